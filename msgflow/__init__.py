@@ -1,0 +1,63 @@
+"""msgflow: ROS 2 traces as a relational database.
+
+import msgflow
+
+with msgflow.open_db("msgflow.duckdb") as database:
+    database.ingest("~/.ros/tracing/session")
+    print(database.query("e2e-latency").to_pandas())
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from msgflow.database import Database, open_db
+    from msgflow.errors import (
+        DatabaseError,
+        ExitCode,
+        MsgflowError,
+        QueryError,
+        TraceError,
+        UsageError,
+    )
+    from msgflow.query.result import QueryResult
+
+__all__ = [
+    "Database",
+    "DatabaseError",
+    "ExitCode",
+    "MsgflowError",
+    "QueryError",
+    "QueryResult",
+    "TraceError",
+    "UsageError",
+    "__version__",
+    "open_db",
+]
+
+_HOME = {
+    "Database": "msgflow.database",
+    "open_db": "msgflow.database",
+    "DatabaseError": "msgflow.errors",
+    "ExitCode": "msgflow.errors",
+    "MsgflowError": "msgflow.errors",
+    "QueryError": "msgflow.errors",
+    "TraceError": "msgflow.errors",
+    "UsageError": "msgflow.errors",
+    "QueryResult": "msgflow.query.result",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Lazily, so that `msgflow --help` does not pay for the database stack.
+    if name not in _HOME:
+        raise AttributeError(f"module 'msgflow' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

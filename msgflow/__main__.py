@@ -1,0 +1,5 @@
+"""`python -m msgflow`."""
+
+from msgflow.cli.app import main
+
+main()

@@ -1,0 +1,73 @@
+"""`msgflow db`: the database file itself."""
+
+from __future__ import annotations
+
+import typer
+
+from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption, FormatOption, OutputOption
+from msgflow.errors import ExitCode
+
+app = typer.Typer(help="Look after a database file.")
+
+
+@app.callback()
+def group() -> None:
+    """Look after a database file."""
+
+
+@app.command("upgrade")
+def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
+    """Bring a database to the schema and the views of this msgflow."""
+    from msgflow.cli.output import count, print_status
+    from msgflow.db.migrate import upgrade as upgrade_database
+
+    done = upgrade_database(database)
+    if done.before == done.after and not done.views_changed and not done.rederived_runs:
+        print_status(f"{database} is up to date (schema revision {done.after})")
+        return
+    print_status(f"{database}: schema revision {done.before or 'none'} to {done.after}")
+    if done.rederived_runs:
+        print_status(f"links derived anew for {count(len(done.rederived_runs), 'run')}")
+
+
+@app.command("check")
+def check(
+    form: FormatOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Audit the content; exit code 1 when a check finds an error."""
+    import pyarrow
+
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+    from msgflow.query.result import QueryResult
+
+    with Database(database) as opened:
+        results = opened.check()
+    table = pyarrow.table(
+        {
+            "check": pyarrow.array([result.name for result in results], "string"),
+            "severity": pyarrow.array([result.severity for result in results], "string"),
+            "offending_rows": pyarrow.array([result.row_count for result in results], "int64"),
+            "description": pyarrow.array([result.description for result in results], "string"),
+        }
+    )
+    print_result(QueryResult(table), form, output)
+    if any(result.row_count and result.severity == "error" for result in results):
+        raise typer.Exit(ExitCode.FAILED)
+
+
+@app.command("schema")
+def schema(
+    form: FormatOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """List the public views: one row per column, with its type and meaning."""
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        result = opened.schema()
+    print_result(result, form, output)

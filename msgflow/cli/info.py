@@ -1,0 +1,88 @@
+"""`msgflow info`: what a database holds, as a handful of named queries."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    OUTPUT,
+    DatabaseOption,
+    InternalOption,
+    RunOption,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from msgflow.query.result import QueryResult
+
+_PREFIX = "info-"
+SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "diagnostics")
+
+
+class InfoFormat(StrEnum):
+    """How several tables are written; the queries `info-…` give each alone in any format."""
+
+    TABLE = "table"
+    JSON = "json"
+    MARKDOWN = "markdown"
+
+
+def command(
+    run: RunOption = None,
+    internal: InternalOption = False,
+    form: Annotated[
+        InfoFormat, typer.Option("--format", help="How to write it", rich_help_panel=OUTPUT)
+    ] = InfoFormat.TABLE,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
+
+    Each section is a named query, `msgflow query info-topics` for instance.
+    """
+    from msgflow.cli.output import print_lines, print_note
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        results = {
+            section: opened.query(
+                f"{_PREFIX}{section}", run="all" if section == "runs" else run, internal=internal
+            )
+            for section in SECTIONS
+        }
+    lines = _json(results) if form is InfoFormat.JSON else _sections(results, form)
+    print_lines(lines)
+    for section, result in results.items():
+        for note in result.notes:
+            print_note(f"{section}: {note}")
+
+
+def _json(results: dict[str, QueryResult]) -> Iterator[str]:
+    from msgflow.export.formats import json_rows
+
+    yield "{"
+    for position, (section, result) in enumerate(results.items(), start=1):
+        rows = ",\n    ".join(json_rows(result))
+        comma = "," if position < len(results) else ""
+        yield f"  {json.dumps(section)}: [{rows}]{comma}"
+    yield "}"
+
+
+def _sections(results: dict[str, QueryResult], form: InfoFormat) -> Iterator[str]:
+    from msgflow.export.table import markdown_lines, table_lines
+
+    for position, (section, result) in enumerate(results.items()):
+        if position:
+            yield ""
+        if form is InfoFormat.MARKDOWN:
+            yield f"## {section.capitalize()}"
+            yield ""
+            yield from markdown_lines(result)
+        else:
+            yield section.upper()
+            yield from table_lines(result)

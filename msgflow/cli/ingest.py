@@ -1,0 +1,86 @@
+"""`msgflow ingest`: traces into a database."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption
+from msgflow.errors import UsageError
+
+
+class Reader(StrEnum):
+    """What decodes the traces."""
+
+    AUTO = "auto"
+    BT2 = "bt2"
+
+
+def command(
+    traces: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="TRACE...",
+            help="Directories with CTF traces, at any depth; all of them become one run",
+        ),
+    ],
+    name: Annotated[
+        str | None,
+        typer.Option("--name", help="Name of the run", show_default="from the path"),
+    ] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace the run that holds these traces already")
+    ] = False,
+    host: Annotated[
+        list[str] | None,
+        typer.Option("--host", metavar="NAME=PATH", help="Name the host of the traces below PATH"),
+    ] = None,
+    keep_staging: Annotated[
+        Path | None,
+        typer.Option("--keep-staging", metavar="DIR", help="Keep the events as read, as Parquet"),
+    ] = None,
+    reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
+        Reader.AUTO
+    ),
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only")] = False,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Read LTTng traces of a ROS 2 system into a database, as one run."""
+    from msgflow.cli.output import count, print_note, print_status
+    from msgflow.cli.progress import ingest_progress
+    from msgflow.database import Database
+
+    hosts = _hosts(host or [])
+    with Database(database) as opened, ingest_progress(quiet) as progress:
+        report = opened.ingest(
+            traces,
+            name=name,
+            replace=replace,
+            hosts=hosts,
+            keep_staging=keep_staging,
+            reader=reader.value,
+            progress=progress,
+        )
+    if quiet:
+        return
+    rate = report.event_count / report.seconds if report.seconds else 0.0
+    print_status(
+        f"{count(report.event_count, 'event')} read into {database} as run"
+        f" {report.run_name} ({report.run_id}) in {report.seconds:.1f} s, {rate:,.0f} events/s"
+    )
+    for diagnostic in report.diagnostics:
+        if diagnostic.severity != "info":
+            print_note(f"{diagnostic.name} ({diagnostic.count}): {diagnostic.detail}")
+
+
+def _hosts(texts: list[str]) -> dict[str, str]:
+    hosts: dict[str, str] = {}
+    for text in texts:
+        name, separator, path = text.partition("=")
+        if not (name and separator and path):
+            raise UsageError(f"--host takes NAME=PATH — {text}", "--host robot=traces/robot")
+        hosts[name] = path
+    return hosts

@@ -1,0 +1,90 @@
+"""The only writer of stdout and of messages: data to stdout, everything said about it to stderr."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+import typer
+
+from msgflow.errors import UsageError
+from msgflow.export.formats import Format, format_of, write_result
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from msgflow.query.result import QueryResult
+
+
+def print_error(message: str, hint: str | None = None) -> None:
+    """Print an error as `error: …`, an empty line, and `hint: …`."""
+    _labelled("error", typer.colors.RED, message)
+    if hint is not None:
+        typer.echo(err=True)
+        _labelled("hint", typer.colors.CYAN, hint)
+
+
+def print_note(text: str) -> None:
+    """Print something worth knowing about the data."""
+    _labelled("note", typer.colors.YELLOW, text)
+
+
+def print_status(text: str) -> None:
+    """Print what was done."""
+    typer.echo(text, err=True)
+
+
+def print_result(result: QueryResult, form: Format | None, path: Path | None) -> None:
+    """Write a result to a file or stdout, and say on stderr what it leaves out.
+
+    Args:
+        result: the rows.
+        form: what to write; chosen by the suffix of `path`, else a table, when None.
+        path: file to write, replaced when it exists; stdout when None.
+
+    Raises:
+        UsageError: Parquet on a terminal, or a file that cannot be written.
+    """
+    from msgflow.atomic import replacing
+
+    form = form or format_of(path)
+    if result.runs:
+        label = "run" if len(result.runs) == 1 else "runs"
+        names = ", ".join(f"{run.name} ({run.run_id})" for run in result.runs)
+        _labelled(label, typer.colors.CYAN, names)
+    if path is not None:
+        with replacing(path) as temporary, temporary.open("wb") as stream:
+            write_result(result, form, stream)
+        print_status(f"{count(len(result), 'row')} written to {path}")
+    else:
+        if form is Format.PARQUET and sys.stdout.isatty():
+            raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
+        write_result(result, form, _stdout())
+    if path is None and not len(result):
+        print_note("no rows")
+    for note in result.notes:
+        print_note(note)
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Write lines of text to stdout."""
+    stream = _stdout()
+    for line in lines:
+        stream.write(f"{line}\n".encode())
+
+
+def count(number: int, thing: str) -> str:
+    """Return '1 row', '2 rows'."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def _stdout() -> IO[bytes]:
+    sys.stdout.flush()
+    return sys.stdout.buffer
+
+
+def _labelled(label: str, color: str, text: str) -> None:
+    styled = label if os.environ.get("NO_COLOR") else typer.style(label, fg=color, bold=True)
+    typer.echo(f"{styled}: {text}", err=True)

@@ -1,0 +1,64 @@
+"""`msgflow query`: every file of `queries/` is a command with its parameters as options."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from msgflow.cli.options import FormatOption, OutputOption
+from msgflow.cli.query_command import build_command
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_queries, load_query, query_names
+
+
+class QueryGroup(TyperGroup):
+    """The named queries as commands, each built when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all queries."""
+        return list(query_names())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of a query; an unknown name is a UsageError with a suggestion."""
+        return build_command(load_query(cmd_name))
+
+
+app = typer.Typer(
+    cls=QueryGroup,
+    subcommand_metavar="[NAME] [OPTIONS]",
+    help="Run a named query; `msgflow query NAME --help` tells what it means and takes.",
+)
+
+
+@app.callback(invoke_without_command=True)
+def group(
+    context: typer.Context,
+    list_queries: Annotated[
+        bool, typer.Option("--list", help="List the queries, as without a name")
+    ] = False,
+    form: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """List the queries, unless one is named."""
+    if context.invoked_subcommand is not None:
+        if list_queries or form or output:
+            raise UsageError(
+                "options of a query come after its name",
+                f"msgflow query {context.invoked_subcommand} --help",
+            )
+        return
+    import pyarrow
+
+    from msgflow.cli.output import print_result
+    from msgflow.query.result import QueryResult
+
+    headers = load_queries()
+    table = pyarrow.table(
+        {
+            "query": pyarrow.array([header.name for header in headers], "string"),
+            "title": pyarrow.array([header.title for header in headers], "string"),
+        }
+    )
+    print_result(QueryResult(table), form, output)

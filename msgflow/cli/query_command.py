@@ -1,0 +1,171 @@
+"""The command of one named query, made from its header."""
+
+from __future__ import annotations
+
+from inspect import Parameter, Signature
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    OUTPUT,
+    DatabaseOption,
+    EndOption,
+    FormatOption,
+    InternalOption,
+    OutputOption,
+    RunOption,
+    SkipFirstOption,
+    StartOption,
+)
+
+if TYPE_CHECKING:
+    from msgflow.query.header import Header, Param
+
+PARAMETERS = "Parameters"
+# Names that the command line gives to every query, so that no query may use them for itself.
+COMMON_OPTIONS = frozenset(
+    (
+        "db",
+        "end",
+        "format",
+        "help",
+        "internal",
+        "list",
+        "output",
+        "run",
+        "show",
+        "skip_first",
+        "start",
+    )
+)
+_OWN = "own_"
+_ShowOption = Annotated[
+    bool,
+    typer.Option("--show", help="Print the SQL and run nothing", rich_help_panel=OUTPUT),
+]
+
+
+def build_command(header: Header) -> Any:
+    """Return the command that runs the query of `header`."""
+
+    def command(**given: Any) -> None:
+        own = {
+            name.removeprefix(_OWN): value
+            for name, value in given.items()
+            if name.startswith(_OWN) and value is not None
+        }
+        if given["show"]:
+            from msgflow.cli.output import print_lines
+
+            print_lines(header.path.read_text(encoding="utf-8").splitlines())
+            return
+        _run(header, own, given)
+
+    parameters = [_option(param) for param in header.params]
+    for name, annotation, default in (
+        ("run", RunOption, None),
+        ("start", StartOption, None),
+        ("end", EndOption, None),
+        ("skip_first", SkipFirstOption, None),
+        ("internal", InternalOption, False),
+        ("form", FormatOption, None),
+        ("output", OutputOption, None),
+        ("show", _ShowOption, False),
+        ("database", DatabaseOption, DEFAULT_DATABASE),
+    ):
+        parameters.append(
+            Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        )
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    single = typer.Typer(
+        add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
+    )
+    single.command(
+        header.name, cls=_command_class(header), help=_help(header), short_help=header.title
+    )(command)
+    return typer.main.get_command(single)
+
+
+def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+
+    with Database(given["database"]) as database:
+        result = database.query(
+            header.name,
+            run=given["run"],
+            start=given["start"],
+            end=given["end"],
+            skip_first=given["skip_first"],
+            internal=given["internal"],
+            **own,
+        )
+    print_result(result, given["form"], given["output"])
+
+
+def _option(param: Param) -> Parameter:
+    flag = f"--{param.name.replace('_', '-')}"
+    shown: Any = False
+    if param.has_default and param.default is not None:
+        shown = (
+            str(param.default).lower() if isinstance(param.default, bool) else str(param.default)
+        )
+    choices = param.choices
+    option = typer.Option(
+        f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
+        metavar=None if param.type == "BOOLEAN" else "|".join(choices) or param.type,
+        help=_escape(param.description),
+        show_default=shown,
+        autocompletion=(lambda: list(choices)) if choices else None,
+        rich_help_panel=PARAMETERS,
+    )
+    kind: Any = bool if param.type == "BOOLEAN" else str
+    return Parameter(
+        f"{_OWN}{param.name}",
+        Parameter.KEYWORD_ONLY,
+        default=None if param.has_default else Parameter.empty,
+        annotation=Annotated[kind | None if param.has_default else kind, option],
+    )
+
+
+def _command_class(header: Header) -> type[TyperCommand]:
+    class QueryCommand(TyperCommand):
+        """A command whose help ends with the columns of the result."""
+
+        def format_help(self, ctx: Any, formatter: Any) -> None:
+            """Print the help of Typer, then the columns."""
+            super().format_help(ctx, formatter)
+            _print_columns(header)
+
+    return QueryCommand
+
+
+def _help(header: Header) -> str:
+    grain = f"\n\n{header.grain[:1].upper()}{header.grain[1:]}." if header.grain else ""
+    return _escape(f"{header.title}.\n\n{header.description}{grain}")
+
+
+def _escape(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)
+
+
+def _print_columns(header: Header) -> None:
+    from rich.console import Console
+    from rich.panel import Panel
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table.grid(padding=(0, 2))
+    for column in header.columns:
+        grid.add_row(
+            Text(column.name, style="bold cyan"),
+            Text(column.type, style="bold yellow"),
+            Text(f"{column.description} [{column.unit}]" if column.unit else column.description),
+        )
+    Console().print(Panel(grid, title="Columns", title_align="left", border_style="dim"))

@@ -1,0 +1,76 @@
+"""The outermost group: turns whatever goes wrong into a message and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from msgflow.cli.output import print_error
+from msgflow.errors import ExitCode, MsgflowError
+from msgflow.version import __version__
+
+COMMANDS = ("ingest", "query", "sql", "info", "export", "db", "simulate")
+REPORT_TO = "https://github.com/msgflow/msgflow/issues"
+
+
+class RootGroup(TyperGroup):
+    """The group of all commands; no exception leaves it."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the commands in the order in which a user needs them."""
+        return sorted(super().list_commands(ctx), key=COMMANDS.index)
+
+    def main(self, *args: Any, **options: Any) -> None:
+        """Run a command line and exit with its code."""
+        options["standalone_mode"] = False
+        try:
+            code = super().main(*args, **options)
+        except MsgflowError as error:
+            print_error(error.message, error.hint)
+            code = error.exit_code
+        except typer.TyperException as error:
+            print_error(*_usage(error))
+            code = error.exit_code
+        except (typer.Abort, KeyboardInterrupt):
+            code = ExitCode.INTERRUPTED
+        except Exception as error:
+            code = _unexpected(error)
+        if code == ExitCode.INTERRUPTED:
+            print_error("interrupted")
+        sys.exit(int(code or 0))
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; a reader that went away (`… | head`) ends it quietly."""
+        try:
+            value = super().invoke(ctx)
+            sys.stdout.flush()
+        except BrokenPipeError:
+            # Python flushes stdout once more when it exits, which must not complain either.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(ExitCode.OK) from None
+        return value
+
+
+def _usage(error: typer.TyperException) -> tuple[str, str | None]:
+    message, _, suggestion = error.format_message().strip().partition(". Did you mean ")
+    context = getattr(error, "ctx", None)
+    hint = None if context is None else f"{context.command_path} --help"
+    if suggestion:
+        hint = f"did you mean {suggestion}"
+    return message[:1].lower() + message[1:].rstrip("."), hint
+
+
+def _unexpected(error: Exception) -> ExitCode:
+    summary = (str(error).strip().splitlines() or [""])[0]
+    if os.environ.get("MSGFLOW_DEBUG") == "1":
+        traceback.print_exception(error)
+        hint = f"report it with the lines above and `msgflow {__version__}` at {REPORT_TO}"
+    else:
+        hint = "run it again with MSGFLOW_DEBUG=1 in the environment to see where, and report it"
+    print_error(f"unexpected {type(error).__name__}: {summary}", hint)
+    return ExitCode.FAILED

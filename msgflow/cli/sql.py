@@ -1,0 +1,53 @@
+"""`msgflow sql`: any SQL, read-only."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption, FormatOption, OutputOption
+from msgflow.errors import UsageError
+
+DEFAULT_LIMIT = 1_000
+
+
+def command(
+    text: Annotated[
+        str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
+    ] = None,
+    file: Annotated[
+        Path | None, typer.Option("-f", "--file", metavar="FILE", help="Read the statements here")
+    ] = None,
+    limit: Annotated[
+        int, typer.Option("--limit", min=0, metavar="ROWS", help="Most rows to print; 0 for all")
+    ] = DEFAULT_LIMIT,
+    form: FormatOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Run SQL on the public views, read-only and without access to other files.
+
+    `msgflow db schema` lists the views.
+    """
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+
+    statements = _statements(text, file)
+    with Database(database) as opened:
+        result = opened.sql(statements, limit=limit or None)
+    print_result(result, form, output)
+
+
+def _statements(text: str | None, file: Path | None) -> str:
+    if (text is None) == (file is None):
+        raise UsageError("give SQL, or a file with -f", 'msgflow sql "SELECT * FROM run"')
+    if file is not None:
+        try:
+            return file.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "not UTF-8 text"
+            raise UsageError(f"cannot read the file: {reason.lower()} — {file}") from None
+    return sys.stdin.read() if text == "-" else str(text)

@@ -1,0 +1,266 @@
+"""A msgflow database as a Python object."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.db.connection import connect
+from msgflow.errors import QueryError, UsageError
+from msgflow.query.catalogue import load_queries, load_query
+from msgflow.query.result import QueryResult
+from msgflow.query.run import read_runs, run_query
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import TracebackType
+
+    from msgflow.db.check import CheckResult
+    from msgflow.export.parquet import ExportedView
+    from msgflow.ingest import IngestProgress, IngestReport
+    from msgflow.query.header import Header
+    from msgflow.query.value import Value
+    from msgflow.query.window import Run
+
+DEFAULT_LIMIT = 10_000
+
+_SCHEMA = """
+SELECT columns.table_name AS view, columns.column_name AS column, columns.data_type AS type,
+    columns.comment AS description
+FROM duckdb_columns() AS columns
+JOIN duckdb_views() AS views
+    ON views.database_name = columns.database_name
+    AND views.schema_name = columns.schema_name
+    AND views.view_name = columns.table_name
+WHERE columns.database_name = current_database() AND columns.schema_name = 'main'
+    AND NOT views.internal
+ORDER BY columns.table_name, columns.column_index
+"""
+
+
+class Database:
+    """A database file: ingest into it, ask it, export it.
+
+    Reading happens on one read-only connection without access to other files or the network,
+    opened at the first question. Use it as a context manager, or call `close`.
+
+    Attributes:
+        path: the file; `ingest` creates it.
+    """
+
+    def __init__(self, path: str | Path, *, memory_limit: str | None = None) -> None:
+        self.path = Path(path)
+        self._memory_limit = memory_limit
+        self._connection: duckdb.DuckDBPyConnection | None = None
+
+    def __enter__(self) -> Database:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; a later call opens it again."""
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    @property
+    def connection(self) -> duckdb.DuckDBPyConnection:
+        """The read-only connection, opened at first use.
+
+        Raises:
+            DatabaseError: the file is missing, locked, foreign, or of another schema revision.
+        """
+        if self._connection is None:
+            connection = connect(self.path, read_only=True, memory_limit=self._memory_limit)
+            connection.execute("SET enable_external_access = false")
+            connection.execute("SET lock_configuration = true")
+            self._connection = connection
+        return self._connection
+
+    def ingest(
+        self,
+        paths: str | Path | Sequence[str | Path],
+        *,
+        name: str | None = None,
+        replace: bool = False,
+        hosts: Mapping[str, str] | None = None,
+        keep_staging: str | Path | None = None,
+        reader: str = "auto",
+        ignore: Sequence[str] = (),
+        progress: Callable[[IngestProgress], None] | None = None,
+    ) -> IngestReport:
+        """Read all traces below `paths` as one run, in one transaction.
+
+        Args:
+            paths: CTF directories, or directories above some.
+            name: of the run; derived from the paths when None.
+            replace: take the place of a run with the same name or packets.
+            hosts: name of a host -> path of one of its traces.
+            keep_staging: directory for the staging tables as Parquet.
+            reader: 'auto' or 'bt2'.
+            ignore: names of events to leave out.
+            progress: called now and then while reading.
+
+        Raises:
+            TraceError: no trace, or none that can be read.
+            DatabaseError: the file is locked, foreign, or of another schema revision.
+        """
+        from msgflow.ingest import ingest
+
+        self.close()
+        return ingest(
+            [paths] if isinstance(paths, str | Path) else list(paths),
+            self.path,
+            name=name,
+            replace=replace,
+            hosts=dict(hosts) if hosts else None,
+            keep_staging=Path(keep_staging) if keep_staging is not None else None,
+            reader=reader,
+            ignore=ignore,
+            memory_limit=self._memory_limit,
+            progress=progress,
+        )
+
+    def query(
+        self,
+        name: str,
+        /,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+        internal: bool = False,
+        **parameters: Value,
+    ) -> QueryResult:
+        """Run a named query.
+
+        Args:
+            name: as `list_queries` has it.
+            run: 'all', a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+            internal: show the rows of ROS's own topics and services too.
+            parameters: the query's own; `from_` means `from`.
+
+        Raises:
+            UsageError: a query, parameter, run or time that does not exist or cannot be read.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        return run_query(
+            self.connection,
+            load_query(name),
+            parameters,
+            run=run,
+            start=start,
+            end=end,
+            skip_first=skip_first,
+            internal=internal,
+        )
+
+    def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
+        """Run SQL, read-only, without access to other files, and return the last result.
+
+        Args:
+            text: one or more statements.
+            limit: most rows returned, all when None; a note says when there were more.
+
+        Raises:
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        if not text.strip().strip(";"):
+            raise UsageError("there is no SQL to run", 'msgflow sql "SELECT * FROM run"')
+        try:
+            relation = self.connection.sql(text)
+        except duckdb.Error as error:
+            raise _sql_error(error) from error
+        return _capped(relation, limit)
+
+    def schema(self) -> QueryResult:
+        """Return the public views: one row per column, with its type and meaning."""
+        return QueryResult(self.connection.sql(_SCHEMA).to_arrow_table())
+
+    def list_queries(self) -> tuple[Header, ...]:
+        """Return the named queries, sorted by name."""
+        return load_queries()
+
+    def runs(self) -> tuple[Run, ...]:
+        """Return the runs in the database, oldest first."""
+        return read_runs(self.connection)
+
+    def check(self) -> list[CheckResult]:
+        """Audit the content: one result per check below `schema/check`."""
+        from msgflow.db.check import run_checks
+
+        return run_checks(self.connection)
+
+    def export_parquet(
+        self,
+        directory: str | Path,
+        views: Sequence[str] = (),
+        *,
+        run: str | int | None = "all",
+        force: bool = False,
+    ) -> tuple[ExportedView, ...]:
+        """Write public views to `directory`, one Parquet file each.
+
+        Args:
+            directory: created if missing.
+            views: names of views; all when empty.
+            run: 'all', a name or an id; the latest run when None.
+            force: replace files that exist.
+
+        Raises:
+            UsageError: a view or run that does not exist, a file that does.
+        """
+        from msgflow.export.parquet import export_parquet
+
+        return export_parquet(self.connection, Path(directory), views=views, run=run, force=force)
+
+
+def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:
+    import pyarrow
+
+    if relation is None:
+        return QueryResult(pyarrow.table({}))
+    try:
+        if limit is None:
+            return QueryResult(relation.to_arrow_table())
+        table = relation.limit(limit + 1).to_arrow_table()
+    except duckdb.Error as error:
+        raise _sql_error(error) from error
+    if table.num_rows <= limit:
+        return QueryResult(table)
+    note = f"only the first {limit} rows are shown; --limit raises that"
+    return QueryResult(table.slice(0, limit), notes=[note])
+
+
+def _sql_error(error: duckdb.Error) -> QueryError:
+    # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
+    what, *more = first_line(error), *str(error).strip().splitlines()[1:]
+    place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))
+    hint = " ".join(line.strip() for line in more[:place] if line.strip())
+    return QueryError("\n".join([what, *more[place:]]), hint or None)
+
+
+def open_db(path: str | Path, *, memory_limit: str | None = None) -> Database:
+    """Return the database at `path`, which is opened at the first question.
+
+    Args:
+        path: file; need not exist before the first ingest.
+        memory_limit: for DuckDB, such as '2GB'; chosen by msgflow when None.
+    """
+    return Database(path, memory_limit=memory_limit)

@@ -1,0 +1,1 @@
+"""The database: definition of its tables, connections, migrations, views and audits."""

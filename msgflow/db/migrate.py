@@ -1,0 +1,173 @@
+"""Creates databases and brings old ones up to date: Alembic for tables, then the views anew."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.db import objects
+from msgflow.db.connection import (
+    is_empty,
+    open_file,
+    recorded_revision,
+    require_current,
+    require_known,
+)
+from msgflow.errors import DatabaseError
+from msgflow.resources import resource_directory
+
+if TYPE_CHECKING:
+    from sqlalchemy.engine import Connection
+
+
+@dataclass(frozen=True)
+class Upgrade:
+    """What an upgrade did.
+
+    Attributes:
+        before: schema revision found; None for a new file.
+        after: schema revision now.
+        views_changed: whether the views had to be applied anew.
+        rederived_runs: names of the runs whose links were derived anew.
+    """
+
+    before: str | None
+    after: str
+    views_changed: bool
+    rederived_runs: tuple[str, ...]
+
+
+def current_revision(con: duckdb.DuckDBPyConnection) -> str | None:
+    """Return the schema revision of a database, or None where it is not msgflow's."""
+    return recorded_revision(con)
+
+
+def create(path: Path) -> None:
+    """Create a database at `path`, complete or not at all.
+
+    Raises:
+        DatabaseError: something is there already, or the directory cannot be written.
+    """
+    if path.exists():
+        raise DatabaseError(f"a file is there already — {path}", "give another file with --db")
+    try:
+        with tempfile.TemporaryDirectory(prefix=".msgflow-", dir=path.parent) as directory:
+            fresh = Path(directory) / "new.duckdb"
+            con = open_file(fresh, read_only=False)
+            try:
+                _bring_to_head(con)
+            finally:
+                con.close()
+            os.replace(fresh, path)
+    except OSError as error:
+        raise DatabaseError(
+            f"cannot create a database — {path}: {error.strerror}",
+            "give a file in a directory that exists and can be written with --db",
+        ) from error
+
+
+def require_ingestable(path: Path) -> None:
+    """Raise unless `path` does not exist yet, or is a current msgflow database.
+
+    Raises:
+        DatabaseError: the file is locked, foreign, or of another schema revision.
+    """
+    if not path.exists():
+        if not path.parent.is_dir():
+            raise DatabaseError(
+                f"no such directory — {path.parent}", "give a file in an existing directory"
+            )
+        return
+    con = open_file(path, read_only=False)
+    try:
+        require_current(con, path)
+    finally:
+        con.close()
+
+
+def upgrade(path: Path) -> Upgrade:
+    """Bring a database to the schema, views and links of this msgflow, in one transaction each.
+
+    Raises:
+        DatabaseError: the file is missing, locked, foreign, or newer than this msgflow.
+    """
+    if not path.exists():
+        raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
+    con = open_file(path, read_only=False)
+    try:
+        before = None if is_empty(con) else require_known(con, path)
+        row = (
+            None
+            if before is None
+            else con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
+        )
+        views_changed = row is None or row[0] != objects.definition_hash()
+        _bring_to_head(con)
+        return Upgrade(before, objects.head_revision(), views_changed, _rederive(con))
+    finally:
+        con.close()
+
+
+def _bring_to_head(con: duckdb.DuckDBPyConnection) -> None:
+    con.execute("CREATE SCHEMA IF NOT EXISTS store")
+    with sqlalchemy_connection(con) as connection:
+        _alembic_upgrade(connection)
+    con.begin()
+    try:
+        objects.apply(con)
+        con.commit()
+    except BaseException:
+        con.rollback()
+        raise
+
+
+def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
+    from msgflow.db.derive import derive, stale_runs
+
+    stale = stale_runs(con)
+    if not stale:
+        return ()
+    con.begin()
+    try:
+        for run_id, _ in stale:
+            derive(con, run_id)
+        con.commit()
+    except BaseException:
+        con.rollback()
+        raise
+    return tuple(name for _, name in stale)
+
+
+def _alembic_upgrade(connection: Connection) -> None:
+    from alembic import command
+    from alembic.config import Config
+
+    config = Config()
+    config.set_main_option("script_location", str(resource_directory("migrations")))
+    config.set_main_option("path_separator", "os")
+    config.attributes["connection"] = connection
+    command.upgrade(config, "head")
+
+
+@contextmanager
+def sqlalchemy_connection(con: duckdb.DuckDBPyConnection) -> Iterator[Connection]:
+    """Lend a DuckDB connection to SQLAlchemy; it stays open and is committed at the end."""
+    from duckdb_engine import ConnectionWrapper
+    from sqlalchemy import create_engine
+    from sqlalchemy.pool import StaticPool
+
+    engine = create_engine(
+        "duckdb://", creator=lambda: ConnectionWrapper(con.cursor()), poolclass=StaticPool
+    )
+    try:
+        with engine.begin() as connection:
+            yield connection
+    finally:
+        engine.dispose()

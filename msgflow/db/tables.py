@@ -1,0 +1,594 @@
+"""The one definition of the tables in schema `store`.
+
+`schema/tables.sql` is rendered from here for readers, the migrations are the frozen history of how
+files came to look like this, and the public views in schema `main` are what users read.
+
+Every table has one comment that states its grain; every column one that states its meaning.
+Relations are declared in `info["references"]`: DuckDB's foreign keys would forbid replacing a run
+in one transaction, so `schema/check` proves them instead.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from duckdb_engine.datatypes import UBigInteger
+from sqlalchemy import (
+    TIMESTAMP,
+    BigInteger,
+    Boolean,
+    Column,
+    Integer,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+)
+from sqlalchemy.types import TypeEngine
+
+SCHEMA = "store"
+metadata = MetaData(schema=SCHEMA)
+
+RUN_COMMENT = "Run that the row belongs to"
+
+
+def _column(
+    name: str,
+    type_: TypeEngine[Any] | type[TypeEngine[Any]],
+    comment: str,
+    *,
+    key: bool = False,
+    required: bool = False,
+    references: str | None = None,
+) -> Column[Any]:
+    info = {} if references is None else {"references": references}
+    return Column(
+        name,
+        type_,
+        comment=comment,
+        primary_key=key,
+        autoincrement=False,
+        nullable=not (required or key),
+        info=info,
+    )
+
+
+def _key(name: str, comment: str) -> Column[Any]:
+    return _column(name, BigInteger, comment, key=True)
+
+
+def _id(name: str, comment: str) -> Column[Any]:
+    """Key of an instance or link table: unique, but not worth an index."""
+    return _column(name, BigInteger, comment, required=True)
+
+
+def _reference(name: str, comment: str, *, to: str, required: bool = False) -> Column[Any]:
+    return _column(name, BigInteger, comment, required=required, references=to)
+
+
+def _run() -> Column[Any]:
+    return _reference("run_id", RUN_COMMENT, to="run.run_id", required=True)
+
+
+def _trace(required: bool = True) -> Column[Any]:
+    return _reference(
+        "trace_id", "Trace it was recorded in", to="trace.trace_id", required=required
+    )
+
+
+def _process() -> Column[Any]:
+    return _reference("process_id", "Process it lives in", to="process.process_id", required=True)
+
+
+def _thread(
+    comment: str = "Thread it happened on", name: str = "thread_id", required: bool = True
+) -> Column[Any]:
+    return _reference(name, comment, to="thread.thread_id", required=required)
+
+
+def _time(name: str, comment: str, *, required: bool = False) -> Column[Any]:
+    return _column(name, BigInteger, f"{comment} [epoch ns]", required=required)
+
+
+def _order(name: str, comment: str) -> Column[Any]:
+    return _column(name, BigInteger, f"{comment}; position in the event order of the run")
+
+
+def _text(name: str, comment: str, *, required: bool = False) -> Column[Any]:
+    return _column(name, String, comment, required=required)
+
+
+def _count(name: str, comment: str) -> Column[Any]:
+    return _column(name, BigInteger, comment)
+
+
+def _flag(name: str, comment: str) -> Column[Any]:
+    return _column(name, Boolean, comment, required=True)
+
+
+def _handle(name: str, comment: str) -> Column[Any]:
+    return _column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
+
+
+def _table(name: str, comment: str, *columns: Column[Any]) -> Table:
+    return Table(name, metadata, *columns, comment=comment)
+
+
+# --- the database itself -------------------------------------------------------------------------
+
+definition = _table(
+    "definition",
+    "One row per part of the schema that is re-applied rather than migrated",
+    _column("name", String, "'views': the SQL of all views and macros", key=True),
+    _text("hash", "SHA-256 of the SQL that was last applied", required=True),
+    _text("msgflow_version", "Version of msgflow that applied it", required=True),
+)
+
+# --- what was read -------------------------------------------------------------------------------
+
+run = _table(
+    "run",
+    "One row per ingest of traces that belong together",
+    _key("run_id", "Identity of the run"),
+    _text(
+        "name", "Name given by the user, or the name of the first trace directory", required=True
+    ),
+    _column("created_at", TIMESTAMP, "When the run was ingested, UTC", required=True),
+    _text("msgflow_version", "Version of msgflow that ingested the run", required=True),
+    _text("derivation_hash", "SHA-256 of the SQL that derived the links", required=True),
+    _time("start_ns", "First event of any trace"),
+    _time("end_ns", "Last event of any trace"),
+    _count("event_count", "Events read"),
+)
+
+trace = _table(
+    "trace",
+    "One row per CTF trace read",
+    _key("trace_id", "Identity of the trace"),
+    _run(),
+    _reference("host_id", "Host that was traced", to="host.host_id", required=True),
+    _text("path", "Directory as it was given", required=True),
+    _text("uuid", "UUID of the trace"),
+    _text("tracer", "Tracer and its version"),
+    _text("domain", "'ust' or 'kernel'"),
+    _time("start_ns", "First event or packet begin"),
+    _time("end_ns", "Last event or packet end"),
+    _count("event_count", "Events read"),
+    _count("discarded_event_count", "Events that the tracer counted as discarded"),
+)
+
+packet = _table(
+    "packet",
+    "One row per packet of a trace; the identity of what was read",
+    _run(),
+    _trace(),
+    _count("stream_class_id", "Stream class (channel) of the packet"),
+    _count("stream_instance_id", "Stream (buffer) of the packet"),
+    _column("cpu_id", Integer, "CPU that wrote the packet"),
+    _count("position", "Position in its stream, from 0"),
+    _time("begin_ns", "Begin of the packet"),
+    _time("end_ns", "End of the packet"),
+    _time("last_event_ns", "Last event in the packet"),
+    _count("event_count", "Events in the packet"),
+    _count("discarded_event_count", "Events lost in the packet, after its last event"),
+    _count("lost_packet_count", "Packets missing right before it"),
+)
+
+loss_interval = _table(
+    "loss_interval",
+    "One row per gap in a trace",
+    _run(),
+    _trace(),
+    _column("cpu", Integer, "CPU concerned; NULL: all"),
+    _text(
+        "kind",
+        "'loss' (discarded events), 'packets' (lost packets) or 'pause' (not tracing)",
+        required=True,
+    ),
+    _time("start_ns", "Last moment before the gap"),
+    _time("end_ns", "First moment after the gap"),
+    _count("event_count", "Events lost, where the tracer counted them"),
+)
+
+clock = _table(
+    "clock",
+    "One row per clock: hosts of one clock need no synchronisation",
+    _key("clock_id", "Identity of the clock"),
+    _run(),
+    _text("uuid", "UUID of the clock (LTTng: boot identity)"),
+    _column(
+        "offset_ns", BigInteger, "Added to a time of this clock to correct it [ns]", required=True
+    ),
+    _column(
+        "drift_ppb", BigInteger, "Added per elapsed time since reference_ns [1e-9]", required=True
+    ),
+    _time("reference_ns", "Moment at which the correction is offset_ns alone", required=True),
+    _column("uncertainty_ns", BigInteger, "Bound of the error of the correction [ns]"),
+    _text("method", "'none', 'messages', 'packets' or 'file'", required=True),
+)
+
+host = _table(
+    "host",
+    "One row per machine or container",
+    _key("host_id", "Identity of the host"),
+    _run(),
+    _reference("clock_id", "Clock of the host", to="clock.clock_id", required=True),
+    _text("hostname", "Name recorded in the trace, or given by the user", required=True),
+)
+
+process = _table(
+    "process",
+    "One row per process life",
+    _key("process_id", "Identity of the process life"),
+    _run(),
+    _reference("host_id", "Host it ran on", to="host.host_id", required=True),
+    _column("pid", Integer, "Process id, virtual where the trace has no other", required=True),
+    _text("name", "Name of the process (its first thread)"),
+    _text("tracetools_version", "Version that rcl_init stated; for display only"),
+    _time("first_seen_ns", "First event"),
+    _time("last_seen_ns", "Last event"),
+    _column("pid_namespace", BigInteger, "PID namespace, where the trace has it"),
+    _column("life", Integer, "Number of the life among those of one pid, from 1", required=True),
+)
+
+thread = _table(
+    "thread",
+    "One row per thread",
+    _key("thread_id", "Identity of the thread"),
+    _run(),
+    _process(),
+    _column("tid", Integer, "Thread id, virtual where the trace has no other", required=True),
+    _text("name", "Name of the thread"),
+    _order("first_event_id", "First event"),
+    _order("last_event_id", "Last event"),
+    _time("first_seen_ns", "First event"),
+    _time("last_seen_ns", "Last event"),
+)
+
+# --- entities ------------------------------------------------------------------------------------
+
+
+def _node_reference() -> Column[Any]:
+    return _reference("node_id", "Node it belongs to", to="node.node_id")
+
+
+node = _table(
+    "node",
+    "One row per ROS node",
+    _key("node_id", "Identity of the node"),
+    _run(),
+    _process(),
+    _text("name", "Name without namespace"),
+    _text("namespace", "Namespace, beginning with /"),
+    _text("full_name", "Namespace and name"),
+    _handle("node_handle", "rcl node handle"),
+    _time("created_ns", "rcl_node_init"),
+    _flag("is_inferred", "Its initialisation was not traced"),
+)
+
+publisher = _table(
+    "publisher",
+    "One row per publisher",
+    _key("publisher_id", "Identity of the publisher"),
+    _run(),
+    _process(),
+    _node_reference(),
+    _text("topic_name", "Fully expanded topic name"),
+    _handle("publisher_handle", "rcl publisher handle"),
+    _handle("rmw_handle", "rmw publisher handle"),
+    _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
+    _count("queue_depth", "History depth asked for"),
+    _time("created_ns", "First initialisation event"),
+    _flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
+    _flag("is_inferred", "Its initialisation was not traced"),
+)
+
+subscription = _table(
+    "subscription",
+    "One row per subscription",
+    _key("subscription_id", "Identity of the subscription"),
+    _run(),
+    _process(),
+    _node_reference(),
+    _text("topic_name", "Fully expanded topic name"),
+    _handle("subscription_handle", "rcl subscription handle"),
+    _handle("rmw_handle", "rmw subscription handle"),
+    _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
+    _count("queue_depth", "History depth asked for"),
+    _time("created_ns", "First initialisation event"),
+    _flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
+    _flag("is_inferred", "Its initialisation was not traced"),
+)
+
+timer = _table(
+    "timer",
+    "One row per timer",
+    _key("timer_id", "Identity of the timer"),
+    _run(),
+    _process(),
+    _node_reference(),
+    _column("period_ns", BigInteger, "Period [ns]"),
+    _handle("timer_handle", "rcl timer handle"),
+    _time("created_ns", "rcl_timer_init"),
+)
+
+service = _table(
+    "service",
+    "One row per service",
+    _key("service_id", "Identity of the service"),
+    _run(),
+    _process(),
+    _node_reference(),
+    _text("service_name", "Fully expanded service name"),
+    _handle("service_handle", "rcl service handle"),
+    _handle("rmw_handle", "rmw service handle"),
+    _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
+    _time("created_ns", "rcl_service_init"),
+    _flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+)
+
+client = _table(
+    "client",
+    "One row per service client",
+    _key("client_id", "Identity of the client"),
+    _run(),
+    _process(),
+    _node_reference(),
+    _text("service_name", "Fully expanded service name"),
+    _handle("client_handle", "rcl client handle"),
+    _handle("rmw_handle", "rmw client handle"),
+    _column("gid", LargeBinary, "Identifier that servers see, 16 bytes; NULL: none"),
+    _time("created_ns", "rcl_client_init"),
+    _flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+)
+
+callback = _table(
+    "callback",
+    "One row per callback object",
+    _key("callback_id", "Identity of the callback"),
+    _run(),
+    _process(),
+    _node_reference(),
+    _text("kind", "'subscription', 'timer', 'service' or 'unknown'", required=True),
+    _reference("subscription_id", "Its subscription", to="subscription.subscription_id"),
+    _reference("timer_id", "Its timer", to="timer.timer_id"),
+    _reference("service_id", "Its service", to="service.service_id"),
+    _handle("callback_handle", "Address of the callback object"),
+    _text("symbol", "Function registered for it; NULL: none or unresolvable"),
+    _time("created_ns", "First initialisation event"),
+)
+
+executor = _table(
+    "executor",
+    "One row per executor",
+    _key("executor_id", "Identity of the executor"),
+    _run(),
+    _process(),
+    _text(
+        "kind",
+        "'single_threaded', 'multi_threaded', 'unknown', or as CARET names it",
+        required=True,
+    ),
+    _flag("is_inferred", "Deduced from the threads that run the same callbacks"),
+)
+
+executor_thread = _table(
+    "executor_thread",
+    "One row per thread of an executor",
+    _run(),
+    _reference("executor_id", "The executor", to="executor.executor_id", required=True),
+    _thread("The thread"),
+)
+
+annotation = _table(
+    "annotation",
+    "One row per declared indirect link",
+    _key("annotation_id", "Identity of the annotation"),
+    _run(),
+    _text("kind", "'periodic_async' or 'partial_sync'", required=True),
+    _text("source", "'trace' or 'file'", required=True),
+    _process(),
+)
+
+annotation_input = _table(
+    "annotation_input",
+    "One row per subscription of an annotation",
+    _run(),
+    _reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
+    _reference("subscription_id", "Its input", to="subscription.subscription_id", required=True),
+)
+
+annotation_output = _table(
+    "annotation_output",
+    "One row per publisher of an annotation",
+    _run(),
+    _reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
+    _reference("publisher_id", "Its output", to="publisher.publisher_id", required=True),
+)
+
+lifecycle_transition = _table(
+    "lifecycle_transition",
+    "One row per state change of a managed node",
+    _run(),
+    _reference("node_id", "The node", to="node.node_id"),
+    _time("at_ns", "Moment of the change", required=True),
+    _text("start_state", "State that was left"),
+    _text("goal_state", "State that was entered"),
+)
+
+diagnostic = _table(
+    "diagnostic",
+    "One row per thing worth knowing about the input",
+    _run(),
+    _trace(required=False),
+    _text("name", "What was found; a closed vocabulary", required=True),
+    _text("severity", "'info', 'warning', 'data_loss' or 'error'", required=True),
+    _count("count", "How often"),
+    _text("detail", "Where, and what it means"),
+)
+
+# --- instances -----------------------------------------------------------------------------------
+
+publication = _table(
+    "publication",
+    "One row per publish() call",
+    _id("publication_id", "Identity of the publication"),
+    _run(),
+    _trace(),
+    _reference(
+        "publisher_id", "Publisher; NULL: the middleware itself", to="publisher.publisher_id"
+    ),
+    _process(),
+    _thread(),
+    _time("start_ns", "First layer seen", required=True),
+    _time("end_ns", "Last layer seen", required=True),
+    _time("intra_ns", "rclcpp_intra_publish"),
+    _time("rclcpp_ns", "rclcpp_publish"),
+    _time("rcl_ns", "rcl_publish"),
+    _time("rmw_ns", "rmw_publish"),
+    _time("dds_ns", "dds:write"),
+    _time("source_timestamp_ns", "Stamp that the middleware sent along, clock of ROS"),
+    _order("start_event_id", "First layer seen"),
+    _order("end_event_id", "Last layer seen"),
+)
+
+take = _table(
+    "take",
+    "One row per message handed over to a subscription",
+    _id("take_id", "Identity of the take"),
+    _run(),
+    _trace(),
+    _reference("subscription_id", "Subscription", to="subscription.subscription_id"),
+    _process(),
+    _thread(),
+    _time("taken_ns", "Moment of the hand-over", required=True),
+    _time("source_timestamp_ns", "Stamp that came with the message, clock of ROS"),
+    _text("method", "'rmw', 'ring_buffer', 'caret' or 'callback_only'", required=True),
+    _order("start_event_id", "First layer seen"),
+    _order("end_event_id", "Last layer seen"),
+)
+
+callback_instance = _table(
+    "callback_instance",
+    "One row per run of a callback",
+    _id("callback_instance_id", "Identity of the run"),
+    _run(),
+    _trace(),
+    _reference("callback_id", "Callback that ran", to="callback.callback_id", required=True),
+    _process(),
+    _thread(),
+    _time("start_ns", "callback_start", required=True),
+    _time("end_ns", "callback_end; NULL: never seen to end"),
+    _reference("take_id", "Message it was called with", to="take.take_id"),
+    _reference("request_id", "Request it was called with", to="request.request_id"),
+    _flag("is_intra_process", "Called with an intra-process message"),
+    _reference("parent_id", "Run it is nested in", to="callback_instance.callback_instance_id"),
+    _column("depth", Integer, "Nesting depth on its thread, from 1", required=True),
+    _order("start_event_id", "callback_start"),
+    _order("end_event_id", "callback_end; NULL: never seen to end"),
+    _order("effective_end_event_id", "callback_end, else the first event that cannot be inside"),
+)
+
+request = _table(
+    "request",
+    "One row per service request",
+    _id("request_id", "Identity of the request"),
+    _run(),
+    _reference("client_id", "Client that sent it", to="client.client_id"),
+    _reference("service_id", "Service that took it", to="service.service_id"),
+    _count("sequence_number", "Number given by the client"),
+    _time("sent_ns", "rmw_send_request"),
+    _time("taken_ns", "rmw_take_request"),
+    _thread("Thread that sent it", "sender_thread_id", required=False),
+    _thread("Thread that took it", "receiver_thread_id", required=False),
+    _reference(
+        "callback_instance_id",
+        "Service callback it led to",
+        to="callback_instance.callback_instance_id",
+    ),
+)
+
+response = _table(
+    "response",
+    "One row per service response",
+    _id("response_id", "Identity of the response"),
+    _run(),
+    _reference("client_id", "Client that took it", to="client.client_id"),
+    _reference("service_id", "Service that sent it", to="service.service_id"),
+    _count("sequence_number", "Number given by the client"),
+    _time("sent_ns", "rmw_send_response"),
+    _time("taken_ns", "rmw_take_response"),
+    _thread("Thread that sent it", "sender_thread_id", required=False),
+    _thread("Thread that took it", "receiver_thread_id", required=False),
+    _reference(
+        "callback_instance_id",
+        "Service callback it came from",
+        to="callback_instance.callback_instance_id",
+    ),
+)
+
+executor_state = _table(
+    "executor_state",
+    "One row per interval between two executor events of a thread",
+    _run(),
+    _reference("executor_id", "Executor", to="executor.executor_id"),
+    _thread(),
+    _text("state", "'wait', 'process' or 'execute'", required=True),
+    _time("start_ns", "Executor event that began it", required=True),
+    _time("end_ns", "Next executor event of the thread; NULL: the last"),
+    _reference(
+        "callback_instance_id",
+        "First callback run in it",
+        to="callback_instance.callback_instance_id",
+    ),
+    _order("start_event_id", "Executor event that began it"),
+)
+
+# --- links ---------------------------------------------------------------------------------------
+
+link_transport = _table(
+    "link_transport",
+    "One row per take whose publication is known",
+    _run(),
+    _reference(
+        "publication_id",
+        "Where the message came from",
+        to="publication.publication_id",
+        required=True,
+    ),
+    _reference("take_id", "Where it was received", to="take.take_id", required=True),
+    _text("method", "'exact', 'exact_stamp', 'nearest' or 'ring_buffer'", required=True),
+    _count("candidate_count", "Publications that it could have been"),
+    _flag("is_self_loop", "Received by the publishing node itself"),
+    _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
+)
+
+link_causal = _table(
+    "link_causal",
+    "One row per callback run that led to a publication",
+    _run(),
+    _reference(
+        "callback_instance_id", "Cause", to="callback_instance.callback_instance_id", required=True
+    ),
+    _reference("publication_id", "Effect", to="publication.publication_id", required=True),
+    _text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
+    _reference("annotation_id", "Annotation that declares it", to="annotation.annotation_id"),
+    _count("candidate_count", "Runs that it could have been"),
+    _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
+)
+
+link_request = _table(
+    "link_request",
+    "One row per request that a callback run or thread sent",
+    _run(),
+    _reference("request_id", "Effect", to="request.request_id", required=True),
+    _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+)
+
+link_response = _table(
+    "link_response",
+    "One row per response and the callback run that sent it",
+    _run(),
+    _reference("response_id", "Effect", to="response.response_id", required=True),
+    _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+)

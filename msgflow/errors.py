@@ -1,0 +1,60 @@
+"""Every error that a user can cause, with what to do about it and the exit code of the command."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What the process returns; part of the interface."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    TRACE = 3
+    DATABASE = 4
+    INTERRUPTED = 130
+
+
+class MsgflowError(Exception):
+    """Something that the user can put right.
+
+    Attributes:
+        message: what went wrong and with which object, one sentence without a full stop.
+        hint: the command to run or the thing to check, or None.
+        exit_code: what the command line returns.
+    """
+
+    exit_code: ExitCode = ExitCode.FAILED
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return self.message if self.hint is None else f"{self.message}\n\nhint: {self.hint}"
+
+
+class QueryError(MsgflowError):
+    """A query does not exist, got parameters it does not have, or failed."""
+
+    exit_code = ExitCode.FAILED
+
+
+class UsageError(MsgflowError):
+    """The command or call itself is wrong."""
+
+    exit_code = ExitCode.USAGE
+
+
+class TraceError(MsgflowError):
+    """A trace is missing, unreadable, or holds nothing that msgflow can use."""
+
+    exit_code = ExitCode.TRACE
+
+
+class DatabaseError(MsgflowError):
+    """A database is missing, locked, foreign, or of another schema revision."""
+
+    exit_code = ExitCode.DATABASE

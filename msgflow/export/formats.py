@@ -1,0 +1,121 @@
+"""Writes a result as bytes in one of the formats of the command line."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from typing import IO, TYPE_CHECKING
+
+from msgflow.export.plain import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from pathlib import Path
+
+    import pyarrow as pa
+
+    from msgflow.query.result import QueryResult
+
+_ROWS_AT_ONCE = 10_000
+
+
+class Format(StrEnum):
+    """How a result is written; all but table and markdown are exact."""
+
+    TABLE = "table"
+    CSV = "csv"
+    JSON = "json"
+    JSONL = "jsonl"
+    PARQUET = "parquet"
+    MARKDOWN = "markdown"
+
+
+_SUFFIXES = {
+    ".csv": Format.CSV,
+    ".json": Format.JSON,
+    ".jsonl": Format.JSONL,
+    ".md": Format.MARKDOWN,
+    ".parquet": Format.PARQUET,
+}
+
+
+def format_of(path: Path | None) -> Format:
+    """Return the format that the suffix of a file asks for, else a table."""
+    return Format.TABLE if path is None else _SUFFIXES.get(path.suffix.lower(), Format.TABLE)
+
+
+def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
+    """Write `result` to a binary stream, text as UTF-8."""
+    if form is Format.CSV:
+        _write_csv(result.table, stream)
+    elif form is Format.PARQUET:
+        import pyarrow.parquet
+
+        pyarrow.parquet.write_table(result.table, stream, compression="zstd")
+    else:
+        for line in _lines(result, form):
+            stream.write(f"{line}\n".encode())
+
+
+def json_rows(result: QueryResult) -> Iterator[str]:
+    """Yield each row as a JSON object on one line."""
+    for batch in result.table.to_batches(max_chunksize=_ROWS_AT_ONCE):
+        for row in batch.to_pylist():
+            yield json.dumps(plain(row), ensure_ascii=False, allow_nan=False)
+
+
+def _lines(result: QueryResult, form: Format) -> Iterable[str]:
+    from msgflow.export.table import markdown_lines, table_lines
+
+    if form is Format.TABLE:
+        return table_lines(result)
+    if form is Format.MARKDOWN:
+        return markdown_lines(result)
+    return json_rows(result) if form is Format.JSONL else _json_array(result)
+
+
+def _json_array(result: QueryResult) -> Iterator[str]:
+    if not len(result):
+        yield "[]"
+        return
+    before = "["
+    row = ""
+    for following in json_rows(result):
+        if row:
+            yield f"{before}{row},"
+            before = " "
+        row = following
+    yield f"{before}{row}]"
+
+
+def _write_csv(table: pa.Table, stream: IO[bytes]) -> None:
+    # Text in quotes, NULL without: so an empty text and a missing one stay apart.
+    import pyarrow
+    import pyarrow.csv
+
+    columns = [_csv_column(column) for column in table.columns]
+    pyarrow.csv.write_csv(pyarrow.table(columns, names=table.column_names), stream)
+
+
+def _csv_column(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    import pyarrow
+    import pyarrow.types as types
+
+    kind = column.type
+    if (
+        types.is_integer(kind)
+        or types.is_floating(kind)
+        or types.is_boolean(kind)
+        or types.is_string(kind)
+    ):
+        return column
+    if types.is_decimal(kind) and kind.scale == 0:
+        return column
+    return pyarrow.chunked_array([pyarrow.array(map(_csv_text, column.to_pylist()), "string")])
+
+
+def _csv_text(value: object) -> str | None:
+    simple = plain(value)
+    if simple is None or isinstance(simple, str):
+        return simple
+    return json.dumps(simple, ensure_ascii=False)

@@ -1,0 +1,76 @@
+"""Values as people read them, for tables and Markdown only; every other format is exact."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from msgflow.export.plain import plain
+from msgflow.query.window import format_epoch
+
+NULL = "-"
+DURATION = "ns"
+MOMENT = "epoch ns"
+
+
+def format_duration(duration_ns: float) -> str:
+    """Return a duration with the unit that fits: '812 ns', '562.411 µs', '45.602 ms', '1.250 s'."""
+    whole = round(duration_ns)
+    sign, size = ("-", -whole) if whole < 0 else ("", whole)
+    if size < 1_000:
+        return f"{sign}{size} ns"
+    if size < 1_000_000:
+        return f"{sign}{size // 1_000}.{size % 1_000:03d} µs"
+    microseconds = (size + 500) // 1_000
+    if microseconds < 1_000_000:
+        return f"{sign}{microseconds // 1_000}.{microseconds % 1_000:03d} ms"
+    milliseconds = (size + 500_000) // 1_000_000
+    return f"{sign}{milliseconds // 1_000}.{milliseconds % 1_000:03d} s"
+
+
+def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False) -> str:
+    """Return one cell of a table.
+
+    Args:
+        value: as Arrow gives it to Python.
+        unit: of the column, 'ns' for durations and 'epoch ns' for points in time.
+        is_handle: an address, shown in hexadecimal.
+    """
+    if value is None:
+        return NULL
+    value = plain(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return _number(value, unit, is_handle)
+    if isinstance(value, list):
+        return ", ".join(format_cell(item, unit, is_handle=is_handle) for item in value)
+    return _printable(str(value))
+
+
+def shown_name(name: str, unit: str | None, names: tuple[str, ...]) -> str:
+    """Return the title of a column: `_ns` goes where the unit stands in the cells instead."""
+    short = name.removesuffix("_ns")
+    if unit in (DURATION, MOMENT) and short and (short == name or short not in names):
+        return short
+    return name
+
+
+def _number(value: float, unit: str | None, is_handle: bool) -> str:
+    if unit == DURATION:
+        return format_duration(value)
+    if isinstance(value, int):
+        if unit == MOMENT:
+            return format_epoch(value)
+        return f"0x{value:x}" if is_handle else str(value)
+    if value == 0 or abs(value) >= 0.001:
+        return f"{value:.3f}"
+    return f"{value:.3g}"
+
+
+def _printable(text: str) -> str:
+    # Names come from traces: no terminal shall obey what stands in them.
+    if text.isprintable():
+        return text
+    return "".join(
+        character if character.isprintable() else repr(character)[1:-1] for character in text
+    )

@@ -1,0 +1,152 @@
+"""The catalogue of tracepoints: what is loaded of each event, and the staging table it goes to.
+
+The data is in `tracepoints.toml`; this gives it Arrow and SQL form.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pyarrow as pa
+
+COMMON_COLUMNS = (
+    ("event_id", "BIGINT"),
+    ("ts_ns", "BIGINT"),
+    ("trace_index", "INTEGER"),
+    ("cpu_id", "INTEGER"),
+    ("vpid", "INTEGER"),
+    ("vtid", "INTEGER"),
+    ("procname", "VARCHAR"),
+    ("pid_ns", "BIGINT"),
+)
+"""First columns of every staging table: `msgflow.trace.COMMON_SCHEMA` in SQL."""
+
+_FILE = Path(__file__).with_name("tracepoints.toml")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A payload field.
+
+    Attributes:
+        name: the column, and the name in most traces.
+        type: DuckDB's type of the column.
+        aliases: other names in traces.
+        since: first version of tracetools that has it, None if as old as the event.
+        until: last version of tracetools that has it, None if it is still there.
+        where: other places that have it, None if there are no others.
+    """
+
+    name: str
+    type: str
+    aliases: tuple[str, ...] = ()
+    since: str | None = None
+    until: str | None = None
+    where: str | None = None
+
+
+@dataclass(frozen=True)
+class Tracepoint:
+    """An event.
+
+    Attributes:
+        name: provider and event, such as 'ros2:rcl_publish'.
+        description: one sentence.
+        fields: its payload, over all versions.
+        since: first version of tracetools that has it, None for other providers.
+        until: last version of tracetools that has it, None if it is still there.
+        where: other places that have it, None if there are no others.
+    """
+
+    name: str
+    description: str
+    fields: tuple[Field, ...]
+    since: str | None = None
+    until: str | None = None
+    where: str | None = None
+
+    @property
+    def provider(self) -> str:
+        """The part before the colon."""
+        return self.name.partition(":")[0]
+
+    @property
+    def event(self) -> str:
+        """The part after the colon."""
+        return self.name.partition(":")[2]
+
+    @property
+    def table(self) -> str:
+        """Name of the staging table."""
+        return f"{self.provider}_{self.event}"
+
+    def arrow_schema(self) -> pa.Schema:
+        """Return the payload columns as `TraceSet.batches` wants them."""
+        import pyarrow as pa
+
+        return pa.schema(
+            [
+                pa.field(
+                    field.name,
+                    _arrow_type(field.type),
+                    metadata={"aliases": ",".join(field.aliases)} if field.aliases else None,
+                )
+                for field in self.fields
+            ]
+        )
+
+    def create_table_sql(self, catalog: str) -> str:
+        """Return the statement that creates the staging table in this catalog or schema."""
+        columns = [*COMMON_COLUMNS, *((field.name, field.type) for field in self.fields)]
+        body = ",\n".join(f'    "{name}" {sql_type}' for name, sql_type in columns)
+        return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """All tracepoints.
+
+    Attributes:
+        tracepoints: by name, in the order of the file.
+    """
+
+    tracepoints: Mapping[str, Tracepoint]
+
+    def arrow_schemas(self) -> dict[str, pa.Schema]:
+        """Return the payload columns of all, which is the `wanted` of `TraceSet.batches`."""
+        return {name: tracepoint.arrow_schema() for name, tracepoint in self.tracepoints.items()}
+
+
+@cache
+def load() -> Catalogue:
+    """Read the catalogue that comes with msgflow."""
+    entries = tomllib.loads(_FILE.read_text(encoding="utf-8"))["tracepoint"]
+    return Catalogue({entry["name"]: _tracepoint(entry) for entry in entries})
+
+
+def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
+    fields = tuple(
+        Field(**{**field, "aliases": tuple(field.get("aliases", ()))}) for field in entry["fields"]
+    )
+    return Tracepoint(**{**entry, "fields": fields})
+
+
+def _arrow_type(sql_type: str) -> pa.DataType:
+    import pyarrow as pa
+
+    if sql_type.endswith("[]"):
+        return pa.list_(_arrow_type(sql_type.removesuffix("[]")))
+    return {
+        "UBIGINT": pa.uint64(),
+        "BIGINT": pa.int64(),
+        "INTEGER": pa.int32(),
+        "UTINYINT": pa.uint8(),
+        "VARCHAR": pa.string(),
+    }[sql_type]

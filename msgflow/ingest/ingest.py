@@ -1,0 +1,284 @@
+"""One ingest: all given traces become one run of a database, or nothing changes."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import duckdb
+
+from msgflow import trace as trace_package
+from msgflow.db import migrate, objects
+from msgflow.db.connection import connect
+from msgflow.db.derive import derive
+from msgflow.errors import TraceError, UsageError
+from msgflow.ingest import judge, model, staging
+from msgflow.ingest.store import delete, store
+from msgflow.ingest.workspace import workspace
+from msgflow.trace import Progress, TraceInfo
+from msgflow.version import __version__
+
+# Enough for a run of any size: what does not fit goes to the workspace on disk.
+DEFAULT_MEMORY_LIMIT = "640MB"
+
+
+@dataclass(frozen=True)
+class IngestProgress:
+    """How far an ingest has come.
+
+    Attributes:
+        stage: what is being done, for people.
+        events: events read so far.
+        fraction: part of this stage that is done, 0 to 1; None where nobody knows.
+        events_per_second: rate of reading so far.
+    """
+
+    stage: str
+    events: int
+    fraction: float | None
+    events_per_second: float
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """Something worth knowing about the input: a row of the view `diagnostic`."""
+
+    name: str
+    severity: str
+    count: int
+    detail: str
+
+
+@dataclass(frozen=True)
+class IngestReport:
+    """What an ingest did.
+
+    Attributes:
+        run_id: the new run.
+        run_name: its name.
+        event_count: events read.
+        seconds: wall time, by stage, in the order of the stages.
+        diagnostics: what is worth knowing about the input.
+    """
+
+    run_id: int
+    run_name: str
+    event_count: int
+    stage_seconds: Mapping[str, float]
+    diagnostics: tuple[Diagnostic, ...]
+
+    @property
+    def seconds(self) -> float:
+        """Wall time of the whole ingest."""
+        return sum(self.stage_seconds.values())
+
+
+def ingest(
+    paths: Sequence[str | Path],
+    database: Path,
+    *,
+    name: str | None = None,
+    replace: bool = False,
+    hosts: Mapping[str, str] | None = None,
+    keep_staging: Path | None = None,
+    reader: str = "auto",
+    ignore: Sequence[str] = (),
+    memory_limit: str | None = None,
+    progress: Callable[[IngestProgress], None] | None = None,
+) -> IngestReport:
+    """Read all traces below `paths` into `database` as one run.
+
+    Everything happens in one transaction; a new database appears only when it is complete.
+
+    Args:
+        paths: CTF traces, session directories, or directories above such.
+        database: the database file; created where it does not exist.
+        name: name of the run; that of the first path when None.
+        replace: delete the runs that hold some of these packets already, or have this name.
+        hosts: name of a host -> path; the traces below the path belong to that host.
+        keep_staging: directory to which the staged events are written as Parquet.
+        reader: which reader to use: 'auto' or 'bt2'.
+        ignore: patterns of event names that are not loaded, such as 'dds:*'.
+        memory_limit: most memory that the database takes, such as '4GB'.
+        progress: called every now and then.
+
+    Raises:
+        TraceError: a path holds no trace, or none that can be read and used.
+        DatabaseError: the database is locked, foreign, or of another schema revision.
+        UsageError: the packets are in the database already, or the name of the run is taken.
+    """
+    watch = _Watch(progress)
+    watch.enter("opening the traces")
+    with trace_package.open(paths, reader=reader) as traces:
+        judge.require_ros_traces(traces.traces)
+        hostnames = _hostnames(traces.traces, hosts or {})
+        migrate.require_ingestable(database)
+        with workspace(database) as directory, _target(database, directory) as target:
+            con = connect(target, read_only=False, memory_limit=memory_limit or DEFAULT_MEMORY_LIMIT)
+            try:
+                con.execute(f"SET temp_directory = '{str(directory).replace(chr(39), chr(39) * 2)}'")
+                con.execute("SET preserve_insertion_order = false")
+                if name is not None and not replace:
+                    _require_free_name(con, name)
+                staging.attach(con, directory / "raw.duckdb")
+                watch.enter("reading the traces")
+                loaded = staging.load_traces(
+                    con,
+                    traces,
+                    hostnames=hostnames,
+                    ignore=ignore,
+                    replace=replace,
+                    progress=watch.reading,
+                )
+                judge.require_ros_events(traces.traces, loaded.event_counts)
+                event_count = sum(loaded.event_counts.values())
+                watch.enter("building the model")
+                model.build(con)
+                if keep_staging is not None:
+                    watch.enter("writing the staged events")
+                    staging.export(con, keep_staging)
+                watch.enter("storing the run")
+                con.begin()
+                try:
+                    run_name = name or Path(paths[0]).resolve().name or "run"
+                    run_id = _write(con, run_name, name is not None, loaded, event_count, watch)
+                    con.commit()
+                except BaseException:
+                    con.rollback()
+                    raise
+                diagnostics = _diagnostics(con, run_id)
+                watch.enter("closing the database")
+            finally:
+                con.close()
+    return IngestReport(run_id, run_name, event_count, watch.finish(), diagnostics)
+
+
+def _write(
+    con: duckdb.DuckDBPyConnection,
+    run_name: str,
+    is_named_by_user: bool,
+    loaded: staging.Loaded,
+    event_count: int,
+    watch: _Watch,
+) -> int:
+    row = con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchone()
+    run_id = 1 if row is None else int(row[0])
+    replaced = set(loaded.replaced_runs)
+    if is_named_by_user:
+        named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [run_name]).fetchall()
+        replaced |= {number for (number,) in named}
+    store(con, run_id)
+    delete(con, sorted(replaced))
+    if not is_named_by_user:
+        run_name = _free_name(con, run_name)
+    con.execute(
+        "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "
+        "start_ns, end_ns, event_count) SELECT ?, ?, now() AT TIME ZONE 'UTC', ?, ?, "
+        "min(start_ns), max(end_ns), ? FROM store.trace WHERE run_id = ?",
+        [run_id, run_name, __version__, objects.derivation_hash(), event_count, run_id],
+    )
+    if loaded.duplicate_packet_count:
+        con.execute(
+            "INSERT INTO store.diagnostic (run_id, name, severity, count, detail) "
+            "VALUES (?, 'duplicate_packet', 'info', ?, 'packets that several of the given traces "
+            "hold were read once')",
+            [run_id, loaded.duplicate_packet_count],
+        )
+    watch.enter("linking messages")
+    derive(con, run_id)
+    return run_id
+
+
+def _diagnostics(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Diagnostic, ...]:
+    rows = con.execute(
+        "SELECT name, severity, count, detail FROM main.diagnostic WHERE run_id = ? ORDER BY ALL",
+        [run_id],
+    ).fetchall()
+    return tuple(Diagnostic(*row) for row in rows)
+
+
+def _require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
+    if name in _names(con):
+        raise UsageError(
+            f"the database has a run of that name already — {name}",
+            "give another --name, or --replace",
+        )
+
+
+def _free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
+    taken = _names(con)
+    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def _names(con: duckdb.DuckDBPyConnection) -> set[str]:
+    return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
+
+
+def _hostnames(traces: Sequence[TraceInfo], hosts: Mapping[str, str]) -> dict[int, str]:
+    names: dict[int, str] = {}
+    for name, path in hosts.items():
+        root = Path(path).resolve()
+        found = [t.index for t in traces if t.path == root or root in t.path.parents]
+        if not found:
+            raise TraceError(
+                f"none of the traces lies below the path given for host {name} — {path}",
+                "give --host NAME=PATH with a directory that holds traces of this ingest",
+            )
+        names.update(dict.fromkeys(found, name))
+    return names
+
+
+@contextlib.contextmanager
+def _target(database: Path, directory: Path) -> Iterator[Path]:
+    """Yield the file to write to: the database, or a new one that takes its place at the end."""
+    if database.exists():
+        yield database
+        return
+    fresh = directory / "target.duckdb"
+    migrate.create(fresh)
+    yield fresh
+    os.replace(fresh, database)
+
+
+class _Watch:
+    """Times the stages and reports them."""
+
+    def __init__(self, report: Callable[[IngestProgress], None] | None) -> None:
+        self._report = report
+        self._seconds: dict[str, float] = {}
+        self._stage: str | None = None
+        self._since = 0.0
+        self._events = 0
+        self._rate = 0.0
+
+    def enter(self, stage: str) -> None:
+        """Begin a stage; the one before it has ended."""
+        self._close()
+        self._stage, self._since = stage, time.monotonic()
+        self._tell(None)
+
+    def reading(self, state: Progress, seconds: float) -> None:
+        """Take over the progress of the reader."""
+        self._events = state.events
+        self._rate = state.events / seconds if seconds > 0 else 0.0
+        self._tell(state.fraction)
+
+    def finish(self) -> Mapping[str, float]:
+        """End the last stage and return the seconds of each."""
+        self._close()
+        return dict(self._seconds)
+
+    def _close(self) -> None:
+        if self._stage is not None:
+            self._seconds[self._stage] = time.monotonic() - self._since
+            self._stage = None
+
+    def _tell(self, fraction: float | None) -> None:
+        if self._report is not None and self._stage is not None:
+            self._report(IngestProgress(self._stage, self._events, fraction, self._rate))

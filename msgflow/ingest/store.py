@@ -1,0 +1,68 @@
+"""Moves a run from staging into the tables of `store`, giving it its ids."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import duckdb
+from sqlalchemy import Column, Table
+
+from msgflow.db.tables import metadata
+
+
+def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Copy every staging table that has the name of a store table, inside the open transaction.
+
+    Ids in staging count from 1; in the store a run has one contiguous block per table, after
+    what is there.
+    """
+    staged = {
+        name
+        for (name,) in con.execute(
+            "SELECT table_name FROM duckdb_tables() WHERE database_name = 'staging' "
+            "AND schema_name = 'main'"
+        ).fetchall()
+    }
+    bases = _bases(con)
+    for table in metadata.tables.values():
+        if table.name in staged:
+            _copy(con, table, run_id, bases)
+
+
+def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
+    """Delete runs from every table, inside the open transaction."""
+    for run_id in run_ids:
+        for table in metadata.tables.values():
+            if "run_id" in table.columns:
+                con.execute(f"DELETE FROM {table.fullname} WHERE run_id = ?", [run_id])
+
+
+def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
+    bases = {}
+    for table in metadata.tables.values():
+        key = f"{table.name}_id"
+        if key in table.columns:
+            row = con.execute(f"SELECT coalesce(max({key}), 0) FROM {table.fullname}").fetchone()
+            bases[key] = 0 if row is None else int(row[0])
+    return bases
+
+
+def _copy(
+    con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]
+) -> None:
+    names = ", ".join(column.name for column in table.columns)
+    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns)
+    con.execute(
+        f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}"
+    )
+
+
+def _value(table: Table, column: Column[object], run_id: int, bases: dict[str, int]) -> str:
+    if column.name == "run_id":
+        return str(run_id)
+    if column.name == f"{table.name}_id":
+        return f"{column.name} + {bases[column.name]}"
+    reference = column.info.get("references")
+    if reference is None:
+        return f'"{column.name}"'
+    return f"{column.name} + {bases[reference.split('.')[1]]}"

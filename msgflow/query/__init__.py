@@ -1,0 +1,1 @@
+"""Named queries: catalogue of `queries/*.sql`, header parser, parameters, runner, result."""

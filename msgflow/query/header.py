@@ -1,0 +1,253 @@
+"""The header at the top of every SQL file: what the object is called, takes, and returns.
+
+    -- name: e2e-latency
+    -- title: End-to-end latency by path
+    -- description: Time from the start of a flow's root to the end of its sink,
+    --     one line continued by four spaces.
+    -- grain: one row per path
+    -- param: from VARCHAR = NULL     Topic where flows start; every source when NULL
+    -- param: case VARCHAR {first|last} = 'first'     Which rows count
+    -- column: median_ns BIGINT [ns]  Half of the flows took no longer
+    -- needs: flow_path, stat_end_to_end
+
+The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.query.value import Value, parse_literal
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+_FIELD = re.compile(r"-- (?P<key>[a-z_]+):(?: +(?P<value>\S.*))?")
+_CONTINUATION = re.compile(r"-- {4,}(?P<value>\S.*)")
+_NAME = r"(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+_TYPE = r"(?P<type>[A-Za-z_][A-Za-z0-9_]*(?:\([0-9, ]+\))?(?:\[\])*)"
+_CHOICES = r"(?: +\{(?P<choices>[^{}]+)\})?"
+_DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
+_PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
+_COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
+_REPEATABLE = ("param", "column")
+_SINGLE = ("name", "title", "description", "grain", "kind", "severity", "needs")
+_KINDS = ("view", "macro")
+
+
+class HeaderError(ValueError):
+    """A header that does not follow the grammar: a mistake in an SQL file, not of the user."""
+
+
+@dataclass(frozen=True)
+class Param:
+    """A parameter, bound as `$name`.
+
+    Attributes:
+        name: as written after the dollar sign.
+        type: DuckDB type.
+        default: the value bound when none is given; meaningless unless `has_default`.
+        has_default: false where the caller has to give a value.
+        description: one sentence.
+        choices: the only values allowed, or empty for any.
+    """
+
+    name: str
+    type: str
+    default: Value
+    has_default: bool
+    description: str
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the output.
+
+    Attributes:
+        name: column name.
+        type: DuckDB type as `DESCRIBE` prints it.
+        unit: 'ns' for a duration, 'epoch ns' for a point in time, another unit, or None.
+        description: one sentence.
+    """
+
+    name: str
+    type: str
+    unit: str | None
+    description: str
+
+
+@dataclass(frozen=True)
+class Header:
+    """Everything that an SQL file says of itself, and its body.
+
+    Attributes:
+        name: object name, equal to the file name.
+        title: a few words for lists; the name where the file has none.
+        description: what it means.
+        grain: "one row per …"; empty for scalar macros.
+        kind: 'view' (the body is a SELECT) or 'macro' (the body is the whole statement).
+        params: parameters in the order of the file.
+        columns: output columns in the order of the file.
+        needs: names of the objects that the body reads.
+        severity: of a check, else None.
+        body: the SQL below the header.
+        path: the file.
+    """
+
+    name: str
+    title: str
+    description: str
+    grain: str
+    kind: str
+    params: tuple[Param, ...]
+    columns: tuple[Column, ...]
+    needs: tuple[str, ...]
+    severity: str | None
+    body: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class _Field:
+    key: str
+    value: str
+    line: int
+
+
+def parse(text: str, path: Path) -> Header:
+    """Parse the text of an SQL file.
+
+    Args:
+        text: the whole file.
+        path: where it came from, for error messages.
+
+    Raises:
+        HeaderError: says which line is wrong, and how.
+    """
+    fields, body = _split(text, path)
+    single: dict[str, str] = {}
+    for field in fields:
+        if field.key in _REPEATABLE:
+            continue
+        if field.key not in _SINGLE:
+            known = ", ".join((*_SINGLE, *_REPEATABLE))
+            raise _error(path, field.line, f"unknown field {field.key!r}; the fields are {known}")
+        if field.key in single:
+            raise _error(path, field.line, f"{field.key!r} stands twice")
+        single[field.key] = field.value
+    for required in ("name", "description"):
+        if required not in single:
+            raise _error(path, 1, f"the header has no {required!r}")
+    if not body.strip():
+        raise _error(path, len(text.splitlines()) or 1, "there is no SQL below the header")
+    kind = single.get("kind", "view")
+    if kind not in _KINDS:
+        raise _error(path, 1, f"kind {kind!r} is not one of {', '.join(_KINDS)}")
+    params = tuple(_param(field, path) for field in fields if field.key == "param")
+    columns = tuple(_column(field, path) for field in fields if field.key == "column")
+    _check_names(params, path)
+    _check_names(columns, path)
+    return Header(
+        name=single["name"],
+        title=single.get("title", single["name"]),
+        description=single["description"],
+        grain=single.get("grain", ""),
+        kind=kind,
+        params=params,
+        columns=columns,
+        needs=tuple(part.strip() for part in single.get("needs", "").split(",") if part.strip()),
+        severity=single.get("severity"),
+        body=body,
+        path=path,
+    )
+
+
+def read(path: Path) -> Header:
+    """Parse the SQL file at `path`.
+
+    Raises:
+        HeaderError: says which line is wrong, and how.
+    """
+    return parse(path.read_text(encoding="utf-8"), path)
+
+
+def _split(text: str, path: Path) -> tuple[list[_Field], str]:
+    lines = text.splitlines()
+    fields: list[_Field] = []
+    count = 0
+    for number, line in enumerate(lines, start=1):
+        if not line.startswith("--"):
+            break
+        count = number
+        if continuation := _CONTINUATION.fullmatch(line.rstrip()):
+            if not fields:
+                raise _error(path, number, "the header starts with a continuation line")
+            last = fields.pop()
+            joined = f"{last.value} {continuation['value']}".strip()
+            fields.append(_Field(last.key, joined, last.line))
+        elif match := _FIELD.fullmatch(line.rstrip()):
+            fields.append(_Field(match["key"], match["value"] or "", number))
+        else:
+            raise _error(
+                path,
+                number,
+                f"expected '-- field: value', or a continuation after four spaces, not {line!r}"
+                " (separate other comments from the header by an empty line)",
+            )
+    if not fields:
+        raise _error(path, 1, "there is no header")
+    return fields, "\n".join(lines[count:]).strip("\n") + "\n"
+
+
+def _param(field: _Field, path: Path) -> Param:
+    match = _PARAM.fullmatch(field.value)
+    if match is None or (match["default"] is not None and len(match["gap"]) < 2):
+        raise _error(
+            path,
+            field.line,
+            "expected '-- param: name TYPE {choice|choice} = default  description' (choices and"
+            f" default may be left out, two spaces end the default), not {field.value!r}",
+        )
+    choices = tuple(part.strip() for part in (match["choices"] or "").split("|") if part.strip())
+    default: Value = None
+    if match["default"] is not None:
+        try:
+            default = parse_literal(match["default"])
+        except ValueError as error:
+            raise _error(path, field.line, str(error)) from None
+        if choices and default is not None and default not in choices:
+            raise _error(path, field.line, f"the default {default!r} is not among the choices")
+    return Param(
+        name=match["name"],
+        type=match["type"],
+        default=default,
+        has_default=match["default"] is not None,
+        description=match["description"],
+        choices=choices,
+    )
+
+
+def _column(field: _Field, path: Path) -> Column:
+    match = _COLUMN.fullmatch(field.value)
+    if match is None:
+        raise _error(
+            path,
+            field.line,
+            f"expected '-- column: name TYPE [unit]  description', not {field.value!r}",
+        )
+    return Column(match["name"], match["type"], match["unit"], match["description"])
+
+
+def _check_names(items: Sequence[Param | Column], path: Path) -> None:
+    names = [item.name for item in items]
+    for name in names:
+        if names.count(name) > 1:
+            raise _error(path, 1, f"{name!r} stands twice")
+
+
+def _error(path: Path, line: int, message: str) -> HeaderError:
+    return HeaderError(f"{path}:{line}: {message}")

@@ -1,0 +1,105 @@
+"""What a query returns: an Arrow table, and what to say about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msgflow.atomic import replacing
+from msgflow.errors import UsageError
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from msgflow.query.header import Header
+    from msgflow.query.window import Run
+
+
+@dataclass(frozen=True)
+class QueryResult:
+    """Rows in the order of the query. Times are integers in nanoseconds.
+
+    Attributes:
+        table: the rows.
+        header: of the named query, which holds the units; None for plain SQL.
+        runs: the runs that were read; empty for plain SQL.
+        notes: what the rows do not say themselves (hidden rows, truncation), a sentence each.
+    """
+
+    table: pa.Table
+    header: Header | None = None
+    runs: tuple[Run, ...] = ()
+    notes: list[str] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return int(self.table.num_rows)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.table.column_names)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each column that has one ('ns' a duration, 'epoch ns' a point in time)."""
+        if self.header is None:
+            return {}
+        return {column.name: column.unit for column in self.header.columns if column.unit}
+
+    def to_arrow(self) -> pa.Table:
+        """Return the rows as a pyarrow.Table."""
+        return self.table
+
+    def to_pandas(self) -> Any:
+        """Return the rows as a pandas.DataFrame; integers stay exact also beside missing values.
+
+        Raises:
+            UsageError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise UsageError("pandas is not installed", "pip install pandas") from None
+        import pyarrow
+
+        # Without these, a column with one NULL would become float64 and lose nanoseconds.
+        exact = {
+            pyarrow.int64(): pandas.Int64Dtype(),
+            pyarrow.int32(): pandas.Int32Dtype(),
+            pyarrow.uint64(): pandas.UInt64Dtype(),
+            pyarrow.bool_(): pandas.BooleanDtype(),
+        }
+        return self.table.to_pandas(types_mapper=exact.get)
+
+    def to_polars(self) -> Any:
+        """Return the rows as a polars.DataFrame.
+
+        Raises:
+            UsageError: polars is not installed.
+        """
+        try:
+            import polars
+        except ImportError:
+            raise UsageError("polars is not installed", "pip install polars") from None
+        return polars.from_arrow(self.table)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write the rows to a Parquet file and return its path; an existing file is replaced.
+
+        The file's metadata name the query and the version of msgflow.
+
+        Raises:
+            UsageError: the file cannot be written.
+        """
+        import pyarrow.parquet
+
+        metadata = {"msgflow.version": __version__}
+        if self.header is not None:
+            metadata["msgflow.query"] = self.header.name
+        target = Path(path)
+        with replacing(target) as temporary:
+            table = self.table.replace_schema_metadata(metadata)
+            pyarrow.parquet.write_table(table, temporary, compression="zstd")
+        return target

@@ -1,0 +1,152 @@
+"""Runs a named query: chooses runs and window, binds parameters, hides internal rows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.errors import QueryError, UsageError
+from msgflow.query.result import QueryResult
+from msgflow.query.value import parse_text
+from msgflow.query.window import Run, choose_runs, time_window
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pyarrow as pa
+
+    from msgflow.query.header import Header, Param
+    from msgflow.query.value import Value
+
+RESERVED = ("runs", "start_ns", "end_ns")
+INTERNAL_COLUMN = "is_internal"
+
+
+def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
+    """Return all runs of the database, oldest first."""
+    rows = connection.execute(
+        "SELECT run_id, name, start_ns FROM main.run ORDER BY run_id"
+    ).fetchall()
+    return tuple(Run(run_id, name, start_ns) for run_id, name, start_ns in rows)
+
+
+def run_query(
+    connection: duckdb.DuckDBPyConnection,
+    header: Header,
+    parameters: Mapping[str, Value],
+    *,
+    run: str | int | None = None,
+    start: str | int | None = None,
+    end: str | int | None = None,
+    skip_first: float | None = None,
+    internal: bool = False,
+) -> QueryResult:
+    """Run the query of `header`.
+
+    Args:
+        connection: to a database with the public views.
+        header: the query.
+        parameters: its own parameters by name; text is read as the declared type.
+        run: 'all', a name or an id; the latest run when None.
+        start: begin of the time window: epoch ns, offset from the run's start, or ISO time.
+        end: its end, likewise.
+        skip_first: seconds to leave out at the begin of the run.
+        internal: show the rows of ROS's own topics and services too.
+
+    Raises:
+        UsageError: a parameter, run or time that does not exist or cannot be read.
+        QueryError: the database could not run it.
+    """
+    used = connection.extract_statements(header.body)[0].named_parameters
+    has_window = bool(used & {"start_ns", "end_ns"})
+    if not has_window and not start is end is skip_first is None:
+        raise UsageError(
+            f"the query has no time window — {header.name}",
+            "leave out --start, --end and --skip-first",
+        )
+    runs = choose_runs(read_runs(connection), run)
+    start_ns, end_ns = time_window(runs, start, end, skip_first)
+    reserved: dict[str, Value] = {
+        "runs": [chosen.run_id for chosen in runs],
+        "start_ns": start_ns,
+        "end_ns": end_ns,
+    }
+    bindings = {name: value for name, value in reserved.items() if name in used}
+    bindings |= bind(header, parameters)
+    try:
+        table = connection.sql(header.body, params=bindings).to_arrow_table()
+    except duckdb.Error as error:
+        raise QueryError(f"the query failed: {first_line(error)} — {header.name}") from error
+    notes = [] if runs else ["the database holds no run yet"]
+    if not internal and INTERNAL_COLUMN in table.column_names:
+        table, hidden = _without_internal(table)
+        if hidden:
+            rows = "1 internal row is" if hidden == 1 else f"{hidden} internal rows are"
+            notes.append(f"{rows} hidden; --internal shows them")
+    return QueryResult(table, header, runs, notes)
+
+
+def bind(header: Header, given: Mapping[str, Value]) -> dict[str, Value]:
+    """Return the value of every parameter of `header`.
+
+    Args:
+        header: the query.
+        given: values by name; a name that is a word of Python may end with an underscore (`from_`).
+
+    Raises:
+        UsageError: unknown or missing parameter, or a value that does not fit.
+    """
+    names = [param.name for param in header.params]
+    by_name: dict[str, Value] = {}
+    for name, value in given.items():
+        exact = name if name in names else name.removesuffix("_")
+        if exact not in names:
+            raise UsageError(f"{header.name} has no such parameter — {name}", _parameters(header))
+        by_name[exact] = value
+    bound: dict[str, Value] = {}
+    for param in header.params:
+        if param.name in by_name:
+            bound[param.name] = _fit(param, by_name[param.name])
+        elif param.has_default:
+            bound[param.name] = param.default
+        else:
+            raise UsageError(
+                f"{header.name} needs a value for a parameter — {param.name}",
+                f"msgflow query {header.name} --{param.name.replace('_', '-')} {param.type}",
+            )
+    return bound
+
+
+def first_line(error: Exception) -> str:
+    """Return what a database error says, without its category and the quoted SQL."""
+    line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    _, separator, text = line.partition(" Error: ")
+    return (text if separator else line).rstrip(".!")
+
+
+def _fit(param: Param, value: Value) -> Value:
+    if isinstance(value, str):
+        try:
+            value = parse_text(value, param.type)
+        except ValueError:
+            raise UsageError(f"{param.name} takes a {param.type} — {value}") from None
+    if param.choices and value is not None and value not in param.choices:
+        raise UsageError(
+            f"{param.name} has no such value — {value}", f"choose {' or '.join(param.choices)}"
+        )
+    return value
+
+
+def _parameters(header: Header) -> str:
+    if not header.params:
+        return "it has none"
+    return f"its parameters are {', '.join(param.name for param in header.params)}"
+
+
+def _without_internal(table: pa.Table) -> tuple[pa.Table, int]:
+    import pyarrow.compute
+
+    is_internal = pyarrow.compute.fill_null(table[INTERNAL_COLUMN], False)
+    visible = table.filter(pyarrow.compute.invert(is_internal)).drop_columns([INTERNAL_COLUMN])
+    return visible, table.num_rows - visible.num_rows

@@ -1,0 +1,62 @@
+"""Values of parameters: written as a literal in a header, or as text on the command line."""
+
+from __future__ import annotations
+
+import re
+
+Value = None | bool | int | float | str | list["Value"]
+
+_INTEGER = re.compile(r"[+-]?\d+")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_WORDS: dict[str, Value] = {"null": None, "true": True, "false": False}
+_INTEGER_TYPES = frozenset(
+    f"{sign}{size}"
+    for sign in ("", "U")
+    for size in ("TINYINT", "SMALLINT", "INTEGER", "BIGINT", "HUGEINT")
+)
+_REAL_TYPES = frozenset(("FLOAT", "DOUBLE"))
+_YES = frozenset(("true", "yes", "on", "1"))
+_NO = frozenset(("false", "no", "off", "0"))
+
+
+def parse_literal(text: str) -> Value:
+    """Return the value of a literal as SQL writes it: NULL, a truth value, number, string or list.
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    if text.lower() in _WORDS:
+        return _WORDS[text.lower()]
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if _NUMBER.fullmatch(text):
+        return float(text)
+    if len(text) > 1 and text[0] == text[-1] == "'":
+        return text[1:-1].replace("''", "'")
+    if text.startswith("[") and text.endswith("]"):
+        return [parse_literal(part.strip()) for part in text[1:-1].split(",") if part.strip()]
+    raise ValueError(f"{text!r} is not NULL, TRUE, FALSE, a number, a 'string' or a [list]")
+
+
+def parse_text(text: str, type_name: str) -> Value:
+    """Return what `text`, typed by a user, means for a parameter of DuckDB type `type_name`.
+
+    Integers may be hexadecimal (0x…, as handles are printed); a list is separated by commas.
+
+    Raises:
+        ValueError: it is not a value of this type.
+    """
+    if type_name.endswith("[]"):
+        return [parse_text(part.strip(), type_name[:-2]) for part in text.split(",") if part]
+    name = type_name.upper()
+    if name in _INTEGER_TYPES:
+        return int(text, 0) if text.lower().startswith("0x") else int(text)
+    if name in _REAL_TYPES or name.startswith("DECIMAL"):
+        return float(text)
+    if name == "BOOLEAN":
+        if text.lower() in _YES:
+            return True
+        if text.lower() in _NO:
+            return False
+        raise ValueError(text)
+    return text

@@ -1,0 +1,157 @@
+"""Which runs a query reads, and between which times."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MINIMUM_NS = -(2**63)
+MAXIMUM_NS = 2**63 - 1
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_INTEGER = re.compile(r"-?\d+")
+_OFFSET = re.compile(r"(?P<sign>\+?)(?P<number>\d+(?:\.\d+)?)(?P<unit>ns|us|µs|ms|s|min|h)?")
+_UNIT_NS = {
+    "ns": 1,
+    "us": 1_000,
+    "µs": 1_000,
+    "ms": 1_000_000,
+    "s": 1_000_000_000,
+    "min": 60_000_000_000,
+    "h": 3_600_000_000_000,
+}
+_FRACTION = re.compile(r"(?P<head>.*:\d\d)\.(?P<fraction>\d{1,9})(?P<tail>.*)")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One ingest, as far as choosing it needs to know.
+
+    Attributes:
+        run_id: its key.
+        name: its name.
+        start_ns: time of its first event, epoch ns; None for a run without events.
+    """
+
+    run_id: int
+    name: str
+    start_ns: int | None
+
+
+def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
+    """Return the runs that `wanted` means: 'all', an id, a name, or None for the latest.
+
+    Args:
+        runs: all runs of the database.
+        wanted: what the user said; a name wins over an id.
+
+    Raises:
+        UsageError: no such run, or a name that several runs have.
+    """
+    if not runs:
+        return ()
+    ordered = sorted(runs, key=lambda run: run.run_id)
+    if wanted is None:
+        return (ordered[-1],)
+    text = str(wanted)
+    if text == "all":
+        return tuple(ordered)
+    found = [run for run in ordered if run.name == text]
+    if not found and _INTEGER.fullmatch(text):
+        found = [run for run in ordered if run.run_id == int(text)]
+    if len(found) > 1:
+        ids = " or ".join(f"--run {run.run_id}" for run in found)
+        raise UsageError(f"several runs have this name — {text}", f"choose by id: {ids}")
+    if not found:
+        known = ", ".join(f"{run.name} ({run.run_id})" for run in ordered[-10:])
+        raise UsageError(f"there is no such run — {text}", f"the runs are {known}")
+    return tuple(found)
+
+
+def time_window(
+    runs: Sequence[Run],
+    start: str | int | None = None,
+    end: str | int | None = None,
+    skip_first: float | None = None,
+) -> tuple[int, int]:
+    """Return (start, end) in epoch ns, the widest possible where nothing is said.
+
+    Args:
+        runs: the chosen runs; times relative to a start need exactly one.
+        start: epoch ns, an offset from the run's start ('2.5s', '+2.5', '100ms'), or ISO time.
+        end: likewise.
+        skip_first: seconds to leave out at the begin of the run, in place of `start`.
+
+    Raises:
+        UsageError: a time that cannot be read, or an empty window.
+    """
+    if start is not None and skip_first is not None:
+        raise UsageError("--start and --skip-first exclude each other", "give one of them")
+    if skip_first is not None:
+        start_ns = _run_start(runs, "--skip-first") + round(skip_first * 1_000_000_000)
+    else:
+        start_ns = MINIMUM_NS if start is None else _point(start, runs, "--start")
+    end_ns = MAXIMUM_NS if end is None else _point(end, runs, "--end")
+    if start_ns > end_ns:
+        raise UsageError(f"the window ends before it starts — {start_ns} to {end_ns} ns")
+    return start_ns, end_ns
+
+
+def _point(text: str | int, runs: Sequence[Run], option: str) -> int:
+    if isinstance(text, int):
+        return text
+    text = text.strip()
+    if _INTEGER.fullmatch(text):
+        return int(text)
+    if (offset := _OFFSET.fullmatch(text)) and (offset["sign"] or offset["unit"]):
+        return _run_start(runs, option) + _to_ns(offset["number"], offset["unit"] or "s")
+    try:
+        return _iso_ns(text)
+    except ValueError:
+        raise UsageError(
+            f"cannot read the time of {option} — {text}",
+            f"{option} 2.5s (from the start of the run), {option} 1700000000000000000 (epoch ns)"
+            f" or {option} 2023-11-14T22:13:20Z",
+        ) from None
+
+
+def _run_start(runs: Sequence[Run], option: str) -> int:
+    if len(runs) != 1:
+        raise UsageError(
+            f"{option} counts from the start of a run, but {len(runs)} are chosen",
+            "choose one with --run, or give epoch ns or ISO times",
+        )
+    if runs[0].start_ns is None:
+        raise UsageError(f"{option} counts from the start of a run, which has no events")
+    return runs[0].start_ns
+
+
+def _to_ns(number: str, unit: str) -> int:
+    whole, _, fraction = number.partition(".")
+    scale = _UNIT_NS[unit]
+    return int(whole) * scale + (int(fraction) * scale // 10 ** len(fraction) if fraction else 0)
+
+
+def _iso_ns(text: str) -> int:
+    # datetime keeps microseconds only: the fraction is taken off before and added afterwards.
+    nanoseconds = 0
+    if match := _FRACTION.fullmatch(text):
+        nanoseconds = int(match["fraction"].ljust(9, "0"))
+        text = match["head"] + match["tail"]
+    moment = datetime.fromisoformat(text)
+    if moment.tzinfo is None:
+        moment = moment.replace(tzinfo=UTC)
+    return (moment - _EPOCH) // timedelta(seconds=1) * 1_000_000_000 + nanoseconds
+
+
+def format_epoch(time_ns: int) -> str:
+    """Return a point in time as UTC in ISO 8601 with nanoseconds, which `--start` reads back."""
+    seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
+    moment = _EPOCH + timedelta(seconds=seconds)
+    return f"{moment:%Y-%m-%dT%H:%M:%S}.{nanoseconds:09d}Z"

@@ -1,0 +1,12 @@
+"""A small writer of CTF 1.8 as LTTng-UST writes it on x86-64: packed, little endian.
+
+It knows layouts and bytes, nothing of ROS 2 or of the simulation.
+"""
+
+from __future__ import annotations
+
+from msgflow.sim.ctf.stream import StreamWriter
+from msgflow.sim.ctf.trace import TraceIdentity, TraceWriter
+from msgflow.sim.ctf.tracepoint import Tracepoint, thread_context
+
+__all__ = ["StreamWriter", "TraceIdentity", "TraceWriter", "Tracepoint", "thread_context"]

@@ -1,0 +1,75 @@
+"""The middleware's own traffic: ros_discovery_info, published without rcl and taken by a thread.
+
+Whenever an object is created, its process publishes what it has; a listener thread of every
+process takes that. The takes carry no stamp (no message info is asked for), and a process takes
+nothing of what it said itself (`taken = 0`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from msgflow.sim.machine import RunningProcess, Thread
+from msgflow.sim.transport import latency_between
+
+_TOPIC = "ros_discovery_info"
+
+
+class DiscoveryListener(Thread):
+    """The thread of a process that takes discovery messages."""
+
+    def __init__(self, process: RunningProcess) -> None:
+        super().__init__(process, process.pid + 9)
+        self.rmw_handle = process.memory.allocate()
+        self._message = process.memory.on_thread_stack()
+        self._heard: deque[int] = deque()
+        self._awake = False
+
+    def hear(self, time: int, taken: int) -> None:
+        """A message has arrived; `taken` is 0 for the own ones, else 1."""
+        self._heard.append(taken)
+        if not self._awake:
+            self._awake = True
+            self.world.at(time + 10_000 + self.world.tail(20_000), self._listen)
+
+    def _listen(self, time: int, _: None) -> None:
+        if later := self.take_cpu(time):
+            self.world.at(later, self._listen)
+            return
+        rmw_take = self.machine.tracepoints.rmw_take
+        while self._heard:
+            taken = self._heard.popleft()
+            self.emit(rmw_take, time, self.context, self.rmw_handle, self._message, 0, taken)
+            time += 1_500 + int(self.world.random() * 2_000)
+        self.keep_cpu(time)
+        self._awake = False
+
+
+class Discovery:
+    """All listeners, and the publications that they listen to."""
+
+    def __init__(self) -> None:
+        self._listeners: list[DiscoveryListener] = []
+
+    def join(self, listener: DiscoveryListener) -> None:
+        """A process can be heard and hears from now on."""
+        self._listeners.append(listener)
+
+    def announce(self, thread: Thread, rmw_handle: int, message: int, time: int) -> int:
+        """Publish what the process has, from `time` on; returns the time when that is done."""
+        world, machine = thread.world, thread.machine
+        stamp = time + 100
+        rmw = stamp + 50 + int(world.random() * 150)
+        stamp_ns, rmw_ns = stamp + machine.epoch, rmw + machine.epoch
+        thread.emit(
+            machine.tracepoints.rmw_publish, rmw, thread.context, rmw_handle, message, stamp_ns
+        )
+        world.truth.publication.add(
+            next(world.publication_ids), machine.hostname, thread.process.pid, thread.tid, None,
+            _TOPIC, None, rmw_handle, None, None, rmw_ns, stamp_ns, None, True,
+        )  # fmt: skip
+        for listener in self._listeners:
+            latency = latency_between(thread.process, listener.process)
+            arrival = rmw + latency.base + world.tail(latency.tail)
+            world.at(arrival, listener.hear, int(listener.process is not thread.process))
+        return rmw + 5_000 + int(world.random() * 10_000)

@@ -1,0 +1,186 @@
+"""Runs a scenario: builds its hosts and processes, lets time pass, writes traces and truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING
+from uuid import UUID
+
+from msgflow.errors import UsageError
+from msgflow.sim.builtin import scenarios
+from msgflow.sim.ctf import TraceIdentity, TraceWriter
+from msgflow.sim.discovery import Discovery
+from msgflow.sim.layout import layouts
+from msgflow.sim.machine import Machine, RunningProcess
+from msgflow.sim.meta import write_meta
+from msgflow.sim.startup import Startup
+from msgflow.sim.system import SECOND, Host, Scenario
+from msgflow.sim.transport import Middleware
+from msgflow.sim.truth import Truth
+from msgflow.sim.world import World
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from msgflow.sim.executor import ExecutorThread
+
+# 2025-03-14 09:26:53.589793238 UTC: when every simulated trace begins.
+_EPOCH_NS = 1_741_944_413_589_793_238
+_SHORTEST_UPTIME_NS = 3600 * SECOND
+_STOP_DELAY_NS = 2_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """What a simulation has written.
+
+    Attributes:
+        directory: holds one folder per host and `truth`.
+        trace_directories: the CTF traces, one per host in the order of the scenario.
+        event_count: events in all traces.
+        truth: name of each truth table and its Parquet file.
+        meta: JSON file with what was simulated, and counts.
+    """
+
+    directory: Path
+    trace_directories: tuple[Path, ...]
+    event_count: int
+    truth: Mapping[str, Path]
+    meta: Path
+
+
+def simulate(
+    scenario: str | Scenario,
+    directory: Path | str,
+    *,
+    factor: float = 1.0,
+    seed: int = 0,
+    clock_offset_ns: int = 0,
+) -> Simulation:
+    """Simulate a ROS 2 system and write its traces and the truth about them.
+
+    The same arguments give the same bytes.
+
+    Args:
+        scenario: name of a built-in one, or one of your own.
+        directory: where to write; it may exist if it is empty.
+        factor: multiplies the scenario's duration.
+        seed: of everything that is random.
+        clock_offset_ns: each host's clock is this much ahead of that of the host before it, in
+            addition to what the scenario says.
+
+    Raises:
+        UsageError: unknown scenario or layout, factor not positive, directory not empty.
+    """
+    chosen = _choose(scenario)
+    if not 0 < factor < float("inf"):
+        raise UsageError(f"the factor must be a positive number — {factor}")
+    target = _empty_directory(Path(directory))
+    # The course of events depends on name and seed only: a longer run begins like a shorter one.
+    # Yet traces that differ in anything never pass for the same.
+    course = f"{chosen.name}/{seed}"
+    identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}"
+    truth = Truth(target / "truth")
+    world = World(course, truth)
+    machines = {
+        host.hostname: _machine(chosen, host, index * clock_offset_ns, target, identity)
+        for index, host in enumerate(chosen.hosts)
+    }
+    middleware = Middleware(world, overwrites=chosen.overwrites)
+    threads = _start(chosen, world, machines, middleware, course)
+    world.run(int(chosen.duration_ns * factor), middleware.arrive)
+
+    for thread in threads:
+        thread.finish()
+    middleware.finish()
+    end = world.end + _STOP_DELAY_NS
+    for machine in machines.values():
+        machine.trace.close(end)
+    truth.close()
+    meta = target / "truth" / "meta.json"
+    write_meta(
+        meta,
+        chosen,
+        {"seed": seed, "factor": factor, "clock_offset_ns": clock_offset_ns},
+        machines,
+        truth,
+        {
+            "length_ns": end,
+            "failed_takes": middleware.failed_takes,
+            "full_queues": middleware.full_queues,
+            "undelivered": middleware.undelivered,
+        },
+    )
+    return Simulation(
+        directory=target,
+        trace_directories=tuple(machine.trace.directory for machine in machines.values()),
+        event_count=sum(
+            sum(machine.trace.event_counts().values()) for machine in machines.values()
+        ),
+        truth={name: table.path for name, table in truth.tables.items()},
+        meta=meta,
+    )
+
+
+def _choose(scenario: str | Scenario) -> Scenario:
+    known = scenarios()
+    if isinstance(scenario, str):
+        if scenario not in known:
+            raise UsageError(f"unknown scenario — {scenario}", f"choose one of {', '.join(known)}")
+        scenario = known[scenario]
+    if scenario.layout not in layouts():
+        raise UsageError(
+            f"unknown layout — {scenario.layout}", f"choose one of {', '.join(layouts())}"
+        )
+    return scenario
+
+
+def _start(
+    scenario: Scenario,
+    world: World,
+    machines: Mapping[str, Machine],
+    middleware: Middleware,
+    course: str,
+) -> list[ExecutorThread]:
+    """Plan the start of every process; its main threads."""
+    discovery = Discovery()
+    version = layouts()[scenario.layout].version
+    threads = []
+    for number, description in enumerate(scenario.processes):
+        machine = machines[description.hostname]
+        process = RunningProcess(world, machine, description, number, course)
+        startup = Startup(process, middleware, discovery, version)
+        world.at(description.start_ns, startup.begin)
+        threads.append(startup.thread)
+    return threads
+
+
+def _empty_directory(directory: Path) -> Path:
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        raise UsageError(
+            f"not an empty directory — {directory}", "name a directory that does not exist yet"
+        )
+    directory.mkdir(parents=True, exist_ok=True)
+    return directory
+
+
+def _machine(
+    scenario: Scenario, host: Host, clock_offset: int, target: Path, identity_key: str
+) -> Machine:
+    digest = sha256(f"{identity_key}/{host.hostname}".encode()).digest()
+    epoch = _EPOCH_NS + host.clock_offset_ns + clock_offset
+    identity = TraceIdentity(
+        session=scenario.name,
+        hostname=host.hostname,
+        uuid=UUID(bytes=digest[:16], version=4),
+        boot_uuid=UUID(bytes=digest[16:], version=4),
+        epoch_ns=epoch,
+        # Up to about thirteen days, so that hosts count from quite different values.
+        uptime_ns=_SHORTEST_UPTIME_NS + int.from_bytes(digest[:7], "little") % 2**50,
+    )
+    trace = TraceWriter(
+        target / host.hostname, layouts()[scenario.layout], identity, host.cpu_count
+    )
+    return Machine(host.hostname, epoch, trace)

@@ -1,0 +1,146 @@
+"""What a trace declares about itself, through Babeltrace."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import TraceError
+from msgflow.trace.bt2_graph import damaged_error, plugin_class, source_parameters
+from msgflow.trace.bt2_streams import Clock
+from msgflow.trace.discovery import is_ctf2
+from msgflow.trace.model import TraceInfo
+
+if TYPE_CHECKING:
+    from msgflow.trace.bt2_library import Bt2Library
+    from msgflow.trace.model import TraceLocation
+
+_PROCESS_CONTEXT = {"vpid", "vtid"}
+
+
+def describe(library: Bt2Library, location: TraceLocation, index: int) -> TraceInfo:
+    """Read the metadata and the packet index of one trace.
+
+    Raises:
+        TraceError: Babeltrace cannot open it.
+    """
+    if is_ctf2(location) and not library.reads_ctf2:
+        raise TraceError(
+            "the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is "
+            f"{'.'.join(map(str, library.version))} — {location.path}",
+            hint="record with `lttng create --trace-format=ctf-1.8`, or install a newer "
+            "python3-bt2",
+        )
+    bt2 = library.bt2
+    try:
+        trace = _first_trace(library, location)
+        if trace is None:
+            return _undeclared(location, index)
+        # Only after the trace could be opened: on a damaged one this query ends the process.
+        begin_ns, end_ns = _range(library, location)
+        return _info(trace, location, index, begin_ns, end_ns)
+    except bt2._Error as error:
+        raise damaged_error(location.path, error) from error
+
+
+def _range(library: Bt2Library, location: TraceLocation) -> tuple[int | None, int | None]:
+    """Return the first begin and the last end of all streams, from the packet index."""
+    source_class = plugin_class(library, "ctf", "source", "fs")
+    query = library.bt2.QueryExecutor(
+        source_class, "babeltrace.trace-infos", source_parameters(location.path)
+    )
+    ranges = [
+        stream["range-ns"]
+        for trace in query.query()
+        for stream in trace["stream-infos"]
+        if "range-ns" in stream
+    ]
+    begin = min((int(span["begin"]) for span in ranges), default=None)
+    end = max((int(span["end"]) for span in ranges), default=None)
+    return begin, end
+
+
+def _first_trace(library: Bt2Library, location: TraceLocation) -> Any:
+    bt2 = library.bt2
+    specification = bt2.ComponentSpec(
+        plugin_class(library, "ctf", "source", "fs"), source_parameters(location.path)
+    )
+    for message in bt2.TraceCollectionMessageIterator(specification):
+        return message.stream.trace
+    return None
+
+
+def _info(
+    trace: Any, location: TraceLocation, index: int, begin_ns: int | None, end_ns: int | None
+) -> TraceInfo:
+    environment = {str(name): value for name, value in trace.environment.items()}
+    stream_classes = list(trace.cls.values())
+    clocks = [sc.default_clock_class for sc in stream_classes if sc.default_clock_class]
+    if not clocks:
+        raise TraceError(
+            f"the events have no time stamps — {location.path}",
+            hint="record with LTTng or ros2_tracing",
+        )
+    clock = clocks[0]
+    offset = clock.offset
+    epoch = Clock(clock.frequency, offset.seconds, offset.cycles)
+    return TraceInfo(
+        index=index,
+        path=location.path,
+        uuid=None if trace.uuid is None else str(trace.uuid),
+        domain=_text(environment, "domain"),
+        hostname=_text(environment, "hostname"),
+        tracer=_tracer(environment),
+        clock_uuid=None if clock.uuid is None else str(clock.uuid),
+        clock_name=clock.name,
+        clock_offset_ns=epoch.to_ns(0),
+        begin_ns=begin_ns,
+        end_ns=end_ns,
+        has_process_context=all(_has_process_context(sc) for sc in stream_classes),
+        event_names=tuple(
+            sorted({event.name or "" for sc in stream_classes for event in sc.values()})
+        ),
+    )
+
+
+def _undeclared(location: TraceLocation, index: int) -> TraceInfo:
+    """Describe a trace without streams, of which Babeltrace tells nothing."""
+    return TraceInfo(
+        index=index,
+        path=location.path,
+        uuid=None,
+        domain=None,
+        hostname=None,
+        tracer=None,
+        clock_uuid=None,
+        clock_name=None,
+        clock_offset_ns=0,
+        begin_ns=None,
+        end_ns=None,
+        has_process_context=False,
+        event_names=(),
+    )
+
+
+def _has_process_context(stream_class: Any) -> bool:
+    common = _member_names(stream_class.event_common_context_field_class)
+    return all(
+        common | _member_names(event.specific_context_field_class) >= _PROCESS_CONTEXT
+        for event in stream_class.values()
+    )
+
+
+def _member_names(structure: Any) -> set[str]:
+    return set() if structure is None else {str(name) for name in structure}
+
+
+def _text(environment: dict[str, Any], name: str) -> str | None:
+    return str(environment[name]) if name in environment else None
+
+
+def _tracer(environment: dict[str, Any]) -> str | None:
+    name = _text(environment, "tracer_name")
+    if name is None:
+        return None
+    parts = ("tracer_major", "tracer_minor", "tracer_patchlevel", "tracer_patch")
+    version = ".".join(str(environment[part]) for part in parts if part in environment)
+    return f"{name} {version}".rstrip()

@@ -1,0 +1,147 @@
+"""What is read of each event class, and where the rows go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from msgflow.trace.columns import can_hold, names_of, record_batch, renumber, union_type
+from msgflow.trace.schemas import COMMON_SCHEMA
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from msgflow.trace.bt2_fields import FieldReader, Member
+    from msgflow.trace.bt2_library import Bt2Library
+
+Getter = tuple[int, "Callable[[Any], Any]"]
+
+_ROW_HEAD = ("event_id", "ts_ns", "trace_index", "cpu_id")
+_CONTEXT_COLUMNS = ("vpid", "vtid", "procname", "pid_ns")
+_WITHOUT_CONTEXT = {"vpid": -1, "vtid": -1}
+
+
+@dataclass
+class RowStore:
+    """Rows of one event name and one layout, in order of arrival."""
+
+    columns: tuple[str, ...]
+    rows: list[list[Any]] = field(default_factory=list)
+
+    def take(self, schema: pa.Schema, new_ids: Mapping[int, int]) -> pa.RecordBatch:
+        """Empty the store into a batch."""
+        rows = renumber(self.rows, new_ids) if new_ids else self.rows
+        columns = dict(zip(self.columns, zip(*rows, strict=True), strict=True))
+        batch = record_batch(schema, columns, _WITHOUT_CONTEXT, len(rows))
+        self.rows.clear()
+        return batch
+
+
+@dataclass(slots=True)
+class ClassPlan:
+    """How one event class is read.
+
+    `append` is None where the event is not wanted: then it is only counted.
+    """
+
+    trace_index: int
+    name: str
+    append: Callable[[list[Any]], None] | None
+    common: list[Getter]
+    specific: list[Getter]
+    payload: list[Getter]
+    count: int = 0
+
+
+class Planner:
+    """Makes the plans and keeps the rows of all events."""
+
+    def __init__(
+        self,
+        library: Bt2Library,
+        fields: FieldReader,
+        schemas: Mapping[str, pa.Schema],
+    ) -> None:
+        self._native = library.native
+        self._fields = fields
+        self._schemas = {
+            name: pa.schema([*COMMON_SCHEMA, *schema]) for name, schema in schemas.items()
+        }
+        self._payloads = schemas
+        self._stores: dict[str, dict[tuple[str, ...], RowStore]] = {}
+
+    def plan(self, event_class: Any, trace_index: int) -> ClassPlan:
+        """Make the plan of the event class at this pointer."""
+        native = self._native
+        name = native.event_class_get_name(event_class) or ""
+        payload_schema = self._payloads.get(name)
+        if payload_schema is None:
+            return ClassPlan(trace_index, name, None, [], [], [])
+        stream_class = native.event_class_borrow_stream_class_const(event_class)
+        common = self._fields.members(
+            native.stream_class_borrow_event_common_context_field_class_const(stream_class)
+        )
+        specific = self._fields.members(
+            native.event_class_borrow_specific_context_field_class_const(event_class)
+        )
+        payload = self._fields.members(
+            native.event_class_borrow_payload_field_class_const(event_class)
+        )
+        contexts = [field for field in COMMON_SCHEMA if field.name in _CONTEXT_COLUMNS]
+        from_common = _matching(contexts, common)
+        missing = [field for field in contexts if field.name not in from_common]
+        from_specific = _matching(missing, specific)
+        from_payload = _matching(payload_schema, payload)
+        columns = (*_ROW_HEAD, *from_common, *from_specific, *from_payload)
+        store = self._stores.setdefault(name, {}).setdefault(columns, RowStore(columns))
+        return ClassPlan(
+            trace_index,
+            name,
+            store.rows.append,
+            [(member.index, member.get) for member in from_common.values()],
+            [(member.index, member.get) for member in from_specific.values()],
+            [(member.index, member.get) for member in from_payload.values()],
+        )
+
+    def take(self, new_ids: Mapping[int, int]) -> Iterable[tuple[str, pa.RecordBatch]]:
+        """Empty all stores into one batch per event name, in order of `event_id`."""
+        for name, stores in self._stores.items():
+            schema = self._schemas[name]
+            batches = [store.take(schema, new_ids) for store in stores.values() if store.rows]
+            if len(batches) == 1:
+                yield name, batches[0]
+            elif batches:
+                table = pa.Table.from_batches(batches).unify_dictionaries().sort_by("event_id")
+                yield name, table.combine_chunks().to_batches()[0]
+
+
+def merged_schema(declared: Iterable[tuple[Member, ...]]) -> pa.Schema:
+    """Return the payload columns of several declarations of one event.
+
+    Integers of different types become int64; a field of types that do not go together keeps
+    the first one and is NULL where it is declared otherwise.
+    """
+    types: dict[str, pa.DataType] = {}
+    for members in declared:
+        for member in members:
+            known = types.setdefault(member.name, member.type)
+            types[member.name] = union_type(known, member.type) or known
+    return pa.schema(list(types.items()))
+
+
+def _matching(schema: Iterable[pa.Field], members: Iterable[Member]) -> dict[str, Member]:
+    by_name = {member.name: member for member in members}
+    matching = {}
+    for wanted in schema:
+        for name in names_of(wanted):
+            member = by_name.get(name)
+            if member is not None and can_hold(_plain(wanted.type), member.type):
+                matching[wanted.name] = member
+                break
+    return matching
+
+
+def _plain(data_type: pa.DataType) -> pa.DataType:
+    return data_type.value_type if pa.types.is_dictionary(data_type) else data_type

@@ -1,0 +1,101 @@
+"""Rows of Python values to Arrow record batches."""
+
+from __future__ import annotations
+
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+ALIASES = b"aliases"
+"""Key of a field's metadata: other names under which traces have it, comma separated."""
+
+
+def names_of(field: pa.Field) -> tuple[str, ...]:
+    """Return the names under which a trace may have this field, the preferred one first."""
+    metadata = field.metadata or {}
+    aliases = metadata.get(ALIASES, b"").decode()
+    return (field.name, *(alias for alias in aliases.split(",") if alias))
+
+
+def can_hold(wanted: pa.DataType, declared: pa.DataType) -> bool:
+    """Tell whether values of a declared type can be delivered as the wanted type."""
+    types = pa.types
+    if types.is_integer(wanted):
+        return bool(types.is_integer(declared))
+    if types.is_floating(wanted):
+        return bool(types.is_floating(declared) or types.is_integer(declared))
+    if types.is_list(wanted):
+        return bool(types.is_list(declared)) and can_hold(wanted.value_type, declared.value_type)
+    return bool(wanted.equals(declared))
+
+
+def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
+    """Return the type that holds values of both, None if there is none."""
+    if first.equals(second):
+        return first
+    if pa.types.is_integer(first) and pa.types.is_integer(second):
+        return pa.int64()
+    return None
+
+
+def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:
+    """Convert a column of Python values.
+
+    Text that is not UTF-8 gets replacement characters; integers that do not fit are wrapped
+    round as C would, so that a handle keeps its bits.
+    """
+    try:
+        return pa.array(values, data_type)
+    except UnicodeEncodeError:
+        return pa.array([_valid_text(value) for value in values], data_type)
+    except (OverflowError, pa.ArrowInvalid):
+        return pa.array([_wrapped(value, data_type) for value in values], data_type)
+
+
+def record_batch(
+    schema: pa.Schema,
+    columns: Mapping[str, Sequence[Any]],
+    constants: Mapping[str, Any],
+    row_count: int,
+) -> pa.RecordBatch:
+    """Build a batch; a column that is neither given nor constant is NULL."""
+    arrays = []
+    for field in schema:
+        if field.name in columns:
+            arrays.append(to_array(columns[field.name], field.type))
+        elif constants.get(field.name) is not None:
+            arrays.append(pa.repeat(pa.scalar(constants[field.name], field.type), row_count))
+        else:
+            arrays.append(pa.nulls(row_count, field.type))
+    return pa.RecordBatch.from_arrays(arrays, schema=schema)
+
+
+def renumber(rows: list[list[Any]], new_ids: Mapping[int, int]) -> list[list[Any]]:
+    """Replace the first value of each row by its new number and sort by it."""
+    changed = [[new_ids.get(row[0], row[0]), *row[1:]] for row in rows]
+    changed.sort(key=itemgetter(0))
+    return changed
+
+
+def _valid_text(value: Any) -> Any:
+    if isinstance(value, str):
+        return value.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    if isinstance(value, list):
+        return [_valid_text(element) for element in value]
+    if isinstance(value, dict):
+        return {name: _valid_text(element) for name, element in value.items()}
+    return value
+
+
+def _wrapped(value: Any, data_type: pa.DataType) -> Any:
+    if isinstance(value, list):
+        return [_wrapped(element, data_type.value_type) for element in value]
+    if not isinstance(value, int) or not pa.types.is_integer(data_type):
+        return value
+    bits = data_type.bit_width
+    low = value & ((1 << bits) - 1)
+    return low - (1 << bits) if pa.types.is_signed_integer(data_type) and low >> (bits - 1) else low

@@ -1,0 +1,185 @@
+"""Finds the CTF traces below given paths."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError
+from msgflow.trace.model import TraceLocation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+METADATA = "metadata"
+
+_PACKETIZED_MAGIC = (b"\x75\xd1\x1d\x57", b"\x57\x1d\xd1\x75")
+_RECORD_SEPARATOR = b"\x1e"
+_PLAIN_TEXT_BEGIN = (b"/* CTF 1.", b"trace", b"typealias", b"clock", b"env")
+
+_FOREIGN = {
+    ".mcap": "a rosbag2 recording",
+    ".db3": "a rosbag2 recording",
+    ".bag": "a ROS 1 recording",
+    ".pickle": "a converted file of tracetools_analysis",
+    ".tar": "an archive",
+    ".gz": "a compressed file",
+    ".tgz": "an archive",
+    ".zst": "a compressed file",
+    ".xz": "a compressed file",
+    ".bz2": "a compressed file",
+    ".zip": "an archive",
+    ".7z": "an archive",
+}
+_RECORD_HINT = "ros2 trace"
+
+
+def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
+    """List every directory with a `metadata` file below `paths`, sorted by path.
+
+    Symbolic links are followed and resolved, so that no directory is listed twice.
+
+    Raises:
+        TraceError: a path does not exist or cannot be read, there is no CTF trace below it, or
+            none of the traces holds any event data.
+    """
+    found: dict[Path, TraceLocation] = {}
+    for path in map(Path, paths):
+        _check_exists(path)
+        below = [_locate(directory) for directory in _directories_with_metadata(path)]
+        if not below:
+            raise _no_trace_error(path)
+        found.update((location.path, location) for location in below)
+    locations = [found[path] for path in sorted(found)]
+    if not locations:
+        raise TraceError("no trace given", hint="msgflow ingest TRACE")
+    if not any(location.size_bytes for location in locations):
+        raise _nothing_recorded_error(locations)
+    return locations
+
+
+def is_ctf2(location: TraceLocation) -> bool:
+    """Tell whether the metadata is CTF 2 (a sequence of JSON texts), packetized or not."""
+    content = (location.path / METADATA).read_bytes()[:64]
+    return content.startswith(_RECORD_SEPARATOR) or (
+        content.startswith(_PACKETIZED_MAGIC) and content[37:38] == _RECORD_SEPARATOR
+    )
+
+
+def stream_files(directory: Path) -> list[Path]:
+    """List the files of a trace directory that hold events, sorted by name."""
+    return sorted(
+        entry
+        for entry in directory.iterdir()
+        if entry.name != METADATA and not entry.name.startswith(".") and entry.is_file()
+    )
+
+
+def _check_exists(path: Path) -> None:
+    if not path.exists():
+        raise TraceError(f"no such file or directory — {path}", hint=f"ls {path.parent}")
+    if path.is_file():
+        if path.name == METADATA or (path.parent / METADATA).is_file():
+            raise TraceError(
+                f"this is a file inside a trace, give the directory — {path}",
+                hint=f"msgflow ingest {path.parent}",
+            )
+        raise TraceError(
+            f"not a trace but {_describe(path)} — {path}",
+            hint=_hint_for(path),
+        )
+
+
+def _directories_with_metadata(root: Path) -> Iterator[Path]:
+    visited: set[Path] = set()
+
+    def fail(error: OSError) -> None:
+        raise TraceError(
+            f"cannot read the directory ({error.strerror}) — {error.filename}",
+            hint=f"ls -ld {error.filename}",
+        ) from error
+
+    for directory, names, files in os.walk(root, onerror=fail, followlinks=True):
+        resolved = Path(directory).resolve()
+        if resolved in visited:
+            names.clear()
+            continue
+        visited.add(resolved)
+        names.sort()
+        if METADATA in files:
+            yield resolved
+
+
+def _locate(directory: Path) -> TraceLocation:
+    metadata = directory / METADATA
+    try:
+        with metadata.open("rb") as file:
+            begin = file.read(512)
+        files = stream_files(directory)
+        size = sum(file.stat().st_size for file in files)
+    except OSError as error:
+        raise TraceError(
+            f"cannot read the trace ({error.strerror}) — {error.filename}",
+            hint=f"ls -l {directory}",
+        ) from error
+    for path in files:
+        if not os.access(path, os.R_OK):
+            raise TraceError(
+                f"cannot read the trace (Permission denied) — {path}",
+                hint=f"sudo chown -R $USER {directory}",
+            )
+    if not _is_ctf_metadata(begin):
+        raise TraceError(
+            f"not a CTF trace, its `metadata` is something else — {directory}",
+            hint="give the directory that `ros2 trace` or `lttng` wrote",
+        )
+    return TraceLocation(directory, size)
+
+
+def _is_ctf_metadata(begin: bytes) -> bool:
+    if begin.startswith((*_PACKETIZED_MAGIC, _RECORD_SEPARATOR)):
+        return True
+    return begin.lstrip().startswith(_PLAIN_TEXT_BEGIN)
+
+
+def _no_trace_error(path: Path) -> TraceError:
+    entries = sorted(path.iterdir())
+    if not entries:
+        return TraceError(f"empty directory — {path}", hint=_RECORD_HINT)
+    for entry in entries:
+        if entry.suffix in _FOREIGN:
+            return TraceError(
+                f"no CTF trace in this directory, it holds {_describe(entry)} — {entry}",
+                hint=_hint_for(entry),
+            )
+    return TraceError(
+        f"no CTF trace (no file `metadata`) in this directory or below — {path}",
+        hint="give the directory that `ros2 trace` or `lttng` wrote",
+    )
+
+
+def _nothing_recorded_error(locations: Sequence[TraceLocation]) -> TraceError:
+    return TraceError(
+        "the trace has metadata but no events, nothing was recorded — "
+        + ", ".join(str(location.path) for location in locations),
+        hint="start the trace before the application, check that tracetools was built with "
+        "LTTng: ros2 run tracetools status",
+    )
+
+
+def _describe(path: Path) -> str:
+    return _FOREIGN.get(path.suffix, "a file of another kind")
+
+
+def _hint_for(path: Path) -> str:
+    kind = _describe(path)
+    if path.suffix == ".zip":
+        return f"unzip {path}"
+    if "archive" in kind or "compressed" in kind:
+        return f"tar xf {path}"
+    if "tracetools_analysis" in kind:
+        return "give the directory of the trace that it was converted from"
+    if "recording" in kind:
+        return f"messages are not traces, record one: {_RECORD_HINT}"
+    return "give the directory that `ros2 trace` or `lttng` wrote"

@@ -1,0 +1,89 @@
+"""What a trace is to the rest of msgflow: where it lies, what it says of itself, what it yields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pyarrow as pa
+
+
+@dataclass(frozen=True)
+class TraceLocation:
+    """A directory that holds one CTF trace.
+
+    Attributes:
+        path: the directory, absolute, symbolic links resolved.
+        size_bytes: total size of its stream files (without metadata and indexes).
+    """
+
+    path: Path
+    size_bytes: int
+
+
+@dataclass(frozen=True)
+class TraceInfo:
+    """What a trace declares about itself; known before its events are read.
+
+    A trace without any stream file keeps its place in the order but declares nothing.
+
+    Attributes:
+        index: place of the trace among those opened together, from 0, in order of path.
+        path: the directory.
+        uuid: the CTF trace uuid, lower case with hyphens, or None.
+        domain: 'ust', 'kernel', or None when the tracer does not say.
+        hostname: name of the machine or container, or None.
+        tracer: name and version, such as 'lttng-ust 2.13', or None.
+        clock_uuid: uuid of the clock (LTTng: the boot id), or None.
+        clock_name: name of the clock, such as 'monotonic', or None.
+        clock_offset_ns: nanoseconds from the epoch to the origin of the clock.
+        begin_ns: time of the first packet's begin, epoch nanoseconds, or None.
+        end_ns: time of the last packet's end, epoch nanoseconds, or None.
+        has_process_context: every event carries both `vpid` and `vtid`.
+        event_names: event classes declared in the metadata, sorted; they need not occur.
+    """
+
+    index: int
+    path: Path
+    uuid: str | None
+    domain: str | None
+    hostname: str | None
+    tracer: str | None
+    clock_uuid: str | None
+    clock_name: str | None
+    clock_offset_ns: int
+    begin_ns: int | None
+    end_ns: int | None
+    has_process_context: bool
+    event_names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EventBatch:
+    """Consecutive events of one name, or packets.
+
+    Attributes:
+        name: the event's full name such as 'ros2:rcl_publish', or `PACKET` for packets.
+        batch: `COMMON_SCHEMA` and the payload columns; `PACKET_SCHEMA` for packets.
+    """
+
+    name: str
+    batch: pa.RecordBatch
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far reading has come.
+
+    Attributes:
+        events: events read so far, wanted or not.
+        fraction: part of the input that has been read, 0 to 1.
+        time_ns: time of the latest event, epoch nanoseconds.
+    """
+
+    events: int
+    fraction: float
+    time_ns: int

@@ -1,0 +1,97 @@
+"""The interface that every reader fulfils, and the choice of one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.trace.discovery import discover
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
+    from types import TracebackType
+
+    import pyarrow as pa
+
+    from msgflow.trace.model import EventBatch, Progress, TraceInfo
+
+READERS = ("auto", "bt2")
+DEFAULT_BATCH_ROWS = 65_536
+
+
+class TraceSet(ABC):
+    """Traces opened together, read as one sequence of events in time order.
+
+    A context manager; closing it ends an iteration that is under way.
+
+    Attributes:
+        traces: what each trace declares, in order of path.
+        event_counts: (trace index, event name) to the number of events read, wanted or not;
+            only events that occur. Complete after `batches` has ended.
+        duplicate_packet_count: packets skipped because the set holds them twice.
+    """
+
+    traces: tuple[TraceInfo, ...]
+    event_counts: Mapping[tuple[int, str], int]
+    duplicate_packet_count: int
+
+    @abstractmethod
+    def batches(
+        self,
+        wanted: Mapping[str, pa.Schema] | None = None,
+        *,
+        progress: Callable[[Progress], None] | None = None,
+        batch_rows: int = DEFAULT_BATCH_ROWS,
+    ) -> Iterator[EventBatch]:
+        """Read everything once; may be called again, which reads again from the start.
+
+        The batches of one name come in order of `event_id`. Memory stays bounded by
+        `batch_rows`, whatever the size of the traces.
+
+        Args:
+            wanted: event name to the payload columns to deliver. A column is filled from the
+                field of its name, else of a name in its metadata `aliases` (comma separated),
+                else it is NULL. None: all events with all their fields.
+            progress: called every few thousand events and once at the end.
+            batch_rows: events held before they are handed over.
+
+        Raises:
+            TraceError: a trace is damaged; what came before has been delivered.
+            UsageError: the set is closed, or an earlier iteration has not ended.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give everything back. May be called more than once."""
+
+    def __enter__(self) -> TraceSet:
+        return self
+
+    def __exit__(
+        self,
+        exception_type: type[BaseException] | None,
+        exception: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def open(paths: Sequence[str | Path], *, reader: str = "auto") -> TraceSet:
+    """Open all traces below `paths` as one set.
+
+    Args:
+        paths: CTF directories or directories above such.
+        reader: 'bt2' (Babeltrace 2's Python bindings), or 'auto' for the best there is.
+
+    Raises:
+        TraceError: there is no readable trace below a path, or the reader is not installed.
+        UsageError: there is no reader of that name.
+    """
+    if reader not in READERS:
+        raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
+    locations = discover(paths)
+    from msgflow.trace.bt2_reader import Bt2TraceSet
+
+    return Bt2TraceSet(locations)

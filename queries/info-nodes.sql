@@ -1,0 +1,47 @@
+-- name: info-nodes
+-- title: ROS nodes
+-- description: The nodes of a run and how much each has of what; what ROS adds to every node
+--     by itself (parameter services, /rosout, /parameter_events) is not counted.
+-- grain: one row per node
+-- column: run_id BIGINT               Run
+-- column: node VARCHAR                Namespace and name
+-- column: process_name VARCHAR        Process it runs in
+-- column: pid INTEGER                 Id of that process
+-- column: publisher_count BIGINT      Publishers
+-- column: subscription_count BIGINT   Subscriptions
+-- column: timer_count BIGINT          Timers
+-- column: service_count BIGINT        Services
+-- column: client_count BIGINT         Service clients
+-- needs: main.node, main.process, main.publisher, main.subscription, main.timer, main.service,
+--     main.client
+SELECT
+    node.run_id,
+    node.full_name AS node,
+    process.name AS process_name,
+    process.pid,
+    (
+        SELECT count(*)
+        FROM main.publisher
+        WHERE publisher.node_id = node.node_id AND NOT coalesce(publisher.is_internal, FALSE)
+    ) AS publisher_count,
+    (
+        SELECT count(*)
+        FROM main.subscription
+        WHERE subscription.node_id = node.node_id
+            AND NOT coalesce(subscription.is_internal, FALSE)
+    ) AS subscription_count,
+    (SELECT count(*) FROM main.timer WHERE timer.node_id = node.node_id) AS timer_count,
+    (
+        SELECT count(*)
+        FROM main.service
+        WHERE service.node_id = node.node_id AND NOT coalesce(service.is_internal, FALSE)
+    ) AS service_count,
+    (
+        SELECT count(*)
+        FROM main.client
+        WHERE client.node_id = node.node_id AND NOT coalesce(client.is_internal, FALSE)
+    ) AS client_count
+FROM main.node
+LEFT JOIN main.process ON process.process_id = node.process_id
+WHERE list_contains($runs, node.run_id)
+ORDER BY node.run_id, node.full_name, node.node_id

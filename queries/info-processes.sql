@@ -1,0 +1,30 @@
+-- name: info-processes
+-- title: Processes
+-- description: The processes of a run with the number of their threads and nodes.
+-- grain: one row per process life
+-- column: run_id BIGINT                     Run
+-- column: hostname VARCHAR                  Host it ran on
+-- column: pid INTEGER                       Process id
+-- column: process_name VARCHAR              Name of the process
+-- column: tracetools_version VARCHAR        Version of tracetools it was built with
+-- column: node_count BIGINT                 ROS nodes in it
+-- column: thread_count BIGINT               Threads seen
+-- column: first_seen_ns BIGINT [epoch ns]   First event
+-- column: duration_ns BIGINT [ns]           From its first event to its last
+-- needs: main.process, main.host, main.node, main.thread
+SELECT
+    process.run_id,
+    host.hostname,
+    process.pid,
+    process.name AS process_name,
+    process.tracetools_version,
+    (SELECT count(*) FROM main.node WHERE node.process_id = process.process_id) AS node_count,
+    (
+        SELECT count(*) FROM main.thread WHERE thread.process_id = process.process_id
+    ) AS thread_count,
+    process.first_seen_ns,
+    process.last_seen_ns - process.first_seen_ns AS duration_ns
+FROM main.process
+LEFT JOIN main.host ON host.host_id = process.host_id
+WHERE list_contains($runs, process.run_id)
+ORDER BY process.run_id, host.hostname, process.pid, process.process_id

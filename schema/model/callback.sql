@@ -1,0 +1,60 @@
+-- name: staging.callback
+-- description: Callback objects. One that ran but whose creation was not traced gets a row, and
+--     learns its subscription from the takes that it was called with (the most frequent).
+-- grain: one row per callback object
+-- needs: staging.callback_known, staging.callback_binding, staging.subscription, staging.take
+WITH learned AS (
+    SELECT
+        b.process_id,
+        b.callback_handle,
+        mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
+    FROM staging.callback_binding AS b
+    JOIN staging.take AS t ON b.start_event_id = t.callback_start_event_id
+    WHERE b.kind IS NULL OR b.kind = 'unknown'
+    GROUP BY b.process_id, b.callback_handle
+),
+never_added AS (
+    SELECT min(start_event_id) AS event_id, process_id, callback_handle
+    FROM staging.callback_binding
+    WHERE callback_event_id IS NULL
+    GROUP BY process_id, callback_handle
+),
+every_callback AS (
+    SELECT
+        k.event_id, k.process_id, k.kind, k.timer_id, k.service_id, k.node_id,
+        k.callback_handle, k.symbol, k.created_ns, s.subscription_id
+    FROM staging.callback_known AS k
+    LEFT JOIN staging.subscription AS s ON k.subscription_event_id = s.event_id
+    UNION ALL
+    SELECT
+        event_id, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL, NULL, NULL
+    FROM never_added
+),
+complete AS (
+    SELECT
+        c.event_id, c.process_id, c.timer_id, c.service_id, c.callback_handle, c.symbol,
+        c.created_ns,
+        coalesce(c.subscription_id, l.subscription_id) AS subscription_id,
+        CASE WHEN c.kind = 'unknown' AND l.subscription_id IS NOT NULL THEN 'subscription'
+            ELSE c.kind END AS kind,
+        c.node_id
+    FROM every_callback AS c
+    LEFT JOIN learned AS l
+        ON c.kind = 'unknown'
+        AND c.process_id = l.process_id
+        AND c.callback_handle = l.callback_handle
+)
+SELECT
+    row_number() OVER (ORDER BY c.event_id) AS callback_id,
+    c.process_id,
+    coalesce(c.node_id, s.node_id) AS node_id,
+    c.kind,
+    c.subscription_id,
+    c.timer_id,
+    c.service_id,
+    c.callback_handle,
+    c.symbol,
+    c.created_ns,
+    c.event_id
+FROM complete AS c
+LEFT JOIN staging.subscription AS s ON c.subscription_id = s.subscription_id

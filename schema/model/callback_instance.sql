@@ -1,0 +1,53 @@
+-- name: staging.callback_instance
+-- description: Runs of callbacks in the order in which they began, with the run that each is
+--     nested in.
+-- grain: one row per run of a callback
+-- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take
+WITH callback_of AS (
+    SELECT b.start_event_id, c.callback_id
+    FROM staging.callback_binding AS b
+    JOIN staging.callback AS c ON b.callback_event_id = c.event_id
+    UNION ALL
+    SELECT b.start_event_id, c.callback_id
+    FROM staging.callback_binding AS b
+    JOIN (
+        SELECT process_id, callback_handle, min(callback_id) AS callback_id
+        FROM staging.callback
+        WHERE created_ns IS NULL
+        GROUP BY process_id, callback_handle
+    ) AS c ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
+    WHERE b.callback_event_id IS NULL
+),
+numbered AS (
+    SELECT
+        row_number() OVER (ORDER BY r.start_event_id) AS callback_instance_id,
+        r.trace_index + 1 AS trace_id,
+        c.callback_id,
+        r.process_id,
+        r.thread_id,
+        r.start_ns,
+        r.end_ns,
+        t.take_id,
+        r.is_intra_process,
+        r.depth,
+        r.start_event_id,
+        r.end_event_id,
+        r.effective_end_event_id
+    FROM staging.callback_run AS r
+    JOIN callback_of AS c ON r.start_event_id = c.start_event_id
+    LEFT JOIN staging.take AS t ON r.start_event_id = t.callback_start_event_id
+),
+nested AS (
+    SELECT n.callback_instance_id, p.callback_instance_id AS parent_id
+    FROM (SELECT * FROM numbered WHERE depth > 1) AS n
+    ASOF JOIN numbered AS p
+        ON n.thread_id = p.thread_id
+        AND n.depth - 1 = p.depth
+        AND n.start_event_id > p.start_event_id
+)
+SELECT
+    n.callback_instance_id, n.trace_id, n.callback_id, n.process_id, n.thread_id, n.start_ns,
+    n.end_ns, n.take_id, NULL::BIGINT AS request_id, n.is_intra_process, p.parent_id, n.depth,
+    n.start_event_id, n.end_event_id, n.effective_end_event_id
+FROM numbered AS n
+LEFT JOIN nested AS p ON n.callback_instance_id = p.callback_instance_id

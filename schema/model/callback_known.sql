@@ -1,0 +1,60 @@
+-- name: staging.callback_known
+-- description: Callback objects whose creation was traced, with what they belong to. A callback
+--     that was only registered has a symbol but no owner.
+-- grain: one row per callback object
+-- needs: staging.located, staging.subscription_object, staging.timer, staging.service
+WITH added AS (
+    SELECT
+        a.event_id, a.ts_ns, a.process_id, a.callback, 'subscription' AS kind,
+        o.subscription_event_id, NULL::BIGINT AS timer_id, NULL::BIGINT AS service_id,
+        NULL::BIGINT AS node_id
+    FROM staging.located('ros2_rclcpp_subscription_callback_added') AS a
+    LEFT JOIN staging.subscription_object AS o ON a.event_id = o.event_id
+    UNION ALL
+    SELECT
+        a.event_id, a.ts_ns, a.process_id, a.callback, 'timer', NULL, t.timer_id, NULL, t.node_id
+    FROM staging.located('ros2_rclcpp_timer_callback_added') AS a
+    ASOF LEFT JOIN staging.timer AS t
+        ON a.process_id = t.process_id
+        AND a.timer_handle = t.timer_handle
+        AND a.event_id >= t.event_id
+    UNION ALL
+    SELECT
+        a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL, s.service_id,
+        s.node_id
+    FROM staging.located('ros2_rclcpp_service_callback_added') AS a
+    ASOF LEFT JOIN staging.service AS s
+        ON a.process_id = s.process_id
+        AND a.service_handle = s.service_handle
+        AND a.event_id >= s.event_id
+),
+registered AS (
+    SELECT
+        r.event_id, r.ts_ns, r.process_id, r.callback,
+        CASE
+            WHEN r.symbol NOT IN ('', 'UNKNOWN', 'UNKNOWN_demangling_failed', '(null)')
+                THEN r.symbol
+        END AS symbol,
+        a.event_id AS added_event_id
+    FROM staging.located('ros2_rclcpp_callback_register') AS r
+    ASOF LEFT JOIN added AS a
+        ON r.process_id = a.process_id
+        AND r.callback = a.callback
+        AND r.event_id >= a.event_id
+),
+symbol_of AS (
+    SELECT added_event_id, arg_min(symbol, event_id) AS symbol
+    FROM registered
+    WHERE added_event_id IS NOT NULL
+    GROUP BY added_event_id
+)
+SELECT
+    a.event_id, a.ts_ns AS created_ns, a.process_id, a.callback AS callback_handle, a.kind,
+    a.subscription_event_id, a.timer_id, a.service_id, a.node_id, s.symbol
+FROM added AS a
+LEFT JOIN symbol_of AS s ON a.event_id = s.added_event_id
+UNION ALL
+SELECT
+    event_id, ts_ns, process_id, callback, 'unknown', NULL, NULL, NULL, NULL, symbol
+FROM registered
+WHERE added_event_id IS NULL

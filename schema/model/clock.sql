@@ -1,0 +1,16 @@
+-- name: staging.clock
+-- description: Clocks by uuid (LTTng: the boot). A trace without one has a clock of its own, by
+--     hostname. No correction is known at ingest.
+-- grain: one row per clock
+-- needs: staging.source
+SELECT
+    row_number() OVER (ORDER BY min(trace_index)) AS clock_id,
+    any_value(clock_uuid) AS uuid,
+    clock_key,
+    0::BIGINT AS offset_ns,
+    0::BIGINT AS drift_ppb,
+    coalesce(min(begin_ns), 0) AS reference_ns,
+    NULL::BIGINT AS uncertainty_ns,
+    'none' AS method
+FROM staging.source
+GROUP BY clock_key

@@ -1,0 +1,20 @@
+-- name: staging.lifecycle_transition
+-- description: State changes of managed nodes, by the state machine that the node created last.
+-- grain: one row per rcl_lifecycle_transition
+-- needs: staging.located, staging.object_node
+WITH machine AS (
+    SELECT m.event_id, m.process_id, m.state_machine, n.node_id
+    FROM staging.located('ros2_rcl_lifecycle_state_machine_init') AS m
+    LEFT JOIN staging.object_node AS n ON m.event_id = n.event_id
+)
+SELECT
+    m.node_id,
+    t.ts_ns AS at_ns,
+    t.start_label AS start_state,
+    t.goal_label AS goal_state
+FROM staging.located('ros2_rcl_lifecycle_transition') AS t
+ASOF LEFT JOIN machine AS m
+    ON t.process_id = m.process_id
+    AND t.state_machine = m.state_machine
+    AND t.event_id >= m.event_id
+ORDER BY t.event_id

@@ -1,0 +1,15 @@
+-- name: staging.located
+-- kind: macro
+-- description: The events of one tracepoint with the thread and process that they happened in.
+-- grain: one row per event of the tracepoint
+-- needs: staging.context, raw
+CREATE OR REPLACE MACRO staging.located(tracepoint) AS TABLE
+SELECT e.*, c.thread_id, c.process_id
+FROM query_table('raw.' || tracepoint) AS e
+JOIN staging.context AS c
+    ON e.trace_index = c.trace_index
+    AND e.vpid = c.vpid
+    AND e.vtid = c.vtid
+    AND e.pid_ns IS NOT DISTINCT FROM c.pid_ns
+    AND e.event_id >= c.from_event_id
+    AND e.event_id < c.until_event_id

@@ -1,0 +1,56 @@
+-- name: staging.process
+-- description: Process lives. The name is that of the main thread (tid = pid), else of the first
+--     thread seen; the version is what rcl_init stated, for display only.
+-- grain: one row per process life
+-- needs: staging.thread_life, staging.trace, raw
+WITH life AS (
+    SELECT
+        host_id,
+        pid_ns,
+        vpid,
+        life,
+        from_event_id,
+        until_event_id,
+        coalesce(
+            any_value(name) FILTER (WHERE vtid = vpid),
+            arg_min(name, first_event_id)
+        ) AS name,
+        min(first_event_id) AS first_event_id,
+        min(first_seen_ns) AS first_seen_ns,
+        max(last_seen_ns) AS last_seen_ns
+    FROM staging.thread_life
+    GROUP BY ALL
+),
+version AS (
+    SELECT
+        t.host_id,
+        i.pid_ns,
+        i.vpid,
+        l.life,
+        arg_min(i.version, i.event_id) AS tracetools_version
+    FROM raw.ros2_rcl_init AS i
+    JOIN staging.trace AS t ON i.trace_index + 1 = t.trace_id
+    JOIN life AS l
+        ON t.host_id = l.host_id
+        AND i.pid_ns IS NOT DISTINCT FROM l.pid_ns
+        AND i.vpid = l.vpid
+        AND i.event_id >= l.from_event_id
+        AND i.event_id < l.until_event_id
+    GROUP BY ALL
+)
+SELECT
+    row_number() OVER (ORDER BY l.first_event_id) AS process_id,
+    l.host_id,
+    l.vpid AS pid,
+    l.name,
+    v.tracetools_version,
+    l.first_seen_ns,
+    l.last_seen_ns,
+    l.pid_ns AS pid_namespace,
+    l.life::INTEGER AS life
+FROM life AS l
+LEFT JOIN version AS v
+    ON l.host_id = v.host_id
+    AND l.pid_ns IS NOT DISTINCT FROM v.pid_ns
+    AND l.vpid = v.vpid
+    AND l.life = v.life

@@ -1,0 +1,32 @@
+-- name: staging.publisher
+-- description: Publishers. A handle that was published on but never initialised in the trace gets a
+--     row without topic, or with /rosout where nothing else is possible.
+-- grain: one row per publisher
+-- needs: staging.publisher_known, staging.publication_origin, staging.is_internal_topic
+WITH every_publisher AS (
+    SELECT
+        event_id, process_id, node_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,
+        created_ns, is_internal, false AS is_inferred
+    FROM staging.publisher_known
+    UNION ALL
+    SELECT
+        min(start_event_id),
+        process_id,
+        NULL,
+        CASE WHEN bool_and(is_rosout) THEN '/rosout' END,
+        unknown_handle,
+        NULL,
+        NULL,
+        NULL,
+        NULL,
+        bool_and(is_rosout),
+        true
+    FROM staging.publication_origin
+    WHERE unknown_handle IS NOT NULL
+    GROUP BY process_id, unknown_handle
+)
+SELECT
+    row_number() OVER (ORDER BY event_id) AS publisher_id,
+    process_id, node_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth, created_ns,
+    is_internal, is_inferred, event_id
+FROM every_publisher

@@ -1,0 +1,28 @@
+-- name: staging.subscription_known
+-- description: Subscriptions whose rcl initialisation was traced, with rmw handle and GID.
+-- grain: one row per rcl_subscription_init
+-- needs: staging.located, staging.object_node, staging.gid_bytes, staging.is_internal_topic
+WITH rmw_init AS (
+    SELECT
+        event_id, ts_ns, process_id, rmw_subscription_handle,
+        staging.gid_bytes(gid) AS gid
+    FROM staging.located('ros2_rmw_subscription_init')
+)
+SELECT
+    s.event_id,
+    s.process_id,
+    s.thread_id,
+    n.node_id,
+    s.topic_name,
+    s.subscription_handle,
+    s.rmw_subscription_handle AS rmw_handle,
+    r.gid,
+    s.queue_depth,
+    least(s.ts_ns, r.ts_ns) AS created_ns,
+    staging.is_internal_topic(s.topic_name) AS is_internal
+FROM staging.located('ros2_rcl_subscription_init') AS s
+ASOF LEFT JOIN rmw_init AS r
+    ON s.process_id = r.process_id
+    AND s.rmw_subscription_handle = r.rmw_subscription_handle
+    AND s.event_id >= r.event_id
+LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id

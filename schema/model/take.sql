@@ -1,0 +1,29 @@
+-- name: staging.take
+-- description: Takes in the order in which they began.
+-- grain: one row per message handed over to a subscription
+-- needs: staging.take_origin, staging.subscription
+WITH subscription_of AS (
+    SELECT o.start_event_id, s.subscription_id
+    FROM staging.take_origin AS o
+    JOIN staging.subscription AS s ON o.subscription_event_id = s.event_id
+    UNION ALL
+    SELECT o.start_event_id, s.subscription_id
+    FROM staging.take_origin AS o
+    JOIN staging.subscription AS s
+        ON o.process_id = s.process_id AND o.rmw_handle = s.rmw_handle
+    WHERE o.subscription_event_id IS NULL AND s.is_inferred
+)
+SELECT
+    row_number() OVER (ORDER BY o.start_event_id) AS take_id,
+    o.trace_index + 1 AS trace_id,
+    s.subscription_id,
+    o.process_id,
+    o.thread_id,
+    o.taken_ns,
+    o.source_timestamp_ns,
+    o.method,
+    o.start_event_id,
+    o.end_event_id,
+    o.callback_start_event_id
+FROM staging.take_origin AS o
+LEFT JOIN subscription_of AS s ON o.start_event_id = s.start_event_id

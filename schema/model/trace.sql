@@ -1,0 +1,30 @@
+-- name: staging.trace
+-- description: Traces read, with what their packets and events say of their extent.
+-- grain: one row per CTF trace
+-- needs: staging.source, staging.clock, staging.host, staging.packet
+WITH extent AS (
+    SELECT
+        trace_index,
+        min(begin_ns) AS start_ns,
+        max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) AS end_ns,
+        sum(event_count)::BIGINT AS event_count,
+        sum(discarded_event_count)::BIGINT AS discarded_event_count
+    FROM staging.packet
+    GROUP BY trace_index
+)
+SELECT
+    s.trace_index + 1 AS trace_id,
+    h.host_id,
+    s.path,
+    s.uuid,
+    s.tracer,
+    s.domain,
+    coalesce(e.start_ns, s.begin_ns) AS start_ns,
+    coalesce(e.end_ns, s.end_ns) AS end_ns,
+    coalesce(e.event_count, 0) AS event_count,
+    coalesce(e.discarded_event_count, 0) AS discarded_event_count
+FROM staging.source AS s
+JOIN staging.clock AS c ON s.clock_key = c.clock_key
+JOIN staging.host AS h ON c.clock_id = h.clock_id AND s.hostname = h.hostname
+LEFT JOIN extent AS e ON s.trace_index = e.trace_index
+ORDER BY trace_id

@@ -1,0 +1,222 @@
+"""Simulations shared by the tests, and bt2 to read what they have written."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import duckdb
+import pytest
+
+from msgflow.sim import (
+    Host,
+    Node,
+    Process,
+    Publisher,
+    Scenario,
+    Simulation,
+    Subscription,
+    Timer,
+    Work,
+    scenarios,
+    simulate,
+)
+
+_DISTRIBUTION_PACKAGE = Path("/usr/lib/python3/dist-packages/bt2/__init__.py")
+_LENGTH = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class ReadEvent:
+    """One event as bt2 has read it; `fields` are the payload."""
+
+    ts_ns: int
+    name: str
+    host: str
+    cpu: int
+    pid: int
+    tid: int
+    procname: str
+    fields: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A simulation and its events in the order of time."""
+
+    simulation: Simulation
+    events: tuple[ReadEvent, ...]
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        return json.loads(self.simulation.meta.read_text())
+
+    def truth(self, sql: str) -> list[tuple[Any, ...]]:
+        """Rows of a query over the truth tables."""
+        with duckdb.connect() as connection:
+            for name, path in self.simulation.truth.items():
+                connection.execute(f"CREATE VIEW {name} AS FROM '{path}'")
+            return connection.execute(sql).fetchall()
+
+
+@pytest.fixture(scope="session")
+def bt2() -> ModuleType:
+    """babeltrace 2's bindings, also from outside a virtual environment."""
+    try:
+        return importlib.import_module("bt2")
+    except ImportError:
+        pass
+    if not _DISTRIBUTION_PACKAGE.exists():
+        pytest.skip("bt2 is not installed (Debian package python3-bt2)")
+    spec = importlib.util.spec_from_file_location(
+        "bt2", _DISTRIBUTION_PACKAGE, submodule_search_locations=[str(_DISTRIBUTION_PACKAGE.parent)]
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["bt2"] = module
+    try:
+        spec.loader.exec_module(module)
+    except ImportError as error:
+        del sys.modules["bt2"]
+        pytest.skip(f"bt2 belongs to another Python: {error}")
+    return module
+
+
+def read_events(bt2: ModuleType, directory: Path) -> tuple[ReadEvent, ...]:
+    """All events below a directory; fails on anything that babeltrace 2 complains about."""
+    events = []
+    for message in bt2.TraceCollectionMessageIterator(str(directory)):
+        kind = type(message).__name__
+        assert "Discarded" not in kind, "events or packets are missing"
+        if kind != "_EventMessageConst":
+            continue
+        event = message.event
+        context = event.common_context_field
+        events.append(
+            ReadEvent(
+                message.default_clock_snapshot.ns_from_origin,
+                event.name,
+                str(event.stream.trace.environment["hostname"]),
+                int(event.packet.context_field["cpu_id"]),
+                int(context["vpid"]),
+                int(context["vtid"]),
+                str(context["procname"]),
+                {name: _plain(value) for name, value in event.payload_field.items()},
+            )
+        )
+    return tuple(events)
+
+
+def _plain(value: Any) -> Any:
+    if "String" in type(value).__name__:
+        # bt2 2.0.4 shows the text of an earlier field instead of an empty one.
+        return str(value) if len(value) else ""
+    if "Array" in type(value).__name__:
+        return bytes(int(element) for element in value)
+    return int(value)
+
+
+@pytest.fixture(scope="session")
+def recordings(bt2: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]:
+    """Every built-in scenario, simulated and read once."""
+    found = {}
+    for name in scenarios():
+        simulation = simulate(name, tmp_path_factory.mktemp("sim") / name, factor=_LENGTH)
+        found[name] = Recording(simulation, read_events(bt2, simulation.directory))
+    return found
+
+
+@pytest.fixture(params=list(scenarios()))
+def recording(request: pytest.FixtureRequest, recordings: dict[str, Recording]) -> Recording:
+    """Each built-in scenario in turn."""
+    return recordings[request.param]
+
+
+@pytest.fixture(scope="session")
+def recorded_jazzy() -> Path:
+    """A trace of the Jazzy layout that LTTng has recorded."""
+    path = Path(__file__).parents[3] / "shared" / "traces" / "periodic_async_jazzy24"
+    if not path.is_dir():
+        pytest.skip("the recorded traces (../shared/traces) are not here")
+    return path
+
+
+@pytest.fixture
+def read(bt2: ModuleType) -> Callable[[Simulation], Recording]:
+    """Reads the events of a simulation."""
+    return lambda simulation: Recording(simulation, read_events(bt2, simulation.directory))
+
+
+@pytest.fixture
+def quiet() -> Scenario:
+    """Two processes of which hardly anything is heard: one message in ten seconds."""
+    talker = Node(
+        "talker",
+        publishers=(Publisher("/seldom"),),
+        timers=(Timer(10 * 1_000_000_000, publishes=("/seldom",)),),
+    )
+    listener = Node("listener", subscriptions=(Subscription("/seldom"),))
+    return Scenario(
+        name="quiet",
+        description="Hardly anything happens.",
+        hosts=(Host("alpha", cpu_count=1),),
+        processes=(
+            Process("talker", "alpha", 100, (talker,)),
+            Process("listener", "alpha", 200, (listener,)),
+        ),
+        duration_ns=35 * 1_000_000_000,
+    )
+
+
+@pytest.fixture
+def overloaded() -> Scenario:
+    """A subscription with a queue of three that is four times slower than what it hears."""
+    talker = Node(
+        "talker",
+        publishers=(Publisher("/fast"),),
+        timers=(Timer(1_000_000, publishes=("/fast",)),),
+    )
+    listener = Node(
+        "listener",
+        subscriptions=(Subscription("/fast", work=Work(4_000_000), depth=3),),
+    )
+    return Scenario(
+        name="overloaded",
+        description="More messages than anybody can take.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("talker", "alpha", 100, (talker,)),
+            Process("listener", "alpha", 200, (listener,)),
+        ),
+        duration_ns=1_000_000_000,
+        overwrites=True,
+    )
+
+
+@pytest.fixture
+def burst() -> Scenario:
+    """Each callback publishes five times at once, faster than messages differ in latency."""
+    topic = "/burst"
+    talker = Node(
+        "talker",
+        publishers=(Publisher(topic),),
+        timers=(Timer(5_000_000, publishes=(topic,) * 5),),
+    )
+    listener = Node("listener", subscriptions=(Subscription(topic),))
+    return Scenario(
+        name="burst",
+        description="Many messages at once.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("talker", "alpha", 100, (talker,)),
+            Process("listener", "alpha", 200, (listener,)),
+        ),
+        duration_ns=1_000_000_000,
+    )
