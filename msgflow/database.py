@@ -10,8 +10,9 @@ import duckdb
 from msgflow.db.connection import connect
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query
+from msgflow.query.interrupt import interruptible
 from msgflow.query.result import QueryResult
-from msgflow.query.run import read_runs, run_query
+from msgflow.query.run import first_line, read_runs, run_query
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -159,15 +160,20 @@ class Database:
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
-        return run_query(
-            self.connection,
-            load_query(name),
-            parameters,
-            run=run,
-            start=start,
-            end=end,
-            skip_first=skip_first,
-            internal=internal,
+        header = load_query(name)
+        connection = self.connection
+        return interruptible(
+            connection,
+            lambda: run_query(
+                connection,
+                header,
+                parameters,
+                run=run,
+                start=start,
+                end=end,
+                skip_first=skip_first,
+                internal=internal,
+            ),
         )
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
@@ -183,11 +189,11 @@ class Database:
         """
         if not text.strip().strip(";"):
             raise UsageError("there is no SQL to run", 'msgflow sql "SELECT * FROM run"')
+        connection = self.connection
         try:
-            relation = self.connection.sql(text)
+            return interruptible(connection, lambda: _capped(connection.sql(text), limit))
         except duckdb.Error as error:
             raise _sql_error(error) from error
-        return _capped(relation, limit)
 
     def schema(self) -> QueryResult:
         """Return the public views: one row per column, with its type and meaning."""
@@ -205,7 +211,8 @@ class Database:
         """Audit the content: one result per check below `schema/check`."""
         from msgflow.db.check import run_checks
 
-        return run_checks(self.connection)
+        connection = self.connection
+        return interruptible(connection, lambda: run_checks(connection))
 
     def export_parquet(
         self,
@@ -228,7 +235,11 @@ class Database:
         """
         from msgflow.export.parquet import export_parquet
 
-        return export_parquet(self.connection, Path(directory), views=views, run=run, force=force)
+        connection = self.connection
+        return interruptible(
+            connection,
+            lambda: export_parquet(connection, Path(directory), views=views, run=run, force=force),
+        )
 
 
 def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:
@@ -236,12 +247,9 @@ def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> Quer
 
     if relation is None:
         return QueryResult(pyarrow.table({}))
-    try:
-        if limit is None:
-            return QueryResult(relation.to_arrow_table())
-        table = relation.limit(limit + 1).to_arrow_table()
-    except duckdb.Error as error:
-        raise _sql_error(error) from error
+    if limit is None:
+        return QueryResult(relation.to_arrow_table())
+    table = relation.limit(limit + 1).to_arrow_table()
     if table.num_rows <= limit:
         return QueryResult(table)
     note = f"only the first {limit} rows are shown; --limit raises that"

@@ -37,13 +37,13 @@ class MsgflowError(Exception):
 
 
 class QueryError(MsgflowError):
-    """A query does not exist, got parameters it does not have, or failed."""
+    """The database could not run a query or other SQL."""
 
     exit_code = ExitCode.FAILED
 
 
 class UsageError(MsgflowError):
-    """The command or call itself is wrong."""
+    """The command or call itself is wrong: a name, parameter or value that does not exist."""
 
     exit_code = ExitCode.USAGE
 

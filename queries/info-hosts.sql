@@ -17,6 +17,6 @@ SELECT
     clock.method AS clock_method,
     clock.uncertainty_ns AS clock_uncertainty_ns
 FROM main.host
-LEFT JOIN main.clock ON clock.clock_id = host.clock_id
+JOIN main.clock ON clock.clock_id = host.clock_id
 WHERE list_contains($runs, host.run_id)
 ORDER BY host.run_id, host.hostname, host.host_id

@@ -22,26 +22,26 @@ SELECT
     (
         SELECT count(*)
         FROM main.publisher
-        WHERE publisher.node_id = node.node_id AND NOT coalesce(publisher.is_internal, FALSE)
+        WHERE publisher.node_id = node.node_id AND NOT publisher.is_internal
     ) AS publisher_count,
     (
         SELECT count(*)
         FROM main.subscription
         WHERE subscription.node_id = node.node_id
-            AND NOT coalesce(subscription.is_internal, FALSE)
+            AND NOT subscription.is_internal
     ) AS subscription_count,
     (SELECT count(*) FROM main.timer WHERE timer.node_id = node.node_id) AS timer_count,
     (
         SELECT count(*)
         FROM main.service
-        WHERE service.node_id = node.node_id AND NOT coalesce(service.is_internal, FALSE)
+        WHERE service.node_id = node.node_id AND NOT service.is_internal
     ) AS service_count,
     (
         SELECT count(*)
         FROM main.client
-        WHERE client.node_id = node.node_id AND NOT coalesce(client.is_internal, FALSE)
+        WHERE client.node_id = node.node_id AND NOT client.is_internal
     ) AS client_count
 FROM main.node
-LEFT JOIN main.process ON process.process_id = node.process_id
+JOIN main.process ON process.process_id = node.process_id
 WHERE list_contains($runs, node.run_id)
 ORDER BY node.run_id, node.full_name, node.node_id

@@ -25,6 +25,6 @@ SELECT
     process.first_seen_ns,
     process.last_seen_ns - process.first_seen_ns AS duration_ns
 FROM main.process
-LEFT JOIN main.host ON host.host_id = process.host_id
+JOIN main.host ON host.host_id = process.host_id
 WHERE list_contains($runs, process.run_id)
 ORDER BY process.run_id, host.hostname, process.pid, process.process_id

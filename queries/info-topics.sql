@@ -57,7 +57,7 @@ SELECT
     CAST(sum(subscription_count) AS BIGINT) AS subscription_count,
     CAST(sum(publication_count) AS BIGINT) AS publication_count,
     CAST(sum(take_count) AS BIGINT) AS take_count,
-    coalesce(bool_or(is_internal), FALSE) AS is_internal
+    bool_or(is_internal) AS is_internal
 FROM endpoint
 WHERE list_contains($runs, run_id)
 GROUP BY run_id, topic_name

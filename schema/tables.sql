@@ -366,6 +366,8 @@ CREATE TABLE store.link_transport (
     run_id           BIGINT NOT NULL,            -- Run that the row belongs to -> run.run_id
     publication_id   BIGINT NOT NULL,            -- Where the message came from -> publication.publication_id
     take_id          BIGINT NOT NULL,            -- Where it was received -> take.take_id
+    publisher_id     BIGINT,                     -- Publisher of the message -> publisher.publisher_id
+    subscription_id  BIGINT,                     -- Subscription that received it -> subscription.subscription_id
     method           VARCHAR NOT NULL,           -- 'exact', 'exact_stamp', 'nearest' or 'ring_buffer'
     candidate_count  BIGINT,                     -- Publications that it could have been
     is_self_loop     BOOLEAN NOT NULL,           -- Received by the publishing node itself
@@ -377,6 +379,9 @@ CREATE TABLE store.link_causal (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id
     callback_instance_id BIGINT NOT NULL,        -- Cause -> callback_instance.callback_instance_id
     publication_id       BIGINT NOT NULL,        -- Effect -> publication.publication_id
+    take_id              BIGINT,                 -- Message that the cause was called with -> take.take_id
+    subscription_id      BIGINT,                 -- Subscription of that message -> subscription.subscription_id
+    publisher_id         BIGINT,                 -- Publisher of the effect -> publisher.publisher_id
     kind                 VARCHAR NOT NULL,       -- 'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'
     annotation_id        BIGINT,                 -- Annotation that declares it -> annotation.annotation_id
     candidate_count      BIGINT,                 -- Runs that it could have been

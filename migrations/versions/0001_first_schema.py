@@ -779,6 +779,8 @@ def upgrade() -> None:
             "publication_id", sa.BigInteger(), nullable=False, comment="Where the message came from"
         ),
         sa.Column("take_id", sa.BigInteger(), nullable=False, comment="Where it was received"),
+        sa.Column("publisher_id", sa.BigInteger(), comment="Publisher of the message"),
+        sa.Column("subscription_id", sa.BigInteger(), comment="Subscription that received it"),
         sa.Column(
             "method",
             sa.String(),
@@ -808,6 +810,9 @@ def upgrade() -> None:
         sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
         sa.Column("callback_instance_id", sa.BigInteger(), nullable=False, comment="Cause"),
         sa.Column("publication_id", sa.BigInteger(), nullable=False, comment="Effect"),
+        sa.Column("take_id", sa.BigInteger(), comment="Message that the cause was called with"),
+        sa.Column("subscription_id", sa.BigInteger(), comment="Subscription of that message"),
+        sa.Column("publisher_id", sa.BigInteger(), comment="Publisher of the effect"),
         sa.Column(
             "kind",
             sa.String(),

@@ -76,8 +76,8 @@ def print_lines(lines: Iterable[str]) -> None:
 
 
 def count(number: int, thing: str) -> str:
-    """Return '1 row', '2 rows'."""
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+    """Return '1 row', '1,234 rows'."""
+    return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
 
 
 def _stdout() -> IO[bytes]:

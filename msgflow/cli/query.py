@@ -7,7 +7,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msgflow.cli.options import FormatOption, OutputOption
 from msgflow.cli.query_command import build_command
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
@@ -38,27 +37,17 @@ def group(
     list_queries: Annotated[
         bool, typer.Option("--list", help="List the queries, as without a name")
     ] = False,
-    form: FormatOption = None,
-    output: OutputOption = None,
 ) -> None:
     """List the queries, unless one is named."""
     if context.invoked_subcommand is not None:
-        if list_queries or form or output:
+        if list_queries:
             raise UsageError(
-                "options of a query come after its name",
-                f"msgflow query {context.invoked_subcommand} --help",
+                "--list takes no name of a query",
+                f"msgflow query --list, or msgflow query {context.invoked_subcommand} --help",
             )
         return
-    import pyarrow
+    from msgflow.cli.output import print_lines
+    from msgflow.export.table import lay_out
 
-    from msgflow.cli.output import print_result
-    from msgflow.query.result import QueryResult
-
-    headers = load_queries()
-    table = pyarrow.table(
-        {
-            "query": pyarrow.array([header.name for header in headers], "string"),
-            "title": pyarrow.array([header.title for header in headers], "string"),
-        }
-    )
-    print_result(QueryResult(table), form, output)
+    rows = [(header.name, header.title) for header in load_queries()]
+    print_lines(lay_out(("query", "title"), rows, (False, False)))

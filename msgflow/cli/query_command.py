@@ -109,17 +109,12 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
 
 def _option(param: Param) -> Parameter:
     flag = f"--{param.name.replace('_', '-')}"
-    shown: Any = False
-    if param.has_default and param.default is not None:
-        shown = (
-            str(param.default).lower() if isinstance(param.default, bool) else str(param.default)
-        )
     choices = param.choices
     option = typer.Option(
         f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
-        metavar=None if param.type == "BOOLEAN" else "|".join(choices) or param.type,
-        help=_escape(param.description),
-        show_default=shown,
+        metavar=None if param.type == "BOOLEAN" else param.type,
+        help=_escape(_describe(param)),
+        show_default=False,
         autocompletion=(lambda: list(choices)) if choices else None,
         rich_help_panel=PARAMETERS,
     )
@@ -130,6 +125,16 @@ def _option(param: Param) -> Parameter:
         default=None if param.has_default else Parameter.empty,
         annotation=Annotated[kind | None if param.has_default else kind, option],
     )
+
+
+def _describe(param: Param) -> str:
+    text = param.description
+    if param.choices:
+        text += f" ({', '.join(param.choices)})"
+    if param.has_default and param.default is not None:
+        default = param.default
+        text += f" [default: {str(default).lower() if isinstance(default, bool) else default}]"
+    return text
 
 
 def _command_class(header: Header) -> type[TyperCommand]:

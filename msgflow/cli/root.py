@@ -15,7 +15,6 @@ from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
 COMMANDS = ("ingest", "query", "sql", "info", "export", "db", "simulate")
-REPORT_TO = "https://github.com/msgflow/msgflow/issues"
 
 
 class RootGroup(TyperGroup):
@@ -39,7 +38,7 @@ class RootGroup(TyperGroup):
         except (typer.Abort, KeyboardInterrupt):
             code = ExitCode.INTERRUPTED
         except Exception as error:
-            code = _unexpected(error)
+            code = ExitCode.INTERRUPTED if _is_interrupt(error) else _unexpected(error)
         if code == ExitCode.INTERRUPTED:
             print_error("interrupted")
         sys.exit(int(code or 0))
@@ -56,6 +55,11 @@ class RootGroup(TyperGroup):
         return value
 
 
+def _is_interrupt(error: Exception) -> bool:
+    # DuckDB turns the interrupt of a running query into an exception of its own.
+    return isinstance(error, RuntimeError) and str(error) == "Query interrupted"
+
+
 def _usage(error: typer.TyperException) -> tuple[str, str | None]:
     message, _, suggestion = error.format_message().strip().partition(". Did you mean ")
     context = getattr(error, "ctx", None)
@@ -69,8 +73,8 @@ def _unexpected(error: Exception) -> ExitCode:
     summary = (str(error).strip().splitlines() or [""])[0]
     if os.environ.get("MSGFLOW_DEBUG") == "1":
         traceback.print_exception(error)
-        hint = f"report it with the lines above and `msgflow {__version__}` at {REPORT_TO}"
+        hint = f"this is a mistake of msgflow {__version__}; report it with the lines above"
     else:
-        hint = "run it again with MSGFLOW_DEBUG=1 in the environment to see where, and report it"
+        hint = "this is a mistake of msgflow; MSGFLOW_DEBUG=1 in the environment shows where"
     print_error(f"unexpected {type(error).__name__}: {summary}", hint)
     return ExitCode.FAILED

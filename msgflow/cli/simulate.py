@@ -9,7 +9,12 @@ import typer
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Name of the system")],
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO", help="Name of the system", autocompletion=lambda: _scenarios()
+        ),
+    ],
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the trace")],
     factor: Annotated[
         float, typer.Option("--factor", min=0, help="Length, as a multiple of the scenario's own")
@@ -17,8 +22,15 @@ def command(
     seed: Annotated[int, typer.Option("--seed", help="Of the random numbers")] = 0,
 ) -> None:
     """Write the trace of a simulated ROS 2 system, and the links that really happened."""
-    from msgflow.cli.output import print_status
+    from msgflow.cli.output import count, print_status
     from msgflow.sim import simulate
 
-    simulate(scenario, directory, factor=factor, seed=seed)
-    print_status(f"trace of {scenario} written to {directory}")
+    done = simulate(scenario, directory, factor=factor, seed=seed)
+    traces = count(len(done.trace_directories), "trace")
+    print_status(f"{traces}, {count(done.event_count, 'event')} written to {directory}")
+
+
+def _scenarios() -> list[str]:
+    from msgflow.sim import scenarios
+
+    return list(scenarios())

@@ -557,6 +557,12 @@ link_transport = _table(
         required=True,
     ),
     _reference("take_id", "Where it was received", to="take.take_id", required=True),
+    _reference("publisher_id", "Publisher of the message", to="publisher.publisher_id"),
+    _reference(
+        "subscription_id",
+        "Subscription that received it",
+        to="subscription.subscription_id",
+    ),
     _text("method", "'exact', 'exact_stamp', 'nearest' or 'ring_buffer'", required=True),
     _count("candidate_count", "Publications that it could have been"),
     _flag("is_self_loop", "Received by the publishing node itself"),
@@ -571,6 +577,11 @@ link_causal = _table(
         "callback_instance_id", "Cause", to="callback_instance.callback_instance_id", required=True
     ),
     _reference("publication_id", "Effect", to="publication.publication_id", required=True),
+    _reference("take_id", "Message that the cause was called with", to="take.take_id"),
+    _reference(
+        "subscription_id", "Subscription of that message", to="subscription.subscription_id"
+    ),
+    _reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
     _text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
     _reference("annotation_id", "Annotation that declares it", to="annotation.annotation_id"),
     _count("candidate_count", "Runs that it could have been"),

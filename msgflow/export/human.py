@@ -35,9 +35,9 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
         unit: of the column, 'ns' for durations and 'epoch ns' for points in time.
         is_handle: an address, shown in hexadecimal.
     """
+    value = plain(value)
     if value is None:
         return NULL
-    value = plain(value)
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):

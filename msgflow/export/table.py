@@ -18,7 +18,19 @@ if TYPE_CHECKING:
 
 def table_lines(result: QueryResult) -> Iterator[str]:
     """Yield the lines of a table: names, a rule, one line per row, numbers to the right."""
-    names, rows, right = _cells(result)
+    return lay_out(*_cells(result))
+
+
+def lay_out(
+    names: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[bool]
+) -> Iterator[str]:
+    """Yield the lines of a table of text.
+
+    Args:
+        names: titles of the columns.
+        rows: cells, as many in each row as there are columns.
+        right: for each column, whether it is aligned to the right.
+    """
     if not names:
         return
     widths = [
@@ -72,7 +84,7 @@ def _is_number(kind: pa.DataType) -> bool:
     )
 
 
-def _columns(rows: list[list[str]], count: int) -> list[Sequence[str]]:
+def _columns(rows: Sequence[Sequence[str]], count: int) -> list[Sequence[str]]:
     return list(zip(*rows, strict=True)) if rows else [()] * count
 
 

@@ -187,7 +187,9 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
             if not fields:
                 raise _error(path, number, "the header starts with a continuation line")
             last = fields.pop()
-            joined = f"{last.value} {continuation['value']}".strip()
+            # Two spaces, so that the description of a parameter may begin on the next line.
+            gap = "  " if last.key == "param" else " "
+            joined = f"{last.value}{gap}{continuation['value']}".strip()
             fields.append(_Field(last.key, joined, last.line))
         elif match := _FIELD.fullmatch(line.rstrip()):
             fields.append(_Field(match["key"], match["value"] or "", number))
@@ -226,7 +228,7 @@ def _param(field: _Field, path: Path) -> Param:
         type=match["type"],
         default=default,
         has_default=match["default"] is not None,
-        description=match["description"],
+        description=" ".join(match["description"].split()),
         choices=choices,
     )
 

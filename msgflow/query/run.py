@@ -145,8 +145,9 @@ def _parameters(header: Header) -> str:
 
 
 def _without_internal(table: pa.Table) -> tuple[pa.Table, int]:
-    import pyarrow.compute
+    from pyarrow import compute
 
-    is_internal = pyarrow.compute.fill_null(table[INTERNAL_COLUMN], False)
-    visible = table.filter(pyarrow.compute.invert(is_internal)).drop_columns([INTERNAL_COLUMN])
+    is_internal = table[INTERNAL_COLUMN]
+    is_visible = compute.or_kleene(compute.is_null(is_internal), compute.invert(is_internal))
+    visible = table.filter(is_visible).drop_columns([INTERNAL_COLUMN])
     return visible, table.num_rows - visible.num_rows

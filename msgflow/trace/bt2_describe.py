@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import TraceError
 from msgflow.trace.bt2_graph import damaged_error, plugin_class, source_parameters
 from msgflow.trace.bt2_streams import Clock
-from msgflow.trace.discovery import is_ctf2
+from msgflow.trace.discovery import stream_files
+from msgflow.trace.metadata import MetadataKind, kind_of
 from msgflow.trace.model import TraceInfo
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from msgflow.trace.bt2_library import Bt2Library
     from msgflow.trace.model import TraceLocation
 
+_STREAM_MAGIC = (b"\xc1\x1f\xfc\xc1", b"\xc1\xfc\x1f\xc1")
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
 
@@ -23,7 +27,7 @@ def describe(library: Bt2Library, location: TraceLocation, index: int) -> TraceI
     Raises:
         TraceError: Babeltrace cannot open it.
     """
-    if is_ctf2(location) and not library.reads_ctf2:
+    if kind_of(location.path) is MetadataKind.JSON and not library.reads_ctf2:
         raise TraceError(
             "the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is "
             f"{'.'.join(map(str, library.version))} — {location.path}",
@@ -39,7 +43,23 @@ def describe(library: Bt2Library, location: TraceLocation, index: int) -> TraceI
         begin_ns, end_ns = _range(library, location)
         return _info(trace, location, index, begin_ns, end_ns)
     except bt2._Error as error:
+        stranger = _not_a_stream(location)
+        if stranger is not None:
+            raise TraceError(
+                f"a file that is not part of the trace lies in its directory — {stranger}",
+                hint=f"mv {stranger} {location.path.parent}",
+            ) from error
         raise damaged_error(location.path, error) from error
+
+
+def _not_a_stream(location: TraceLocation) -> Path | None:
+    """Return a file among the streams that does not begin as a stream does."""
+    for path in stream_files(location.path):
+        with path.open("rb") as file:
+            begin = file.read(len(_STREAM_MAGIC[0]))
+        if begin and begin not in _STREAM_MAGIC:
+            return path
+    return None
 
 
 def _range(library: Bt2Library, location: TraceLocation) -> tuple[int | None, int | None]:

@@ -120,7 +120,6 @@ class DuplicateFilter:
             kept = min(copies, key=lambda address: copies[address].trace_index)
             for address in copies:
                 self._mode[address] = _PASS if address == kept else _SKIP
-            self.skipped += len(copies) - 1
         self._copies.clear()
         held, self._held = self._held, []
         for address, message in held:
@@ -133,7 +132,10 @@ class DuplicateFilter:
         elif mode == _HOLD:
             self._held.append((address, message))
         else:
-            self._native.message_put_ref(message)
+            native = self._native
+            if native.message_get_type(message) == native.MESSAGE_TYPE_PACKET_BEGINNING:
+                self.skipped += 1
+            native.message_put_ref(message)
 
     def _wait(self, address: int, message: Any) -> None:
         """Keep what precedes a packet until it is known whether the packet stays."""

@@ -12,6 +12,7 @@ from msgflow.trace.bt2_graph import Bt2Graph
 from msgflow.trace.bt2_plan import ClassPlan, Planner, merged_schema
 from msgflow.trace.bt2_streams import PacketRow, StreamTable
 from msgflow.trace.columns import record_batch
+from msgflow.trace.losses import DiscardCounters
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.order import Entry, new_numbers
 from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
@@ -60,6 +61,7 @@ class Iteration:
         }
         if repeated:
             self._duplicates = DuplicateFilter(library, self._streams, repeated)
+        self._counters = DiscardCounters(traces)
         self._planner: Planner | None = None
         self._plans: dict[int, ClassPlan] = {}
         self._packets: list[PacketRow] = []
@@ -98,9 +100,21 @@ class Iteration:
 
     def _steps(self) -> Iterator[list[Any]]:
         for step in self._graph.steps():
+            if self._planner is None:
+                self._add_streams(step)
             # Taken from the end, so that what is left in the list is what is not yet done.
             step.reverse()
             yield step
+
+    def _add_streams(self, step: list[Any]) -> None:
+        """Add the streams that begin; the muxer lets all begin before anything that has a time."""
+        native = self._library.native
+        for message in step:
+            if native.message_get_type(message) == native.MESSAGE_TYPE_STREAM_BEGINNING:
+                self._streams.add(native.message_stream_beginning_borrow_stream_const(message))
+        if len(self._streams.by_address) == self._graph.stream_count:
+            self._streams.number()
+            self._planner = self._new_planner()
 
     def _read(self) -> Iterator[EventBatch]:
         """The loop over all messages, the one place where every event costs Python time."""
@@ -197,18 +211,15 @@ class Iteration:
             self._end_packet(message)
         elif kind == native.MESSAGE_TYPE_DISCARDED_EVENTS:
             pointer = native.message_discarded_events_borrow_stream_const(message)
+            stream = self._streams.by_address[int(pointer)]
             count = self._known(native.message_discarded_events_get_count(message))
-            self._streams.by_address[int(pointer)].discarded_event_count = count
+            stream.discarded_event_count = self._counters.rise(
+                stream.trace_index, stream.class_id, stream.instance_id, count
+            )
         elif kind == native.MESSAGE_TYPE_DISCARDED_PACKETS:
             pointer = native.message_discarded_packets_borrow_stream_const(message)
             count = self._known(native.message_discarded_packets_get_count(message))
             self._streams.by_address[int(pointer)].lost_packet_count = count
-        elif kind == native.MESSAGE_TYPE_STREAM_BEGINNING:
-            # The muxer lets all streams begin before anything that has a time.
-            self._streams.add(native.message_stream_beginning_borrow_stream_const(message))
-            if len(self._streams.by_address) == self._graph.stream_count:
-                self._streams.number()
-                self._planner = self._new_planner()
 
     def _begin_packet(self, message: Any) -> None:
         native = self._library.native

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _INSTALL_HINT = "apt install python3-bt2"
 _VERSION = (sys.version_info.major, sys.version_info.minor)
-_ROOTS = (
+ROOTS = (
     "/usr/lib/python3/dist-packages",
     "/usr/lib/python{0}.{1}/dist-packages",
     "/usr/lib/python{0}.{1}/site-packages",
@@ -32,6 +32,11 @@ _ROOTS = (
     "/usr/local/lib/python{0}.{1}/site-packages",
     "/usr/local/lib64/python{0}.{1}/site-packages",
 )
+"""Where distributions put packages for the Python that runs."""
+
+PREFIXES = ("/usr/lib", "/usr/lib64", "/usr/local/lib")
+"""Below these lie the directories of all versions of Python."""
+
 _NATIVE = "_native_bt"
 
 
@@ -95,12 +100,12 @@ def _load_from_distribution() -> Any:
 
 
 def _installed_directories() -> Iterator[Path]:
-    for root in _ROOTS:
+    for root in ROOTS:
         directory = Path(root.format(*_VERSION)) / "bt2"
         if (directory / "__init__.py").is_file():
             yield directory
     # Bindings for another Python are of no use, but worth naming.
-    for root in ("/usr/lib", "/usr/lib64", "/usr/local/lib"):
+    for root in PREFIXES:
         for directory in sorted(Path(root).glob("python3.*/*-packages/bt2")):
             yield directory
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -11,7 +12,7 @@ from msgflow.trace.bt2_iteration import Iteration
 from msgflow.trace.reader import DEFAULT_BATCH_ROWS, TraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -33,7 +34,8 @@ class Bt2TraceSet(TraceSet):
         )
         self.event_counts: Mapping[tuple[int, str], int] = {}
         self.duplicate_packet_count = 0
-        self._iteration: Iteration | None = None
+        # Weak, so that an iteration which its consumer has dropped is over.
+        self._running: weakref.ref[Generator[EventBatch, None, None]] | None = None
         self._closed = False
 
     def batches(
@@ -46,27 +48,36 @@ class Bt2TraceSet(TraceSet):
         """Read everything once; see `TraceSet.batches`."""
         if self._closed:
             raise UsageError("the traces have been closed", hint="msgflow.trace.open(paths)")
-        if self._iteration is not None:
+        if self._under_way() is not None:
             raise UsageError(
                 "these traces are being read already", hint="open them a second time to read twice"
             )
-        return self._batches(Iteration(self._library, self.traces, wanted, progress, batch_rows))
+        iteration = self._batches(wanted, progress, batch_rows)
+        self._running = weakref.ref(iteration)
+        return iteration
 
     def close(self) -> None:
         """End an iteration under way and give the traces back."""
         self._closed = True
-        self._end()
+        iteration = self._under_way()
+        if iteration is not None:
+            iteration.close()
+        self._running = None
 
-    def _batches(self, iteration: Iteration) -> Iterator[EventBatch]:
-        self._iteration = iteration
+    def _under_way(self) -> Generator[EventBatch, None, None] | None:
+        return None if self._running is None else self._running()
+
+    def _batches(
+        self,
+        wanted: Mapping[str, pa.Schema] | None,
+        progress: Callable[[Progress], None] | None,
+        batch_rows: int,
+    ) -> Generator[EventBatch, None, None]:
+        iteration = Iteration(self._library, self.traces, wanted, progress, batch_rows)
         try:
             yield from iteration.run()
         finally:
-            self._end()
-
-    def _end(self) -> None:
-        if self._iteration is not None:
-            self.event_counts = self._iteration.event_counts()
-            self.duplicate_packet_count = self._iteration.duplicate_packet_count
-            self._iteration.close()
-            self._iteration = None
+            self.event_counts = iteration.event_counts()
+            self.duplicate_packet_count = iteration.duplicate_packet_count
+            iteration.close()
+            self._running = None

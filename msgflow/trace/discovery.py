@@ -7,16 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.trace import metadata
 from msgflow.trace.model import TraceLocation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-METADATA = "metadata"
-
-_PACKETIZED_MAGIC = (b"\x75\xd1\x1d\x57", b"\x57\x1d\xd1\x75")
-_RECORD_SEPARATOR = b"\x1e"
-_PLAIN_TEXT_BEGIN = (b"/* CTF 1.", b"trace", b"typealias", b"clock", b"env")
 
 _FOREIGN = {
     ".mcap": "a rosbag2 recording",
@@ -59,20 +54,12 @@ def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     return locations
 
 
-def is_ctf2(location: TraceLocation) -> bool:
-    """Tell whether the metadata is CTF 2 (a sequence of JSON texts), packetized or not."""
-    content = (location.path / METADATA).read_bytes()[:64]
-    return content.startswith(_RECORD_SEPARATOR) or (
-        content.startswith(_PACKETIZED_MAGIC) and content[37:38] == _RECORD_SEPARATOR
-    )
-
-
 def stream_files(directory: Path) -> list[Path]:
     """List the files of a trace directory that hold events, sorted by name."""
     return sorted(
         entry
         for entry in directory.iterdir()
-        if entry.name != METADATA and not entry.name.startswith(".") and entry.is_file()
+        if entry.name != metadata.FILE_NAME and not entry.name.startswith(".") and entry.is_file()
     )
 
 
@@ -80,7 +67,7 @@ def _check_exists(path: Path) -> None:
     if not path.exists():
         raise TraceError(f"no such file or directory — {path}", hint=f"ls {path.parent}")
     if path.is_file():
-        if path.name == METADATA or (path.parent / METADATA).is_file():
+        if path.name == metadata.FILE_NAME or (path.parent / metadata.FILE_NAME).is_file():
             raise TraceError(
                 f"this is a file inside a trace, give the directory — {path}",
                 hint=f"msgflow ingest {path.parent}",
@@ -107,21 +94,19 @@ def _directories_with_metadata(root: Path) -> Iterator[Path]:
             continue
         visited.add(resolved)
         names.sort()
-        if METADATA in files:
+        if metadata.FILE_NAME in files:
             yield resolved
 
 
 def _locate(directory: Path) -> TraceLocation:
-    metadata = directory / METADATA
     try:
-        with metadata.open("rb") as file:
-            begin = file.read(512)
+        metadata.kind_of(directory)
         files = stream_files(directory)
         size = sum(file.stat().st_size for file in files)
     except OSError as error:
         raise TraceError(
             f"cannot read the trace ({error.strerror}) — {error.filename}",
-            hint=f"ls -l {directory}",
+            hint=f"sudo chown -R $USER {directory}",
         ) from error
     for path in files:
         if not os.access(path, os.R_OK):
@@ -129,18 +114,7 @@ def _locate(directory: Path) -> TraceLocation:
                 f"cannot read the trace (Permission denied) — {path}",
                 hint=f"sudo chown -R $USER {directory}",
             )
-    if not _is_ctf_metadata(begin):
-        raise TraceError(
-            f"not a CTF trace, its `metadata` is something else — {directory}",
-            hint="give the directory that `ros2 trace` or `lttng` wrote",
-        )
     return TraceLocation(directory, size)
-
-
-def _is_ctf_metadata(begin: bytes) -> bool:
-    if begin.startswith((*_PACKETIZED_MAGIC, _RECORD_SEPARATOR)):
-        return True
-    return begin.lstrip().startswith(_PLAIN_TEXT_BEGIN)
 
 
 def _no_trace_error(path: Path) -> TraceError:

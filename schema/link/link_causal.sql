@@ -1,7 +1,26 @@
 -- name: derive.link_causal
--- description: to come
--- grain: one row per callback run that led to a publication
--- needs: store.publication
-SELECT 1::BIGINT AS run_id, 1::BIGINT AS publication_id, 1::BIGINT AS callback_instance_id, 'direct' AS kind,
-    1::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, false AS is_loss_affected
-WHERE false
+-- description: What led to each publication, by every kind of link.
+-- grain: one row per run of a callback and publication that it led to
+-- needs: derive.link_causal_direct, store.callback_instance, store.take, store.publication
+WITH link AS (
+    SELECT
+        run_id, callback_instance_id, publication_id, 'direct' AS kind,
+        NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, false AS is_loss_affected
+    FROM derive.link_causal_direct
+)
+SELECT
+    l.run_id,
+    l.callback_instance_id,
+    l.publication_id,
+    i.take_id,
+    t.subscription_id,
+    b.publisher_id,
+    l.kind,
+    l.annotation_id,
+    l.candidate_count,
+    l.is_loss_affected
+FROM link AS l
+JOIN store.callback_instance AS i
+    ON l.callback_instance_id = i.callback_instance_id AND l.run_id = i.run_id
+JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
+LEFT JOIN store.take AS t ON i.take_id = t.take_id AND i.run_id = t.run_id

@@ -1,0 +1,61 @@
+# `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
+# is installed into .venv, except what only the distribution has (python3-venv, python3-bt2), which
+# apt installs where that is allowed.
+
+SHELL := /bin/sh
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := .demo
+HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()' 2>/dev/null
+
+# Shell function: apt_install PACKAGE...; fails where apt is missing or not allowed.
+APT := apt_install() { \
+	command -v apt-get >/dev/null 2>&1 || return 1; \
+	if [ "$$(id -u)" -eq 0 ]; then root=; else sudo -n true 2>/dev/null || return 1; root=sudo; fi; \
+	$$root apt-get update -qq && \
+	$$root env DEBIAN_FRONTEND=noninteractive \
+		apt-get install -y -qq --no-install-recommends "$$@"; }
+
+.PHONY: help demo test bt2 clean
+
+help:
+	@echo 'make demo   simulate a robot, ingest its trace, print end-to-end latency'
+	@echo 'make test   style, types, import contracts, tests'
+	@echo 'make clean  remove what these made'
+
+demo: $(VENV)/.installed bt2
+	rm -rf $(DEMO)
+	$(BIN)/msgflow simulate demo $(DEMO)/trace
+	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb
+	$(BIN)/msgflow query e2e-latency --db $(DEMO)/msgflow.duckdb
+
+test: $(VENV)/.developed bt2
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest -n auto
+
+$(VENV)/.made:
+	@$(APT); command -v $(PYTHON) >/dev/null 2>&1 || apt_install python3 python3-venv
+	@$(APT); $(PYTHON) -m venv $(VENV) 2>/dev/null \
+		|| { rm -rf $(VENV); apt_install python3-venv; $(PYTHON) -m venv $(VENV); }
+	@# The group of development packages needs a pip of 2025.
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	@touch $@
+
+$(VENV)/.installed: pyproject.toml $(VENV)/.made
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/.developed: pyproject.toml $(VENV)/.made
+	$(BIN)/python -m pip install --quiet --editable . --group dev
+	@touch $@ $(VENV)/.installed
+
+bt2:
+	@$(APT); $(HAS_BT2) || apt_install python3-bt2 || true
+	@$(HAS_BT2) || echo "note: no bt2 (Debian and Ubuntu: apt install python3-bt2): no trace can be read" >&2
+
+clean:
+	rm -rf $(VENV) $(DEMO)

@@ -1,0 +1,113 @@
+-- name: e2e-latency
+-- title: End-to-end latency by path
+-- description: How long it took from the start of a flow (the callback of the timer that published,
+--     or the publication itself) to its end (the end of the callback at the end of the path), for
+--     every path of the computation graph. Roots are counted whole: those that reached the end,
+--     those superseded by a newer input before they were used, those lost on the way, and those
+--     too close to the begin or end of the trace to tell.
+-- grain: one row per path
+-- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
+-- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts the clock
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that stops it
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
+--     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: max_depth BIGINT = 32     Longest path, in topics
+-- param: max_paths BIGINT = 10000  Most chains followed per length
+-- column: run_id BIGINT            Run
+-- column: path VARCHAR             Nodes and topics
+-- column: roots BIGINT             Flows that began in the time window
+-- column: reached BIGINT           Roots that reached the end of the path
+-- column: superseded BIGINT        Roots replaced by a newer input before they were used
+-- column: lost BIGINT              Roots lost on the way although later ones arrived
+-- column: edge BIGINT              Roots too close to the begin or end of the trace to tell
+-- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
+-- column: pairs BIGINT             Pairs of root and arrival that the latencies are from
+-- column: min_ns BIGINT [ns]       Shortest latency
+-- column: median_ns BIGINT [ns]    Median latency
+-- column: mean_ns BIGINT [ns]      Mean latency
+-- column: p95_ns BIGINT [ns]       95 % of the latencies are at most this
+-- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
+-- column: max_ns BIGINT [ns]       Longest latency
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
+-- needs: main.flow_path, main.end_to_end
+WITH flow AS (
+    SELECT
+        run_id, path_id, root_kind, root_id, latency_ns, status, reason,
+        CASE $case
+            WHEN 'first' THEN is_first
+            WHEN 'last' THEN is_last
+            WHEN 'newest' THEN is_newest
+            ELSE true
+        END AS is_counted
+    FROM main.end_to_end(
+        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+        max_depth := $max_depth, max_paths := $max_paths
+    )
+),
+root AS (
+    SELECT run_id, path_id, root_kind, root_id, any_value(status) AS status,
+        any_value(reason) AS reason
+    FROM flow
+    GROUP BY run_id, path_id, root_kind, root_id
+),
+reason AS (
+    SELECT run_id, path_id, string_agg(reason || ' ' || number, ', ' ORDER BY reason) AS lost_reasons
+    FROM (
+        SELECT run_id, path_id, reason, count(*) AS number
+        FROM root
+        WHERE status IN ('lost', 'superseded')
+        GROUP BY run_id, path_id, reason
+    )
+    GROUP BY run_id, path_id
+),
+completeness AS (
+    SELECT
+        run_id,
+        path_id,
+        count(*) AS roots,
+        count(*) FILTER (WHERE status = 'reached') AS reached,
+        count(*) FILTER (WHERE status = 'superseded') AS superseded,
+        count(*) FILTER (WHERE status = 'lost') AS lost,
+        count(*) FILTER (WHERE status = 'edge') AS edge
+    FROM root
+    GROUP BY run_id, path_id
+),
+latency AS (
+    SELECT
+        run_id,
+        path_id,
+        count(*) AS pairs,
+        min(latency_ns) AS min_ns,
+        quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(latency_ns))::BIGINT AS mean_ns,
+        max(latency_ns) AS max_ns
+    FROM flow
+    WHERE status = 'reached' AND is_counted
+    GROUP BY run_id, path_id
+)
+SELECT
+    p.run_id,
+    p.path,
+    coalesce(c.roots, 0) AS roots,
+    coalesce(c.reached, 0) AS reached,
+    coalesce(c.superseded, 0) AS superseded,
+    coalesce(c.lost, 0) AS lost,
+    coalesce(c.edge, 0) AS edge,
+    r.lost_reasons,
+    coalesce(l.pairs, 0) AS pairs,
+    l.min_ns,
+    l.quantiles[1] AS median_ns,
+    l.mean_ns,
+    l.quantiles[2] AS p95_ns,
+    l.quantiles[3] AS p99_ns,
+    l.max_ns,
+    p.is_cut
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+) AS p
+LEFT JOIN completeness AS c ON p.path_id = c.path_id
+LEFT JOIN latency AS l ON p.path_id = l.path_id
+LEFT JOIN reason AS r ON p.path_id = r.path_id
+WHERE p.is_path
+ORDER BY p.run_id, p.path, p.path_id

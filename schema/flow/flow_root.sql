@@ -1,0 +1,28 @@
+-- name: derive.flow_root
+-- description: Where the flow of each publication can be said to begin: with the run of the timer
+--     (or other callback without a message) that published it, else with the publication itself.
+--     It is a source where no taken message led to it.
+-- grain: one row per publication on a topic of the application
+-- needs: store.publication, store.publisher, store.link_causal
+WITH cause AS (
+    SELECT
+        run_id,
+        publication_id,
+        bool_or(take_id IS NOT NULL) AS has_message,
+        min(CASE WHEN take_id IS NULL THEN callback_instance_id END) AS callback_instance_id
+    FROM store.link_causal
+    GROUP BY run_id, publication_id
+)
+SELECT
+    b.run_id,
+    b.publication_id,
+    b.publisher_id,
+    NOT coalesce(c.has_message, false) AS is_source,
+    CASE WHEN c.callback_instance_id IS NULL OR c.has_message THEN 'publication'
+        ELSE 'callback_instance' END AS root_kind,
+    CASE WHEN c.callback_instance_id IS NULL OR c.has_message THEN b.publication_id
+        ELSE c.callback_instance_id END AS root_id
+FROM store.publication AS b
+JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+LEFT JOIN cause AS c ON b.publication_id = c.publication_id
+WHERE NOT p.is_internal

@@ -1,0 +1,74 @@
+-- name: derive.link_transport_exact
+-- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
+--     known. A topic unknown on a side counts only where the stamp alone has a single candidate in
+--     the run. Of several publications with equal topic and stamp the k-th belongs to the k-th
+--     such take of a subscription. Equal values need no clocks: a take may seem to precede.
+-- grain: one row per take whose publication is known by its stamp
+-- needs: store.publication, store.publisher, store.take, store.subscription
+WITH published AS (
+    SELECT
+        b.run_id, b.publication_id, b.source_timestamp_ns, b.start_event_id, p.topic_name
+    FROM store.publication AS b
+    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
+    WHERE b.source_timestamp_ns <> 0
+),
+received AS (
+    SELECT
+        t.run_id, t.take_id, t.source_timestamp_ns, t.subscription_id, t.start_event_id,
+        s.topic_name
+    FROM store.take AS t
+    LEFT JOIN store.subscription AS s
+        ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
+    WHERE t.source_timestamp_ns <> 0
+),
+candidate AS (
+    SELECT
+        r.run_id,
+        r.take_id,
+        r.subscription_id,
+        r.source_timestamp_ns,
+        r.start_event_id AS take_event_id,
+        p.publication_id,
+        p.start_event_id AS publication_event_id,
+        coalesce(r.topic_name = p.topic_name, false) AS is_topic_known
+    FROM received AS r
+    JOIN published AS p
+        ON r.run_id = p.run_id
+        AND r.source_timestamp_ns = p.source_timestamp_ns
+        AND coalesce(r.topic_name = p.topic_name, true)
+),
+counted AS (
+    SELECT
+        run_id, take_id, subscription_id, source_timestamp_ns, take_event_id, publication_id,
+        publication_event_id, is_topic_known,
+        count(*) OVER same_take AS candidate_count,
+        count(CASE WHEN is_topic_known THEN 1 END) OVER same_take AS known_count
+    FROM candidate
+    WINDOW same_take AS (PARTITION BY run_id, take_id)
+),
+unique_match AS (
+    SELECT
+        run_id, publication_id, take_id, 1::BIGINT AS candidate_count,
+        CASE WHEN is_topic_known THEN 'exact' ELSE 'exact_stamp' END AS method
+    FROM counted
+    WHERE CASE WHEN known_count > 0 THEN is_topic_known AND known_count = 1
+        ELSE candidate_count = 1 END
+),
+ordered AS (
+    SELECT
+        run_id, publication_id, take_id, known_count,
+        row_number() OVER (
+            PARTITION BY run_id, take_id ORDER BY publication_event_id
+        ) AS publication_position,
+        dense_rank() OVER (
+            PARTITION BY run_id, subscription_id, source_timestamp_ns ORDER BY take_event_id
+        ) AS take_position
+    FROM counted
+    WHERE is_topic_known AND known_count > 1
+)
+SELECT run_id, publication_id, take_id, method, candidate_count
+FROM unique_match
+UNION ALL
+SELECT run_id, publication_id, take_id, 'exact', known_count
+FROM ordered
+WHERE publication_position = take_position

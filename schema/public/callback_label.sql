@@ -1,0 +1,28 @@
+-- name: main.callback_label
+-- description: What people call a callback: what triggers it, such as Timer(5 ms) or
+--     Subscription(/scan), in the node that it belongs to.
+-- grain: one row per callback object
+-- column: callback_id BIGINT  Identity of the callback
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: node VARCHAR  Full name of the node, or the name and pid of the process in brackets
+-- column: label VARCHAR  What triggers it
+-- column: is_internal BOOLEAN  Infrastructure of ROS
+-- needs: store.callback, store.node, store.process, store.timer, store.subscription,
+--     store.service, derive.node_label
+SELECT
+    c.callback_id,
+    c.run_id,
+    derive.node_label(n.full_name, p.name, p.pid) AS node,
+    CASE c.kind
+        WHEN 'timer' THEN printf('Timer(%.10g ms)', t.period_ns / 1e6)
+        WHEN 'subscription' THEN printf('Subscription(%s)', coalesce(s.topic_name, '?'))
+        WHEN 'service' THEN printf('Service(%s)', coalesce(v.service_name, '?'))
+        ELSE printf('Callback(0x%x)', c.callback_handle)
+    END AS label,
+    coalesce(s.is_internal, v.is_internal, false) AS is_internal
+FROM store.callback AS c
+JOIN store.process AS p ON c.process_id = p.process_id
+LEFT JOIN store.node AS n ON c.node_id = n.node_id
+LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id
+LEFT JOIN store.subscription AS s ON c.subscription_id = s.subscription_id
+LEFT JOIN store.service AS v ON c.service_id = v.service_id

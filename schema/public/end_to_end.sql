@@ -1,0 +1,222 @@
+-- name: main.end_to_end
+-- kind: macro
+-- description: What became of every root of every path. A root that reached the sink has a row per
+--     take there; one that did not has a single row that says why. Roots are runs of timers that
+--     published, or publications (always with from_event 'publish'); the time window is that of
+--     the roots. A message is lost between the first and the last that passed the same step, and
+--     at the edge of the trace before and after.
+-- grain: one row per path, root and take at the sink; one per path and root that did not reach it
+-- needs: main.flow_path, derive.flow_root, derive.flow_transport, derive.flow_continuation,
+--     main.publication, main.callback_instance, main.take, store.publisher
+CREATE OR REPLACE MACRO main.end_to_end(
+    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+    max_depth := 32, max_paths := 10000
+) AS TABLE
+WITH RECURSIVE path AS MATERIALIZED (
+    SELECT
+        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
+        publishers[1] AS first_publisher_id, is_cached, is_path
+    FROM main.flow_path(
+        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
+    )
+),
+-- root_key: positive for a callback run, negative for a publication.
+root AS MATERIALIZED (
+    SELECT
+        r.run_id,
+        r.publication_id,
+        r.publisher_id,
+        CASE WHEN i.callback_instance_id IS NULL THEN -r.publication_id
+            ELSE i.callback_instance_id END AS root_key,
+        coalesce(i.start_ns, b.start_ns) AS root_ns
+    FROM derive.flow_root AS r
+    JOIN main.publication AS b ON r.publication_id = b.publication_id
+    JOIN store.publisher AS p ON r.publisher_id = p.publisher_id
+    LEFT JOIN main.callback_instance AS i
+        ON from_event <> 'publish'
+        AND r.root_kind = 'callback_instance'
+        AND r.root_id = i.callback_instance_id
+       
+    WHERE list_contains(runs, r.run_id)
+        AND CASE WHEN from_topic IS NULL THEN r.is_source ELSE p.topic_name = from_topic END
+        AND coalesce(i.start_ns, b.start_ns) >= window_start_ns
+        AND coalesce(i.start_ns, b.start_ns) < window_end_ns
+),
+transport AS MATERIALIZED (
+    SELECT run_id, publication_id, publisher_id, take_id, subscription_id
+    FROM derive.flow_transport
+    WHERE list_contains(runs, run_id)
+),
+continuation AS MATERIALIZED (
+    SELECT take_id, subscription_id, publication_id, publisher_id
+    FROM derive.flow_continuation
+    WHERE list_contains(runs, run_id)
+),
+step AS MATERIALIZED (
+    SELECT c.take_id AS from_take_id, t.publisher_id, t.subscription_id, t.take_id
+    FROM continuation AS c
+    JOIN transport AS t ON c.publication_id = t.publication_id
+),
+reached (path_id, root_key, take_id) AS (
+    SELECT p.path_id, r.root_key, t.take_id
+    FROM root AS r
+    JOIN transport AS t ON r.publication_id = t.publication_id
+    JOIN path AS p
+        ON t.publisher_id = p.publisher_id
+        AND t.subscription_id = p.subscription_id
+        AND p.depth = 1
+    UNION
+    SELECT p.path_id, r.root_key, s.take_id
+    FROM reached AS r
+    JOIN path AS p ON r.path_id = p.parent_path_id
+    JOIN step AS s
+        ON r.take_id = s.from_take_id
+        AND p.publisher_id = s.publisher_id
+        AND p.subscription_id = s.subscription_id
+),
+arrival AS (
+    SELECT
+        r.path_id,
+        r.root_key,
+        r.take_id,
+        CASE to_event
+            WHEN 'take' THEN t.taken_ns
+            WHEN 'callback_start' THEN i.start_ns
+            ELSE i.end_ns
+        END AS sink_ns
+    FROM reached AS r
+    JOIN path AS p ON r.path_id = p.path_id AND p.is_path
+    JOIN main.take AS t ON r.take_id = t.take_id
+    LEFT JOIN main.callback_instance AS i ON r.take_id = i.take_id
+),
+pair AS MATERIALIZED (
+    SELECT path_id, root_key, take_id, sink_ns FROM arrival WHERE sink_ns IS NOT NULL
+),
+expected AS MATERIALIZED (
+    SELECT
+        p.run_id, p.path_id, r.root_key, min(r.root_ns) AS root_ns,
+        max(r.publication_id) AS publication_id
+    FROM path AS p
+    JOIN root AS r ON p.first_publisher_id = r.publisher_id
+    WHERE p.is_path
+    GROUP BY p.run_id, p.path_id, r.root_key
+),
+missing AS MATERIALIZED (
+    SELECT e.run_id, e.path_id, e.root_key, e.root_ns, e.publication_id
+    FROM expected AS e
+    ANTI JOIN pair AS a ON e.path_id = a.path_id AND e.root_key = a.root_key
+),
+lineage (path_id, prefix_id, depth, parent_path_id) AS (
+    SELECT path_id, path_id, depth, parent_path_id FROM path WHERE is_path
+    UNION ALL
+    SELECT l.path_id, p.path_id, p.depth, p.parent_path_id
+    FROM lineage AS l
+    JOIN path AS p ON l.parent_path_id = p.path_id
+),
+progress AS (
+    SELECT
+        m.path_id, m.root_key,
+        coalesce(max(l.depth) FILTER (WHERE r.take_id IS NOT NULL), 0) AS depth,
+        arg_max(r.take_id, l.depth) FILTER (WHERE r.take_id IS NOT NULL) AS take_id
+    FROM missing AS m
+    JOIN lineage AS l ON m.path_id = l.path_id
+    LEFT JOIN reached AS r ON l.prefix_id = r.path_id AND m.root_key = r.root_key
+    GROUP BY m.path_id, m.root_key
+),
+-- The step at which each root that did not arrive got stuck; none where only the end is missing.
+stuck AS (
+    SELECT
+        m.path_id, m.root_key, p.take_id, p.depth, n.publisher_id, n.subscription_id,
+        n.is_cached,
+        CASE WHEN p.depth = 0 THEN m.publication_id ELSE c.publication_id END AS publication_id
+    FROM missing AS m
+    JOIN progress AS p ON m.path_id = p.path_id AND m.root_key = p.root_key
+    LEFT JOIN lineage AS l ON m.path_id = l.path_id AND l.depth = p.depth + 1
+    LEFT JOIN path AS n ON l.prefix_id = n.path_id
+    LEFT JOIN (
+        SELECT take_id, publisher_id, max(publication_id) AS publication_id
+        FROM continuation
+        GROUP BY take_id, publisher_id
+    ) AS c ON p.take_id = c.take_id AND n.publisher_id = c.publisher_id
+),
+delivered AS (
+    SELECT
+        publisher_id, subscription_id,
+        min(publication_id) AS first_publication_id,
+        max(publication_id) AS last_publication_id
+    FROM transport
+    GROUP BY publisher_id, subscription_id
+),
+continued AS (
+    SELECT
+        subscription_id, publisher_id, min(take_id) AS first_take_id, max(take_id) AS last_take_id
+    FROM continuation
+    GROUP BY subscription_id, publisher_id
+),
+explained AS (
+    SELECT
+        s.path_id,
+        s.root_key,
+        CASE
+            WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
+            WHEN s.publication_id IS NOT NULL THEN 'not_delivered'
+            WHEN s.is_cached THEN 'superseded'
+            ELSE 'not_published'
+        END AS reason,
+        CASE
+            WHEN s.publisher_id IS NULL THEN true
+            WHEN s.publication_id IS NOT NULL THEN
+                s.publication_id < d.first_publication_id
+                OR s.publication_id > d.last_publication_id
+            ELSE s.take_id < c.first_take_id OR s.take_id > c.last_take_id
+        END AS is_edge
+    FROM stuck AS s
+    LEFT JOIN delivered AS d
+        ON s.publisher_id = d.publisher_id AND s.subscription_id = d.subscription_id
+    LEFT JOIN main.take AS t ON s.take_id = t.take_id
+    LEFT JOIN continued AS c
+        ON t.subscription_id = c.subscription_id AND s.publisher_id = c.publisher_id
+)
+SELECT
+    e.run_id,
+    e.path_id,
+    CASE WHEN e.root_key > 0 THEN 'callback_instance' ELSE 'publication' END AS root_kind,
+    abs(e.root_key) AS root_id,
+    e.root_ns,
+    a.take_id,
+    a.sink_ns,
+    a.sink_ns - e.root_ns AS latency_ns,
+    'reached' AS status,
+    NULL AS reason,
+    row_number() OVER (
+        PARTITION BY a.path_id, a.root_key ORDER BY a.sink_ns, a.take_id
+    ) = 1 AS is_first,
+    row_number() OVER (
+        PARTITION BY a.path_id, a.root_key ORDER BY a.sink_ns DESC, a.take_id DESC
+    ) = 1 AS is_last,
+    row_number() OVER (
+        PARTITION BY a.path_id, a.take_id ORDER BY e.root_ns DESC, a.root_key DESC
+    ) = 1 AS is_newest
+FROM pair AS a
+JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
+UNION ALL
+SELECT
+    m.run_id,
+    m.path_id,
+    CASE WHEN m.root_key > 0 THEN 'callback_instance' ELSE 'publication' END,
+    abs(m.root_key),
+    m.root_ns,
+    NULL,
+    NULL,
+    NULL,
+    CASE
+        WHEN x.is_edge THEN 'edge'
+        WHEN x.reason = 'superseded' THEN 'superseded'
+        ELSE 'lost'
+    END,
+    x.reason,
+    true,
+    true,
+    true
+FROM missing AS m
+JOIN explained AS x ON m.path_id = x.path_id AND m.root_key = x.root_key

@@ -1,0 +1,115 @@
+-- name: main.flow_path
+-- kind: macro
+-- description: Chains of publishers and subscriptions that flows can take, with all their
+--     beginnings (prefixes). No subscription comes twice in a chain. A chain is a path where it
+--     ends at the topic asked for, or where it cannot be continued. Chains longer than max_depth
+--     and beyond max_paths per length are cut; where that happened is_cut says so.
+-- grain: one row per run and chain
+-- needs: derive.flow_hop, derive.node_label, store.publisher, store.subscription, store.node, store.process
+CREATE OR REPLACE MACRO main.flow_path(
+    runs, from_topic, to_topic, max_depth := 32, max_paths := 10000
+) AS TABLE
+WITH RECURSIVE hop AS MATERIALIZED (
+    SELECT
+        h.run_id, h.from_subscription_id, h.publisher_id, h.subscription_id, h.is_cached,
+        p.topic_name,
+        derive.node_label(pn.full_name, pp.name, pp.pid) AS from_node,
+        derive.node_label(sn.full_name, sp.name, sp.pid) AS to_node,
+        CASE
+            WHEN h.from_subscription_id IS NOT NULL THEN false
+            WHEN from_topic IS NULL THEN h.is_source
+            ELSE coalesce(p.topic_name = from_topic, false)
+        END AS is_start
+    FROM derive.flow_hop AS h
+    JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
+    JOIN store.process AS pp ON p.process_id = pp.process_id
+    LEFT JOIN store.node AS pn ON p.node_id = pn.node_id
+    JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
+    JOIN store.process AS sp ON s.process_id = sp.process_id
+    LEFT JOIN store.node AS sn ON s.node_id = sn.node_id
+    WHERE list_contains(runs, h.run_id)
+),
+-- Only what leads to the topic asked for is followed, so that nothing else is enumerated.
+toward_end (run_id, subscription_id) AS (
+    SELECT run_id, subscription_id
+    FROM hop
+    WHERE to_topic IS NULL OR topic_name = to_topic
+    UNION
+    SELECT h.run_id, h.from_subscription_id
+    FROM toward_end AS l
+    JOIN hop AS h ON l.subscription_id = h.subscription_id
+    WHERE h.from_subscription_id IS NOT NULL
+),
+useful AS MATERIALIZED (
+    SELECT h.run_id, h.from_subscription_id, h.publisher_id, h.subscription_id, h.is_cached,
+        h.topic_name, h.from_node, h.to_node, h.is_start
+    FROM hop AS h
+    JOIN toward_end AS l ON h.subscription_id = l.subscription_id
+),
+chain AS (
+    SELECT
+        run_id,
+        [publisher_id] AS publishers,
+        [subscription_id] AS subscriptions,
+        [topic_name] AS topics,
+        from_node || ' → ' || coalesce(topic_name, '?') || ' → ' || to_node AS path,
+        is_cached,
+        false AS is_crowded
+    FROM useful
+    WHERE is_start
+    UNION ALL
+    SELECT run_id, publishers, subscriptions, topics, path, is_cached, is_crowded
+    FROM (
+        SELECT
+            c.run_id,
+            list_append(c.publishers, u.publisher_id) AS publishers,
+            list_append(c.subscriptions, u.subscription_id) AS subscriptions,
+            list_append(c.topics, u.topic_name) AS topics,
+            c.path || ' → ' || coalesce(u.topic_name, '?') || ' → ' || u.to_node AS path,
+            u.is_cached,
+            count(*) OVER (PARTITION BY c.run_id) > max_paths AS is_crowded
+        FROM chain AS c
+        JOIN useful AS u
+            ON c.subscriptions[-1] = u.from_subscription_id
+        WHERE len(c.subscriptions) < max_depth
+            AND NOT list_contains(c.subscriptions, u.subscription_id)
+            AND (to_topic IS NULL OR c.topics[-1] IS DISTINCT FROM to_topic)
+    )
+    QUALIFY row_number() OVER (
+        PARTITION BY run_id ORDER BY publishers, subscriptions
+    ) <= max_paths
+),
+numbered AS MATERIALIZED (
+    SELECT
+        run_id, publishers, subscriptions, topics, path, is_cached, is_crowded,
+        row_number() OVER (ORDER BY run_id, publishers, subscriptions) AS path_id
+    FROM chain
+),
+extended AS (
+    SELECT DISTINCT n.run_id, n.path_id
+    FROM numbered AS n
+    JOIN useful AS u ON n.subscriptions[-1] = u.from_subscription_id
+    WHERE NOT list_contains(n.subscriptions, u.subscription_id)
+)
+SELECT
+    n.run_id,
+    n.path_id,
+    p.path_id AS parent_path_id,
+    len(n.subscriptions) AS depth,
+    n.publishers,
+    n.subscriptions,
+    n.topics,
+    n.path,
+    n.publishers[-1] AS publisher_id,
+    n.subscriptions[-1] AS subscription_id,
+    n.is_cached,
+    CASE
+        WHEN to_topic IS NOT NULL THEN n.topics[-1] = to_topic
+        ELSE e.path_id IS NULL OR len(n.subscriptions) >= max_depth
+    END AS is_path,
+    (e.path_id IS NOT NULL AND len(n.subscriptions) >= max_depth) OR n.is_crowded AS is_cut
+FROM numbered AS n
+LEFT JOIN numbered AS p
+    ON p.publishers = n.publishers[:-2]
+    AND p.subscriptions = n.subscriptions[:-2]
+LEFT JOIN extended AS e ON n.path_id = e.path_id

@@ -1,0 +1,12 @@
+-- name: main.link_response
+-- description: Responses and the callback run that sent them.
+-- grain: one row per response and the callback run that sent it
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: response_id BIGINT  Effect
+-- column: callback_instance_id BIGINT  Cause
+-- needs: store.link_response
+SELECT
+    self.run_id,
+    self.response_id,
+    self.callback_instance_id
+FROM store.link_response AS self

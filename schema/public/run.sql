@@ -1,0 +1,22 @@
+-- name: main.run
+-- description: Ingests of traces that belong together. Nothing is ever linked across runs.
+-- grain: one row per ingest of traces that belong together
+-- column: run_id BIGINT  Identity of the run
+-- column: name VARCHAR  Name given by the user, or the name of the first trace directory
+-- column: created_at TIMESTAMP  When the run was ingested, UTC
+-- column: msgflow_version VARCHAR  Version of msgflow that ingested the run
+-- column: derivation_hash VARCHAR  SHA-256 of the SQL that derived the links
+-- column: start_ns BIGINT [epoch ns]  First event of any trace
+-- column: end_ns BIGINT [epoch ns]  Last event of any trace
+-- column: event_count BIGINT  Events read
+-- needs: store.run
+SELECT
+    self.run_id,
+    self.name,
+    self.created_at,
+    self.msgflow_version,
+    self.derivation_hash,
+    self.start_ns,
+    self.end_ns,
+    self.event_count
+FROM store.run AS self

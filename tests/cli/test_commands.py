@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import Result
+
+from msgflow.version import __version__
+
+Msgflow = Callable[..., Result]
+COMMANDS = (
+    "ingest",
+    "query",
+    "sql",
+    "info",
+    "export",
+    "export parquet",
+    "db",
+    "db upgrade",
+    "db check",
+    "db schema",
+    "simulate",
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
+    result = msgflow(*command.split(), "--help")
+    assert result.exit_code == 0
+    assert f"Usage: msgflow {command}" in result.stdout
+    assert result.stderr == ""
+
+
+def test_without_a_command_the_help_is_printed(msgflow: Msgflow) -> None:
+    result = msgflow()
+    assert result.exit_code == 0
+    positions = [result.stdout.index(f"│ {name} ") for name in ("ingest", "query", "sql", "db")]
+    assert positions == sorted(positions)
+
+
+def test_version(msgflow: Msgflow) -> None:
+    assert msgflow("--version").stdout == f"msgflow {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "hint"),
+    [
+        (("qury",), "no such command 'qury'", "did you mean 'query'"),
+        (("ingest",), "missing argument 'TRACE...'", "msgflow ingest --help"),
+        (("ingest", "x", "--host", "robot"), "--host takes NAME=PATH — robot", "--host robot="),
+        (("sql",), "give SQL, or a file with -f", "msgflow sql"),
+        (("sql", "SELECT 1", "-f", "x"), "give SQL, or a file with -f", "msgflow sql"),
+        (("sql", "-f", "none.sql"), "no such file or directory — none.sql", ""),
+        (("simulate", "nothing", "out"), "nothing", ""),
+    ],
+)
+def test_usage_errors(msgflow: Msgflow, arguments: tuple[str, ...], error: str, hint: str) -> None:
+    result = msgflow(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert result.stderr.startswith("error: ")
+    assert error in result.stderr
+    assert hint in result.stderr.partition("\n\nhint: ")[2]
+
+
+def test_sql_from_argument_file_and_stdin(msgflow: Msgflow, small_database: Path) -> None:
+    text = "SELECT name FROM run ORDER BY run_id"
+    Path("q.sql").write_text(text)
+    options = ("--db", small_database, "--format", "csv")
+    expected = '"name"\n"morning"\n"noon"\n'
+    assert msgflow("sql", text, *options).stdout == expected
+    assert msgflow("sql", "-f", "q.sql", *options).stdout == expected
+    assert msgflow("sql", "-", *options, stdin=text).stdout == expected
+
+
+def test_sql_says_when_rows_are_cut(msgflow: Msgflow, small_database: Path) -> None:
+    cut = msgflow("sql", "FROM range(5)", "--limit", 2, "--db", small_database, "--format", "csv")
+    assert cut.stdout.splitlines() == ['"range"', "0", "1"]
+    assert "only the first 2 rows" in cut.stderr
+    whole = msgflow("sql", "FROM range(2000)", "--limit", 0, "--db", small_database)
+    assert len(whole.stdout.splitlines()) == 2002
+    assert whole.stderr == ""
+
+
+def test_sql_that_fails_has_code_1(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow("sql", "SELECT * FROM publishr", "--db", small_database)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: Table with name publishr does not exist\n\nhint: ")
+
+
+def test_sql_shows_addresses_as_numbers(msgflow: Msgflow, small_database: Path) -> None:
+    text = "SELECT publisher_handle FROM publisher WHERE publisher_id = 2"
+    shown = msgflow("sql", text, "--db", small_database)
+    assert shown.stdout.splitlines()[-1] == "0xffffffffffffffff"
+    exact = msgflow("sql", text, "--db", small_database, "--format", "csv")
+    assert exact.stdout.splitlines()[-1] == str(2**64 - 1)
+
+
+def test_info(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow("info", "--db", small_database)
+    assert result.exit_code == 0
+    for part in ("RUNS", "morning", "noon", "NODES", "/talker", "/chatter", "discarded_events"):
+        assert part in result.stdout
+    assert result.stderr == "note: topics: 1 internal row is hidden; --internal shows them\n"
+
+
+def test_info_as_one_json_object(msgflow: Msgflow, small_database: Path) -> None:
+    result = json.loads(msgflow("info", "--db", small_database, "--format", "json").stdout)
+    assert list(result) == [
+        "runs",
+        "hosts",
+        "processes",
+        "nodes",
+        "topics",
+        "counts",
+        "diagnostics",
+    ]
+    assert [run["name"] for run in result["runs"]] == ["morning", "noon"]
+    assert [process["pid"] for process in result["processes"]] == [43]
+    assert result["diagnostics"][0]["count"] == 7
+
+
+def test_info_as_markdown(msgflow: Msgflow, small_database: Path) -> None:
+    text = msgflow("info", "--db", small_database, "--format", "markdown", "--run", "1").stdout
+    assert "## Topics\n\n| run_id | topic_name |" in text
+    assert "| 1 | /chatter | 1 |" in text
+
+
+def test_export(msgflow: Msgflow, small_database: Path) -> None:
+    arguments = ("export", "parquet", "out", "publisher", "node", "--db", small_database)
+    result = msgflow(*arguments)
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    assert result.stderr == "2 views, 5 rows written to out\n"
+    assert pq.read_table("out/node.parquet").num_rows == 2
+    again = msgflow(*arguments)
+    assert again.exit_code == 2
+    assert "--force" in again.stderr
+    assert msgflow(*arguments, "--force").exit_code == 0
+
+
+def test_db_schema_lists_the_views(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow("db", "schema", "--db", small_database, "--format", "jsonl")
+    rows = [json.loads(line) for line in result.stdout.splitlines()]
+    assert {"view", "column", "type", "description"} == set(rows[0])
+    assert ("take", "taken_ns") in {(row["view"], row["column"]) for row in rows}
+
+
+def test_db_upgrade_of_a_current_database(msgflow: Msgflow, small_database: Path) -> None:
+    with duckdb.connect(str(small_database)) as connection:
+        connection.execute("UPDATE store.run SET derivation_hash = 'old'")
+    first = msgflow("db", "upgrade", "--db", small_database)
+    assert first.exit_code == 0
+    assert "links derived anew for 2 runs" in first.stderr
+    assert "is up to date" in msgflow("db", "upgrade", "--db", small_database).stderr
+
+
+def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None:
+    with duckdb.connect(str(small_database)) as connection:
+        connection.execute("UPDATE store.definition SET hash = 'old' WHERE name = 'views'")
+    refused = msgflow("info", "--db", small_database)
+    assert refused.exit_code == 4
+    assert "msgflow db upgrade" in refused.stderr
+    assert msgflow("db", "upgrade", "--db", small_database).exit_code == 0
+    assert msgflow("info", "--db", small_database).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "info",
+        "query info-runs",
+        "sql FROM\u00a0run",
+        "db check",
+        "db schema",
+        "db upgrade",
+        "export parquet out",
+    ],
+)
+def test_a_missing_database_has_code_4(msgflow: Msgflow, command: str) -> None:
+    arguments = [part.replace("\u00a0", " ") for part in command.split(" ")]
+    result = msgflow(*arguments)
+    assert result.exit_code == 4
+    assert result.stdout == ""
+    assert "msgflow.duckdb" in result.stderr
+    assert not Path("msgflow.duckdb").exists()
+    assert not Path("out").exists()
+
+
+def test_foreign_files_have_code_4(msgflow: Msgflow) -> None:
+    Path("text.duckdb").write_text("no database")
+    with duckdb.connect("other.duckdb") as connection:
+        connection.execute("CREATE TABLE t AS SELECT 1 AS a")
+    for name in ("text.duckdb", "other.duckdb"):
+        result = msgflow("info", "--db", name)
+        assert result.exit_code == 4
+        assert name in result.stderr
+
+
+def test_a_trace_that_is_not_there_has_code_3(msgflow: Msgflow) -> None:
+    result = msgflow("ingest", "nowhere")
+    assert result.exit_code == 3
+    assert "nowhere" in result.stderr
+    assert not Path("msgflow.duckdb").exists()
+
+
+def test_simulate(msgflow: Msgflow) -> None:
+    result = msgflow("simulate", "pipeline", "out", "--factor", 0.02)
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    assert result.stderr.startswith("1 trace, ")
+    assert list(Path("out").rglob("metadata"))

@@ -1,0 +1,70 @@
+"""Whatever goes wrong: a message, an exit code, and no traceback."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from msgflow.database import Database
+from msgflow.errors import ExitCode
+
+Msgflow = Callable[..., Result]
+
+
+def break_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(Database, "sql", fail)
+
+
+def test_the_unexpected_is_one_line(msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch) -> None:
+    break_with(monkeypatch, ValueError("first\nsecond"))
+    result = msgflow("sql", "SELECT 1")
+    assert result.exit_code == ExitCode.FAILED
+    assert result.stdout == ""
+    error, _, hint = result.stderr.partition("\n\n")
+    assert error == "error: unexpected ValueError: first"
+    assert "MSGFLOW_DEBUG=1" in hint
+    assert "Traceback" not in result.stderr
+
+
+def test_the_unexpected_can_be_traced(msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MSGFLOW_DEBUG", "1")
+    break_with(monkeypatch, ValueError("first"))
+    result = msgflow("sql", "SELECT 1")
+    assert result.exit_code == ExitCode.FAILED
+    assert "Traceback" in result.stderr
+    assert "report it" in result.stderr
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("Query interrupted")])
+def test_an_interrupt_has_code_130(
+    msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    break_with(monkeypatch, error)
+    result = msgflow("sql", "SELECT 1")
+    assert result.exit_code == ExitCode.INTERRUPTED
+    assert result.stderr == "error: interrupted\n"
+
+
+def test_messages_have_no_colour_in_a_pipe(msgflow: Msgflow) -> None:
+    result = msgflow("info")
+    assert "\x1b" not in result.stderr
+    assert result.stderr.startswith("error: ")
+
+
+def test_nothing_is_left_of_a_file_that_failed(
+    msgflow: Msgflow, small_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no")
+
+    monkeypatch.setattr("msgflow.cli.output.write_result", fail)
+    Path("out.csv").write_text("before")
+    assert msgflow("sql", "FROM run", "--db", small_database, "-o", "out.csv").exit_code == 1
+    assert Path("out.csv").read_text() == "before"
+    assert [path.name for path in Path().iterdir()] == ["out.csv"]

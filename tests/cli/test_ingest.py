@@ -1,0 +1,68 @@
+"""From a trace to an answer, as a user does it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from msgflow.errors import TraceError
+from msgflow.sim import simulate
+from msgflow.trace import bt2_library
+
+Msgflow = Callable[..., Result]
+
+
+@pytest.fixture(scope="module")
+def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short trace of a pipeline."""
+    try:
+        bt2_library.load()
+    except TraceError as error:
+        pytest.skip(error.message)
+    return simulate("pipeline", tmp_path_factory.mktemp("trace") / "robot", factor=0.1).directory
+
+
+def test_two_commands_lead_to_the_answer(msgflow: Msgflow, trace: Path) -> None:
+    ingested = msgflow("ingest", trace)
+    assert ingested.exit_code == 0, ingested.stderr
+    assert ingested.stdout == ""
+    assert "read into msgflow.duckdb as run robot (1)" in ingested.stderr
+    answer = msgflow("query", "e2e-latency")
+    assert answer.exit_code == 0, answer.stderr
+    assert "/topic_a" in answer.stdout
+    assert "run: robot (1)" in answer.stderr
+
+
+def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
+    msgflow("ingest", trace, "--quiet")
+    arguments = ("query", "e2e-latency", "--format", "json")
+    assert json.loads(msgflow(*arguments, "--from", "/topic_a").stdout)
+    assert json.loads(msgflow(*arguments, "--from", "/nothing").stdout) == []
+    whole, late = (
+        json.loads(msgflow(*arguments, *options).stdout)[0]["roots"]
+        for options in ((), ("--skip-first", "0.5"))
+    )
+    assert late < whole
+    refused = msgflow("query", "e2e-latency", "--case", "middle")
+    assert refused.exit_code == 2
+    assert refused.stderr.startswith("error: case has no such value — middle\n\nhint: choose ")
+
+
+def test_quiet_says_nothing_and_a_run_has_the_name_given(msgflow: Msgflow, trace: Path) -> None:
+    result = msgflow("ingest", trace, "--quiet", "--name", "first")
+    assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
+    assert "first" in msgflow("info").stdout
+
+
+def test_the_same_trace_again_is_refused_but_can_be_replaced(msgflow: Msgflow, trace: Path) -> None:
+    assert msgflow("ingest", trace).exit_code == 0
+    again = msgflow("ingest", trace)
+    assert again.exit_code == 2
+    assert "--replace" in again.stderr
+    assert msgflow("ingest", trace, "--replace").exit_code == 0
+    runs = json.loads(msgflow("query", "info-runs", "--run", "all", "--format", "json").stdout)
+    assert len(runs) == 1

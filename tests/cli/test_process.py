@@ -1,0 +1,147 @@
+"""The program as a process of its own: imports, pipes, terminals, signals, time."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+HEAVY = ("duckdb", "pyarrow", "sqlalchemy", "alembic", "pandas", "polars", "bt2")
+NEVER_IN_QUERY = ("sqlalchemy", "alembic", "duckdb_engine", "pandas", "polars", "bt2")
+SLOW = "SELECT count(*) FROM range(1000000) a, range(10000000) b WHERE a.range * b.range % 7 = 3"
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "msgflow", *map(str, arguments)]
+
+
+def imported(*arguments: object) -> set[str]:
+    program = (
+        "import sys\n"
+        "from msgflow.cli.app import app\n"
+        "try:\n    app(sys.argv[1:])\n"
+        "except SystemExit as end:\n    assert not end.code, end.code\n"
+        "print(' '.join(sys.modules), file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--help",),
+        ("--version",),
+        ("ingest", "--help"),
+        ("query", "--help"),
+        ("query", "--list"),
+        ("query", "info-topics", "--help"),
+        ("query", "info-topics", "--show"),
+        ("sql", "--help"),
+        ("info", "--help"),
+        ("export", "parquet", "--help"),
+        ("db", "upgrade", "--help"),
+        ("simulate", "--help"),
+    ],
+)
+def test_help_does_not_import_the_database_stack(arguments: tuple[str, ...]) -> None:
+    assert not imported(*arguments) & set(HEAVY)
+
+
+def test_a_query_imports_what_it_needs_and_no_more(small_database: Path) -> None:
+    modules = imported("query", "info-topics", "--db", small_database)
+    assert {"duckdb", "pyarrow"} <= modules
+    assert not modules & set(NEVER_IN_QUERY)
+
+
+def test_help_is_quick() -> None:
+    def seconds() -> float:
+        begin = time.perf_counter()
+        subprocess.run(command("--help"), capture_output=True, check=True)
+        return time.perf_counter() - begin
+
+    # The best of several: other work on the machine must not decide.
+    assert min(seconds() for _ in range(5)) < 0.4
+
+
+def test_a_reader_that_goes_away_is_no_error(small_database: Path) -> None:
+    process = subprocess.Popen(
+        command("sql", "FROM range(300000)", "--limit", 0, "--db", small_database),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.readline()
+    process.stdout.close()
+    errors = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(timeout=30) == 0
+    assert errors == b""
+
+
+def test_an_interrupt_ends_a_query_with_code_130(small_database: Path) -> None:
+    process = subprocess.Popen(
+        command("sql", SLOW, "--db", small_database), stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(2)
+    process.send_signal(signal.SIGINT)
+    try:
+        _, errors = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert errors == "error: interrupted\n"
+
+
+def on_terminal(arguments: list[str]) -> bytes:
+    """Return what a program writes to stdout when that is a terminal."""
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        arguments,
+        stdout=follower,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"COLUMNS": "40", "TERM": "xterm-256color"},
+    )
+    os.close(follower)
+    parts = []
+    while True:
+        try:
+            part = os.read(leader, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        parts.append(part)
+    os.close(leader)
+    assert process.wait(timeout=30) == 0
+    return b"".join(parts).replace(b"\r\n", b"\n")
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
+def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: str) -> None:
+    arguments = command("query", "info-runs", "--db", small_database, "--format", form)
+    piped = subprocess.run(arguments, capture_output=True, check=True).stdout
+    assert piped
+    assert on_terminal(arguments) == piped
+
+
+def test_parquet_is_not_written_to_a_terminal(small_database: Path) -> None:
+    arguments = command("query", "info-runs", "--db", small_database, "--format", "parquet")
+    leader, follower = pty.openpty()
+    done = subprocess.run(arguments, stdout=follower, stderr=subprocess.PIPE, check=False)
+    os.close(follower)
+    os.close(leader)
+    assert done.returncode == 2
+    assert b"-o FILE.parquet" in done.stderr

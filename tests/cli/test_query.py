@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import Result
+
+from msgflow.cli.query_command import COMMON_OPTIONS
+from msgflow.query.catalogue import load_queries, query_names
+from msgflow.query.run import RESERVED
+
+Msgflow = Callable[..., Result]
+
+
+def test_the_list_names_every_query(msgflow: Msgflow) -> None:
+    for arguments in (("query",), ("query", "--list")):
+        result = msgflow(*arguments)
+        assert result.exit_code == 0
+        for header in load_queries():
+            assert header.name in result.stdout
+            assert header.title in result.stdout
+
+
+@pytest.mark.parametrize("name", query_names())
+def test_help_tells_what_a_query_means_and_takes(msgflow: Msgflow, name: str) -> None:
+    result = msgflow("query", name, "--help")
+    assert result.exit_code == 0
+    header = next(header for header in load_queries() if header.name == name)
+    words = "".join(result.stdout.replace("│", "").split())
+    assert "".join(header.description.split())[:60] in words
+    for param in header.params:
+        assert f"--{param.name.replace('_', '-')}" in words
+    for column in header.columns:
+        assert column.name in words
+
+
+def test_names_of_the_command_line_are_not_taken_by_queries() -> None:
+    for header in load_queries():
+        names = {param.name for param in header.params}
+        assert not names & (COMMON_OPTIONS | set(RESERVED))
+
+
+def test_show_prints_the_file_and_opens_nothing(msgflow: Msgflow) -> None:
+    result = msgflow("query", "info-topics", "--show")
+    assert result.exit_code == 0
+    assert result.stdout == next(
+        header.path.read_text() for header in load_queries() if header.name == "info-topics"
+    )
+
+
+def test_rows_go_to_stdout_and_words_to_stderr(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow("query", "info-topics", "--db", small_database)
+    assert result.exit_code == 0
+    assert "/chatter" in result.stdout
+    assert "/rosout" not in result.stdout
+    assert result.stderr.splitlines() == [
+        "run: noon (2)",
+        "note: 1 internal row is hidden; --internal shows them",
+    ]
+
+
+def test_options_select(msgflow: Msgflow, small_database: Path) -> None:
+    def rows(*options: str) -> list[dict[str, object]]:
+        arguments = ("query", "info-topics", "--db", small_database, "--format", "json")
+        return json.loads(msgflow(*arguments, *options).stdout)
+
+    assert [row["run_id"] for row in rows()] == [2]
+    assert [row["run_id"] for row in rows("--run", "morning")] == [1]
+    assert [row["run_id"] for row in rows("--run", "all")] == [1, 2]
+    assert [row["topic_name"] for row in rows("--internal")] == ["/chatter", "/rosout"]
+
+
+def test_the_database_comes_from_the_environment_or_lies_here(
+    msgflow: Msgflow, small_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert msgflow("query", "info-runs").exit_code == 4
+    Path("msgflow.duckdb").symlink_to(small_database)
+    assert msgflow("query", "info-runs").exit_code == 0
+    Path("msgflow.duckdb").unlink()
+    monkeypatch.setenv("MSGFLOW_DB", str(small_database))
+    assert msgflow("query", "info-runs").exit_code == 0
+    assert msgflow("query", "info-runs", "--db", "none.duckdb").exit_code == 4
+
+
+def test_a_file_is_written_in_the_format_of_its_suffix(
+    msgflow: Msgflow, small_database: Path
+) -> None:
+    result = msgflow("query", "info-runs", "--db", small_database, "-o", "runs.parquet")
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    assert "1 row written to runs.parquet" in result.stderr
+    assert pq.read_table("runs.parquet")["name"].to_pylist() == ["noon"]
+    msgflow("query", "info-runs", "--db", small_database, "-o", "runs.x", "--format", "csv")
+    assert Path("runs.x").read_text().startswith('"run_id","name"')
+
+
+def test_durations_and_times_are_for_people_in_tables_only(
+    msgflow: Msgflow, small_database: Path
+) -> None:
+    arguments = ("query", "info-runs", "--db", small_database, "--format")
+    table = msgflow(*arguments, "table").stdout
+    assert "2.500 s" in table
+    assert "2023-11-14T22:13:30.000000000Z" in table
+    assert "duration_ns" not in table
+    row = json.loads(msgflow(*arguments, "jsonl").stdout)
+    assert row["duration_ns"] == 2_500_000_000
+    assert row["start_ns"] == 1_700_000_010_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "error", "hint"),
+    [
+        (("info-topic",), 2, "there is no such query — info-topic", "msgflow query info-topics"),
+        (("info-runs", "--limit", "3"), 2, "no such option: --limit", "info-runs --help"),
+        (("info-runs", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
+        (("info-runs", "--start", "1s"), 2, "no time window — info-runs", "leave out --start"),
+        (("info-runs", "--format", "xml"), 2, "'xml' is not one of", "info-runs --help"),
+        (("--list", "info-runs"), 2, "--list takes no name of a query", "info-runs --help"),
+        (("info-runs", "-o", "no/dir/x.csv"), 2, "no such file or directory", ""),
+    ],
+)
+def test_mistakes_have_a_message_and_a_code(
+    msgflow: Msgflow,
+    small_database: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    code: int,
+    error: str,
+    hint: str,
+) -> None:
+    monkeypatch.setenv("MSGFLOW_DB", str(small_database))
+    result = msgflow("query", *arguments)
+    assert result.exit_code == code
+    assert result.stdout == ""
+    message, _, rest = result.stderr.removeprefix("run: noon (2)\n").partition("\n\nhint: ")
+    assert message.startswith("error: ")
+    assert error in message
+    assert hint in rest

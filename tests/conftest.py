@@ -1,0 +1,50 @@
+"""What all tests share: an empty database, a place for traces, the golden cases."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from msgflow.db.migrate import create
+
+pytest_plugins = ["golden"]
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database without a run; read it only."""
+    path = tmp_path_factory.mktemp("empty") / "empty.duckdb"
+    create(path)
+    return path
+
+
+@pytest.fixture
+def fresh_database(empty_database: Path, tmp_path: Path) -> Path:
+    """A database without a run, to write to."""
+    path = tmp_path / "msgflow.duckdb"
+    shutil.copyfile(empty_database, path)
+    return path
+
+
+@pytest.fixture
+def small_database(fresh_database: Path) -> Path:
+    """A database with two runs, a node, two topics of which one is internal, and a finding."""
+    from golden import fill
+
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill(connection, ROOT / "tests" / "support" / "small_database")
+    return fresh_database
+
+
+@pytest.fixture(scope="session")
+def shared_traces() -> Path:
+    """Recorded traces, which lie beside the checkout where they are at hand."""
+    path = ROOT.parent / "shared" / "traces"
+    if not path.is_dir():
+        pytest.skip("the recorded traces (../shared/traces) are not here")
+    return path

@@ -1,0 +1,138 @@
+"""The catalogue is sound in itself, in DuckDB, and against recorded traces."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pyarrow as pa
+import pytest
+
+import msgflow.trace
+from msgflow.errors import TraceError
+from msgflow.ingest import catalogue
+from msgflow.trace import COMMON_SCHEMA, bt2_library
+
+TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]"}
+TRACEPOINT_KEYS = {"name", "description", "fields", "since", "until", "where"}
+FIELD_KEYS = {"name", "type", "aliases", "since", "until", "where"}
+VERSION = re.compile(r"\d+\.\d+\.\d+")
+PROVIDERS = {"ros2", "dds", "ros2_caret", "agnocast"}
+
+
+@pytest.fixture(scope="module")
+def entries() -> list[dict[str, Any]]:
+    """The file as it is."""
+    path = Path(catalogue.__file__).with_name("tracepoints.toml")
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert set(content) == {"tracepoint"}
+    return list(content["tracepoint"])
+
+
+def test_entries_are_well_formed(entries: list[dict[str, Any]]) -> None:
+    for entry in entries:
+        name = entry["name"]
+        assert {"name", "description", "fields"} <= set(entry) <= TRACEPOINT_KEYS, name
+        assert re.fullmatch(r"[a-z0-9_]+:[a-z0-9_]+", name), name
+        assert name.partition(":")[0] in PROVIDERS, name
+        assert re.fullmatch(r"[A-Z][^\n]*[^.\s]", entry["description"]), name
+        assert name.startswith("ros2:") >= ("since" in entry), name
+        check_versions(entry, name)
+
+
+def test_fields_are_well_formed(entries: list[dict[str, Any]]) -> None:
+    common = {name for name, _ in catalogue.COMMON_COLUMNS}
+    for entry in entries:
+        for field in entry["fields"]:
+            where = f"{entry['name']}.{field.get('name')}"
+            assert {"name", "type"} <= set(field) <= FIELD_KEYS, where
+            assert re.fullmatch(r"[a-z_][a-z0-9_]*", field["name"]), where
+            assert field["type"] in TYPES, where
+            assert field["name"] not in common, where
+            check_versions(field, where)
+
+
+def check_versions(entry: dict[str, Any], where: str) -> None:
+    for key in ("since", "until"):
+        assert VERSION.fullmatch(entry.get(key, "0.0.0")), where
+    numbers = [tuple(map(int, entry[key].split("."))) for key in ("since", "until") if key in entry]
+    assert numbers == sorted(numbers), where
+
+
+def test_names_are_unique(entries: list[dict[str, Any]]) -> None:
+    names = [entry["name"] for entry in entries]
+    assert len(set(names)) == len(names)
+    tables = [tracepoint.table for tracepoint in catalogue.load().tracepoints.values()]
+    assert len(set(tables)) == len(tables)
+    for entry in entries:
+        names = [
+            name for field in entry["fields"] for name in (field["name"], *field.get("aliases", ()))
+        ]
+        assert len(set(names)) == len(names), entry["name"]
+
+
+def test_pointers_are_unsigned_and_times_signed() -> None:
+    for tracepoint in catalogue.load().tracepoints.values():
+        for field in tracepoint.fields:
+            if field.name.endswith(("_handle", "_addr")):
+                assert field.type == "UBIGINT", (tracepoint.name, field.name)
+            if field.name.endswith(("stamp", "_length", "depth", "period", "timeout")):
+                assert field.type == "BIGINT", (tracepoint.name, field.name)
+
+
+def test_parts_of_a_name() -> None:
+    tracepoint = catalogue.load().tracepoints["ros2_caret:dds_write"]
+    assert (tracepoint.provider, tracepoint.event) == ("ros2_caret", "dds_write")
+    assert tracepoint.table == "ros2_caret_dds_write"
+    assert [field.name for field in tracepoint.fields] == ["message"]
+
+
+def test_common_columns_are_those_of_the_reader() -> None:
+    names = {pa.int64(): "BIGINT", pa.int32(): "INTEGER"}
+    names[pa.dictionary(pa.int32(), pa.string())] = "VARCHAR"
+    assert (
+        tuple((field.name, names[field.type]) for field in COMMON_SCHEMA)
+        == catalogue.COMMON_COLUMNS
+    )
+
+
+def test_tables_take_the_readers_batches() -> None:
+    con = duckdb.connect()
+    con.execute("ATTACH ':memory:' AS staging")
+    for tracepoint in catalogue.load().tracepoints.values():
+        con.execute(tracepoint.create_table_sql("staging"))
+        schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
+        batch = pa.Table.from_batches([], schema)
+        con.register("batch", batch)
+        con.execute(f'INSERT INTO staging."{tracepoint.table}" SELECT * FROM batch')
+        table = con.execute(f'DESCRIBE staging."{tracepoint.table}"').fetchall()
+        given = con.execute("DESCRIBE SELECT * FROM batch").fetchall()
+        assert [row[0] for row in table] == schema.names
+        types = dict(zip(schema.names, (row[1] for row in given), strict=True))
+        assert {row[0]: row[1] for row in table} == types | {"procname": "VARCHAR"}
+
+
+def test_the_alias_of_8_0_0() -> None:
+    schema = catalogue.load().arrow_schemas()["ros2:rmw_publish"]
+    assert schema.field("rmw_publisher_handle").metadata == {b"aliases": b"publisher_handle"}
+    assert schema.field("message").metadata is None
+
+
+def test_every_recorded_event_is_listed_whole(shared_traces: Path) -> None:
+    """Every event and every field that the recorded traces declare."""
+    try:
+        bt2_library.load()
+    except TraceError as error:
+        pytest.skip(error.message)
+    known = catalogue.load().tracepoints
+    with msgflow.trace.open([shared_traces]) as traces:
+        assert {name for info in traces.traces for name in info.event_names} <= set(known)
+        for batch in traces.batches():
+            if batch.name != msgflow.trace.PACKET:
+                declared = batch.batch.schema.names[len(COMMON_SCHEMA) :]
+                fields = known[batch.name].fields
+                names = {name for field in fields for name in (field.name, *field.aliases)}
+                assert set(declared) <= names, batch.name

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import msgflow
+from msgflow import DatabaseError, QueryError, UsageError
+
+
+def test_the_public_names_are_there() -> None:
+    for name in msgflow.__all__:
+        assert getattr(msgflow, name) is not None
+    assert dir(msgflow) == sorted(msgflow.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = msgflow.nothing
+
+
+def test_asking_a_database(small_database: Path) -> None:
+    with msgflow.open_db(small_database) as database:
+        assert [run.name for run in database.runs()] == ["morning", "noon"]
+        topics = database.query("info-topics")
+        assert topics.to_arrow()["topic_name"].to_pylist() == ["/chatter"]
+        assert [run.name for run in topics.runs] == ["noon"]
+        both = database.query("info-topics", run="all", internal=True)
+        assert len(both) == 3
+        assert "info-topics" in [header.name for header in database.list_queries()]
+
+
+def test_sql_is_read_only_and_shut_in(small_database: Path, tmp_path: Path) -> None:
+    target = tmp_path / "out.csv"
+    refused = (
+        "DROP TABLE store.run",
+        "UPDATE store.run SET name = 'x'",
+        f"COPY (SELECT 1) TO '{target}'",
+        f"SELECT * FROM read_text('{__file__}')",
+        f"ATTACH '{tmp_path / 'other.duckdb'}' AS other",
+        "SET enable_external_access = true",
+        "SET threads = 1",
+        "INSTALL httpfs",
+    )
+    with msgflow.open_db(small_database) as database:
+        for statement in refused:
+            with pytest.raises(QueryError):
+                database.sql(statement)
+        assert [run.name for run in database.runs()] == ["morning", "noon"]
+    assert not target.exists()
+
+
+def test_sql_returns_the_last_result_and_says_what_it_cut(small_database: Path) -> None:
+    with msgflow.open_db(small_database) as database:
+        assert database.sql("SELECT 1 AS a; SELECT 2 AS b").to_arrow().to_pylist() == [{"b": 2}]
+        assert database.sql("FROM range(10)", limit=10).notes == []
+        cut = database.sql("FROM range(10)", limit=9)
+        assert len(cut) == 9
+        assert cut.notes == ["only the first 9 rows are shown; --limit raises that"]
+        assert len(database.sql("FROM range(20000)", limit=None)) == 20_000
+        assert len(database.sql("FROM range(20000)")) == 10_000
+
+
+def test_sql_errors_keep_what_helps(small_database: Path) -> None:
+    with msgflow.open_db(small_database) as database:
+        with pytest.raises(QueryError) as raised:
+            database.sql("SELECT * FROM publishr")
+        assert raised.value.message == "Table with name publishr does not exist"
+        assert "publisher" in str(raised.value.hint)
+        with pytest.raises(QueryError, match="LINE 1: selec 1"):
+            database.sql("selec 1")
+        with pytest.raises(QueryError, match="Could not convert"):
+            database.sql("SELECT CAST(full_name AS BIGINT) FROM node")
+        with pytest.raises(UsageError, match="no SQL to run"):
+            database.sql(" ; ")
+
+
+def test_a_query_can_use_more_than_memory(small_database: Path) -> None:
+    with msgflow.open_db(small_database, memory_limit="60MB") as database:
+        rows = database.sql(
+            "SELECT count(*) AS n FROM (SELECT hash(range) AS h FROM range(4000000) ORDER BY h)"
+        )
+    assert rows.to_arrow().to_pylist() == [{"n": 4_000_000}]
+
+
+def test_the_schema_is_described(small_database: Path) -> None:
+    with msgflow.open_db(small_database) as database:
+        rows = database.schema().to_arrow().to_pylist()
+    by_column = {(row["view"], row["column"]): row for row in rows}
+    assert by_column["node", "node_id"]["type"] == "BIGINT"
+    assert all(row["description"] for row in rows)
+
+
+def test_closing_lets_go_of_the_file(small_database: Path) -> None:
+    database = msgflow.open_db(small_database)
+    assert len(database.runs()) == 2
+    database.close()
+    database.close()
+    assert len(database.runs()) == 2
+    database.close()
+
+
+def test_a_missing_database_is_named_when_it_is_asked(tmp_path: Path) -> None:
+    database = msgflow.open_db(tmp_path / "none.duckdb")
+    with pytest.raises(DatabaseError, match=r"none\.duckdb"):
+        database.runs()
+    assert list(tmp_path.iterdir()) == []

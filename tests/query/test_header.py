@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from msgflow.query.header import Column, Header, HeaderError, Param, parse
+
+PATH = Path("queries/example.sql")
+
+FULL = """\
+-- name: example
+-- title: An example
+-- description: What it means,
+--     on two lines.
+-- grain: one row per path
+-- param: from VARCHAR = NULL     Topic where flows start
+-- param: case VARCHAR {every_pair|first} = 'first'  Which rows
+-- param: limit BIGINT = 10  Most rows
+-- param: share DOUBLE = 0.5
+--     Part of
+--     the whole
+-- param: kinds VARCHAR[] = ['a', 'b']  Kinds
+-- param: label VARCHAR = 'it''s  two'  Text
+-- param: needed BIGINT  Has to be given
+-- column: median_ns BIGINT [ns]  Half took no longer
+-- column: hidden BOOLEAN Whether
+-- column: size DECIMAL(18,3)  Size
+-- column: start_ns BIGINT [epoch ns]
+--     When
+-- needs: main.a,
+--     main.b
+-- severity: warning
+SELECT 1
+-- a comment of the body
+"""
+
+
+def parse_with(line: str) -> Header:
+    return parse(f"-- name: example\n-- description: x\n{line}\nSELECT 1\n", PATH)
+
+
+def test_everything_is_parsed() -> None:
+    header = parse(FULL, PATH)
+    assert header.name == "example"
+    assert header.title == "An example"
+    assert header.description == "What it means, on two lines."
+    assert header.grain == "one row per path"
+    assert header.kind == "view"
+    assert header.params == (
+        Param("from", "VARCHAR", None, True, "Topic where flows start"),
+        Param("case", "VARCHAR", "first", True, "Which rows", ("every_pair", "first")),
+        Param("limit", "BIGINT", 10, True, "Most rows"),
+        Param("share", "DOUBLE", 0.5, True, "Part of the whole"),
+        Param("kinds", "VARCHAR[]", ["a", "b"], True, "Kinds"),
+        Param("label", "VARCHAR", "it's  two", True, "Text"),
+        Param("needed", "BIGINT", None, False, "Has to be given"),
+    )
+    assert header.columns == (
+        Column("median_ns", "BIGINT", "ns", "Half took no longer"),
+        Column("hidden", "BOOLEAN", None, "Whether"),
+        Column("size", "DECIMAL(18,3)", None, "Size"),
+        Column("start_ns", "BIGINT", "epoch ns", "When"),
+    )
+    assert header.needs == ("main.a", "main.b")
+    assert header.severity == "warning"
+    assert header.body == "SELECT 1\n-- a comment of the body\n"
+
+
+def test_the_title_defaults_to_the_name() -> None:
+    assert parse("-- name: example\n-- description: x\nSELECT 1\n", PATH).title == "example"
+
+
+def test_a_macro_keeps_its_whole_statement() -> None:
+    header = parse("-- name: m\n-- kind: macro\n-- description: x\nCREATE MACRO m() AS 1\n", PATH)
+    assert header.kind == "macro"
+    assert header.body == "CREATE MACRO m() AS 1\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("-- colour: red", "example.sql:3: unknown field 'colour'"),
+        ("-- name: again", "example.sql:3: 'name' stands twice"),
+        ("--param: a BIGINT  x", "example.sql:3: expected '-- field: value'"),
+        ("-- kind: table", "kind 'table' is not one of view, macro"),
+        ("-- param: a", "example.sql:3: expected '-- param: name TYPE"),
+        ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
+        ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
+        ("-- param: a VARCHAR {b|c} = 'd'  x", "the default 'd' is not among the choices"),
+        ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
+        ("-- column: a", "example.sql:3: expected '-- column: name TYPE [unit]"),
+        ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
+    ],
+)
+def test_a_bad_line_is_named(line: str, message: str) -> None:
+    with pytest.raises(HeaderError) as raised:
+        parse_with(line)
+    assert message in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("SELECT 1\n", "there is no header"),
+        ("", "there is no header"),
+        ("--     first\nSELECT 1\n", "starts with a continuation"),
+        ("-- description: x\nSELECT 1\n", "the header has no 'name'"),
+        ("-- name: x\nSELECT 1\n", "the header has no 'description'"),
+        ("-- name: x\n-- description: x\n\n", "there is no SQL below the header"),
+    ],
+)
+def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
+    with pytest.raises(HeaderError) as raised:
+        parse(text, PATH)
+    assert message in str(raised.value)

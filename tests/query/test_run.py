@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from msgflow.errors import QueryError, UsageError
+from msgflow.query.header import Header, parse
+from msgflow.query.run import bind, run_query
+from msgflow.query.value import Value
+
+PARAMS = """\
+-- name: example
+-- description: x
+-- param: from VARCHAR = NULL  Text
+-- param: case VARCHAR {first|last} = 'first'  Choice
+-- param: depth BIGINT  Has to be given
+SELECT 1
+"""
+QUERY = """\
+-- name: example
+-- description: x
+-- param: topic VARCHAR = NULL  Only this topic
+SELECT topic, start_ns, is_internal
+FROM message
+WHERE list_contains($runs, run_id)
+    AND start_ns BETWEEN $start_ns AND $end_ns
+    AND ($topic IS NULL OR topic = $topic)
+ORDER BY start_ns
+"""
+
+
+@pytest.fixture
+def connection() -> duckdb.DuckDBPyConnection:
+    con = duckdb.connect()
+    con.execute("CREATE TABLE run AS SELECT 1 AS run_id, 'first' AS name, 100::BIGINT AS start_ns")
+    con.execute("INSERT INTO run VALUES (2, 'second', 1000000000)")
+    con.execute(
+        "CREATE TABLE message AS SELECT * FROM (VALUES "
+        "(1, '/a', 100::BIGINT, false), (1, '/b', 200, false), (1, '/rosout', 300, true), "
+        "(1, '/c', 400, NULL), (2, '/a', 1000000000, false), (2, '/a', 2500000000, false)"
+        ") AS t (run_id, topic, start_ns, is_internal)"
+    )
+    return con
+
+
+def header(text: str) -> Header:
+    return parse(text, Path("example.sql"))
+
+
+def starts(con: duckdb.DuckDBPyConnection, **options: object) -> list[int]:
+    parameters = options.pop("parameters", {})
+    result = run_query(con, header(QUERY), parameters, **options)  # type: ignore[arg-type]
+    return result.to_arrow()["start_ns"].to_pylist()
+
+
+def test_the_latest_run_is_the_default(connection: duckdb.DuckDBPyConnection) -> None:
+    assert starts(connection) == [1_000_000_000, 2_500_000_000]
+    result = run_query(connection, header(QUERY), {})
+    assert [run.name for run in result.runs] == ["second"]
+
+
+def test_runs_window_and_parameters_select(connection: duckdb.DuckDBPyConnection) -> None:
+    assert starts(connection, run="first") == [100, 200, 400]
+    assert starts(connection, run="all") == [100, 200, 400, 1_000_000_000, 2_500_000_000]
+    assert starts(connection, run="first", start=150, end="300ns") == [200, 400]
+    assert starts(connection, skip_first=1.0) == [2_500_000_000]
+    assert starts(connection, run="first", parameters={"topic": "/b"}) == [200]
+
+
+def test_internal_rows_are_hidden_and_counted(connection: duckdb.DuckDBPyConnection) -> None:
+    hidden = run_query(connection, header(QUERY), {}, run="first")
+    assert hidden.columns == ("topic", "start_ns")
+    assert hidden.notes == ["1 internal row is hidden; --internal shows them"]
+    shown = run_query(connection, header(QUERY), {}, run="first", internal=True)
+    assert shown.to_arrow()["is_internal"].to_pylist() == [False, False, True, None]
+    assert shown.notes == []
+
+
+def test_a_database_without_runs_gives_nothing_and_says_so(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    connection.execute("DELETE FROM run")
+    result = run_query(connection, header(QUERY), {})
+    assert len(result) == 0
+    assert result.notes == ["the database holds no run yet"]
+
+
+def test_a_query_without_a_window_refuses_one(connection: duckdb.DuckDBPyConnection) -> None:
+    plain = header("-- name: example\n-- description: x\nSELECT 1 AS one\n")
+    with pytest.raises(UsageError, match="no time window — example"):
+        run_query(connection, plain, {}, skip_first=0.0)
+    assert run_query(connection, plain, {}).to_arrow().to_pylist() == [{"one": 1}]
+
+
+def test_a_query_that_fails_is_named(connection: duckdb.DuckDBPyConnection) -> None:
+    failing = header("-- name: example\n-- description: x\nSELECT error('too bad')\n")
+    with pytest.raises(QueryError, match=r"the query failed: .*too bad.* — example"):
+        run_query(connection, failing, {})
+
+
+@pytest.mark.parametrize(
+    ("given", "bound"),
+    [
+        ({"depth": "3"}, {"from": None, "case": "first", "depth": 3}),
+        ({"depth": 3, "from": "/a"}, {"from": "/a", "case": "first", "depth": 3}),
+        ({"depth": 3, "from_": "/a"}, {"from": "/a", "case": "first", "depth": 3}),
+        ({"depth": None, "case": "last"}, {"from": None, "case": "last", "depth": None}),
+    ],
+)
+def test_binding(given: dict[str, Value], bound: dict[str, Value]) -> None:
+    assert bind(header(PARAMS), given) == bound
+
+
+@pytest.mark.parametrize(
+    ("given", "message", "hint"),
+    [
+        ({}, "example needs a value for a parameter — depth", "--depth BIGINT"),
+        ({"deep": 1}, "has no such parameter — deep", "its parameters are from, case, depth"),
+        ({"depth": "deep"}, "depth takes a BIGINT — deep", ""),
+        ({"depth": 1, "case": "middle"}, "case has no such value — middle", "first or last"),
+    ],
+)
+def test_parameters_that_do_not_fit(given: dict[str, Value], message: str, hint: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        bind(header(PARAMS), given)
+    assert message in raised.value.message
+    assert hint in (raised.value.hint or "")

@@ -1,0 +1,178 @@
+"""Every header tells the truth: checked against its place, its SQL, and the database."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import duckdb
+import pytest
+from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
+
+from msgflow.cli.query_command import COMMON_OPTIONS
+from msgflow.query.run import INTERNAL_COLUMN, RESERVED
+
+FILES = sql_files()
+QUERIES = [file for file in FILES if file.layer == "queries"]
+VIEWS = [
+    file
+    for file in FILES
+    if file.layer in {"link", "flow", "stat", "public"} and file.header.kind == "view"
+]
+MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
+LAYER_OF = {file.header.name: file.layer for file in FILES}
+
+
+@pytest.fixture(scope="module")
+def connection(empty_database: Path) -> Iterator[duckdb.DuckDBPyConnection]:
+    with duckdb.connect(str(empty_database), read_only=True) as con:
+        yield con
+
+
+def is_defined_in_sql(name: str) -> bool:
+    """Tell staged events, whose tables ingest makes, from everything else."""
+    return name in LAYER_OF or name.startswith(("store.", "derive.", "main."))
+
+
+def described(relation: duckdb.DuckDBPyRelation) -> list[tuple[str, str]]:
+    return [(name, str(kind)) for name, kind in zip(relation.columns, relation.types, strict=True)]
+
+
+def declared(file: SqlFile) -> list[tuple[str, str]]:
+    return [(column.name, column.type) for column in file.header.columns]
+
+
+def test_every_sql_file_lies_in_a_known_folder() -> None:
+    assert {layer for layer, _ in sql_paths()} <= set(LAYERS)
+    assert FILES
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_the_name_is_the_place(file: SqlFile) -> None:
+    assert file.header.name == file.expected_name
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
+    needs = [name for name in file.header.needs if is_defined_in_sql(name)]
+    assert sorted(needs) == sorted(filter(is_defined_in_sql, file.references))
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
+    position = LAYERS.index(file.layer)
+    for name in file.references:
+        layer = "store" if name.startswith("store.") else LAYER_OF.get(name, "model")
+        assert LAYERS.index(layer) <= position, f"{file} reads {name}"
+    if file.layer == "queries":
+        assert {name.partition(".")[0] for name in file.references} == {"main"}
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_tables_of_the_store_exist(file: SqlFile, connection: duckdb.DuckDBPyConnection) -> None:
+    tables = connection.execute(
+        "SELECT 'store.' || table_name FROM duckdb_tables() WHERE schema_name = 'store'"
+    ).fetchall()
+    used = {name for name in file.references if name.startswith("store.")}
+    assert used <= {name for (name,) in tables}
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_units_agree_with_names(file: SqlFile) -> None:
+    for column in file.header.columns:
+        is_time = column.unit in {"ns", "epoch ns"}
+        assert is_time == column.name.endswith("_ns"), f"{column.name} [{column.unit}]"
+        if is_time:
+            assert column.type == "BIGINT", f"{column.name} {column.type}"
+
+
+@pytest.mark.parametrize("file", QUERIES, ids=str)
+def test_parameters_of_a_query_are_those_of_its_sql(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    (statement,) = connection.extract_statements(file.header.body)
+    names = {param.name for param in file.header.params}
+    assert names == statement.named_parameters - set(RESERVED)
+    assert "runs" in statement.named_parameters
+    assert not names & (COMMON_OPTIONS | set(RESERVED))
+    assert ("start_ns" in statement.named_parameters) == ("end_ns" in statement.named_parameters)
+
+
+@pytest.mark.parametrize("file", QUERIES, ids=str)
+def test_columns_of_a_query_are_those_of_its_output(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    (statement,) = connection.extract_statements(file.header.body)
+    # The values do not matter, but for choices, which a query may refuse.
+    values = {
+        param.name: param.default if param.has_default else None for param in file.header.params
+    }
+    values |= {"runs": [1], "start_ns": 0, "end_ns": 1}
+    bound = {name: values[name] for name in statement.named_parameters}
+    assert described(connection.sql(file.header.body, params=bound)) == declared(file)
+
+
+@pytest.mark.parametrize("file", QUERIES, ids=str)
+def test_a_query_is_ordered_and_hides_only_truth_values(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    row = connection.execute("SELECT json_serialize_sql(?)", [file.header.body]).fetchone()
+    assert row is not None
+    (statement,) = json.loads(row[0])["statements"]
+    modifiers = [modifier["type"] for modifier in statement["node"]["modifiers"]]
+    assert "ORDER_MODIFIER" in modifiers
+    types = dict(declared(file))
+    assert types.get(INTERNAL_COLUMN, "BOOLEAN") == "BOOLEAN"
+
+
+@pytest.mark.parametrize("file", QUERIES, ids=str)
+def test_a_query_has_a_title_and_a_grain(file: SqlFile) -> None:
+    assert file.header.title != file.header.name
+    assert file.header.grain.startswith("one row per ")
+
+
+@pytest.mark.parametrize("file", VIEWS, ids=str)
+def test_columns_of_a_view_are_those_of_its_output(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    output = described(connection.sql(f"FROM {file.header.name}"))
+    if file.layer == "public" or file.header.columns:
+        assert output == declared(file)
+
+
+@pytest.mark.parametrize("file", MACROS, ids=str)
+def test_parameters_and_columns_of_a_public_macro_are_declared(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    rows = connection.execute(
+        "SELECT parameters, function_type FROM duckdb_functions() "
+        "WHERE schema_name || '.' || function_name = ?",
+        [file.header.name],
+    ).fetchall()
+    assert rows
+    for parameters, _ in rows:
+        assert [param.name for param in file.header.params] == parameters
+    if rows[0][1] == "table_macro":
+        arguments = ", ".join(
+            f"{param.name} := CAST(NULL AS {param.type})"
+            for param in file.header.params
+            if not param.has_default
+        )
+        output = described(connection.sql(f"FROM {file.header.name}({arguments})"))
+        assert output == declared(file)
+
+
+@pytest.mark.parametrize("file", [*VIEWS, *MACROS], ids=str)
+def test_the_database_has_the_object_in_its_schema(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    row = connection.execute(
+        "SELECT (SELECT count(*) FROM duckdb_views() WHERE schema_name || '.' || view_name = $name)"
+        " + (SELECT count(*) FROM duckdb_functions()"
+        "    WHERE schema_name || '.' || function_name = $name)",
+        {"name": file.header.name},
+    ).fetchone()
+    assert row is not None
+    assert row[0] > 0
+    assert file.header.name.startswith(f"{SCHEMAS[file.layer]}.")

@@ -1,0 +1,41 @@
+"""How SQL is written here: line length, indentation, explicit columns in what users see."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from sql_files import SqlFile, sql_files
+
+FILES = sql_files()
+KEYWORDS = re.compile(
+    r"(?<![\w$.'\"])(select|from|where|join|left join|group by|order by|having|union all|with|case"
+    r"|when|then|else|end|over|partition by|limit|on|and|or|not|in|is null|as)(?![\w.'\"])"
+)
+SHOWN = [file for file in FILES if file.layer in {"public", "queries"}]
+
+
+def code_lines(file: SqlFile) -> list[str]:
+    """Lines of the body without comments and text in quotes."""
+    text = re.sub(r"'(?:[^']|'')*'", "''", re.sub(r"--[^\n]*", "", file.header.body))
+    return text.splitlines()
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_lines_are_short_and_indented_by_spaces(file: SqlFile) -> None:
+    for line in file.path.read_text().splitlines():
+        assert len(line) <= 100, line
+        assert "\t" not in line, line
+        assert line == line.rstrip(), line
+
+
+@pytest.mark.parametrize("file", FILES, ids=str)
+def test_keywords_are_upper_case(file: SqlFile) -> None:
+    for line in code_lines(file):
+        assert not KEYWORDS.search(line), line
+
+
+@pytest.mark.parametrize("file", SHOWN, ids=str)
+def test_columns_are_listed(file: SqlFile) -> None:
+    last = "\n".join(code_lines(file)).rpartition("SELECT")[2]
+    assert not re.match(r"\s*(DISTINCT\s+)?\*", last)

@@ -1,0 +1,60 @@
+"""The SQL files of the project, where they belong, and what they refer to."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from msgflow.query.header import Header, read
+from msgflow.resources import resource_directory
+
+# From left to right: an object reads only its own layer and those to its left.
+LAYERS = ("model", "store", "link", "flow", "stat", "public", "check", "queries")
+# The schema in the database of what lies in a folder below schema/.
+SCHEMAS = {
+    "model": "staging",
+    "link": "derive",
+    "flow": "derive",
+    "stat": "derive",
+    "public": "main",
+    "check": "check",
+}
+_REFERENCE = re.compile(r"\b(?:staging|store|derive|main)\.[a-z_0-9]+\b")
+_COMMENT = re.compile(r"--[^\n]*")
+
+
+@dataclass(frozen=True)
+class SqlFile:
+    """A file with an SQL object: its layer and its header."""
+
+    layer: str
+    path: Path
+    header: Header
+
+    def __str__(self) -> str:
+        return f"{self.layer}/{self.path.stem}"
+
+    @property
+    def expected_name(self) -> str:
+        """The name that the header has to give."""
+        schema = SCHEMAS.get(self.layer)
+        return self.path.stem if schema is None else f"{schema}.{self.path.stem}"
+
+    @property
+    def references(self) -> set[str]:
+        """Every object that the body names, with its schema, but for itself."""
+        return set(_REFERENCE.findall(_COMMENT.sub("", self.header.body))) - {self.header.name}
+
+
+def sql_paths() -> list[tuple[str, Path]]:
+    """Return (layer, path) of every SQL file with a header."""
+    schema = resource_directory("schema")
+    folders = [(folder.name, folder) for folder in sorted(schema.iterdir()) if folder.is_dir()]
+    folders.append(("queries", resource_directory("queries")))
+    return [(layer, path) for layer, folder in folders for path in sorted(folder.glob("**/*.sql"))]
+
+
+def sql_files() -> list[SqlFile]:
+    """Return every SQL file, parsed."""
+    return [SqlFile(layer, path, read(path)) for layer, path in sql_paths()]

@@ -1,0 +1,56 @@
+"""What the tests of reading share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+
+import msgflow.trace
+from msgflow.errors import TraceError
+from msgflow.trace import EventBatch, TraceSet, bt2_library
+
+Rows = dict[str, list[dict[str, Any]]]
+
+
+@pytest.fixture(scope="session")
+def bt2_bindings() -> bt2_library.Bt2Library:
+    """Babeltrace 2's bindings, where this Python can load them."""
+    try:
+        return bt2_library.load()
+    except TraceError as error:
+        pytest.skip(error.message)
+
+
+@pytest.fixture(scope="session")
+def open_traces(bt2_bindings: bt2_library.Bt2Library) -> Callable[..., TraceSet]:
+    """`msgflow.trace.open` of one or more paths, where there is a reader."""
+
+    def open_paths(*paths: Path) -> TraceSet:
+        return msgflow.trace.open(paths)
+
+    return open_paths
+
+
+@pytest.fixture(scope="session")
+def read_rows(open_traces: Callable[..., TraceSet]) -> Callable[..., Rows]:
+    """Read traces whole, into a list of rows per event name."""
+
+    def read(*paths: Path, **options: Any) -> Rows:
+        with open_traces(*paths) as traces:
+            return rows_of(list(traces.batches(**options)))
+
+    return read
+
+
+def rows_of(batches: list[EventBatch]) -> Rows:
+    """Join the batches of each name."""
+    tables: dict[str, list[pa.RecordBatch]] = {}
+    for batch in batches:
+        tables.setdefault(batch.name, []).append(batch.batch)
+    return {
+        name: [row for part in parts for row in part.to_pylist()] for name, parts in tables.items()
+    }

@@ -1,0 +1,115 @@
+"""Packets that a set of traces holds more than once are read once, from the first trace."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from uuid import uuid4
+
+import pytest
+from ctf_writer import Event, Packet, TraceContent, write_trace
+
+from msgflow.trace import PACKET, TraceSet
+
+Open = Callable[..., TraceSet]
+
+
+def packet(begin: int, **more: int) -> Packet:
+    """Three events, the first of them at the very begin, as LTTng writes it."""
+    times = (begin, begin + 3, begin + 6)
+    return Packet([Event(t, "ros2:x", (t,)) for t in times], end=begin + 10, **more)
+
+
+def write(path: Path, *begins: int, **more: object) -> Path:
+    streams = {
+        0: [packet(begin) for begin in begins],
+        1: [packet(begin, cpu=1) for begin in begins],
+    }
+    return write_trace(path, TraceContent({"ros2:x": {"n": "u64"}}, streams, **more))  # type: ignore[arg-type]
+
+
+def read(traces: TraceSet, **options: int) -> tuple[list[tuple[int, int, int]], list[int]]:
+    """Return the events as (id, trace, n) and the trace index of each packet."""
+    events, packets = [], []
+    for batch in traces.batches(**options):  # type: ignore[arg-type]
+        for row in batch.batch.to_pylist():
+            if batch.name == PACKET:
+                packets.append(row["trace_index"])
+            else:
+                events.append((row["event_id"], row["trace_index"], row["n"]))
+    return events, packets
+
+
+@pytest.mark.parametrize("batch_rows", [1, 1000])
+def test_copied_directory(tmp_path: Path, open_traces: Open, batch_rows: int) -> None:
+    trace = write(tmp_path / "a", 0, 10, 20)
+    with open_traces(trace) as traces:
+        alone = read(traces)
+    shutil.copytree(trace, tmp_path / "b")
+    with open_traces(tmp_path) as traces:
+        assert read(traces, batch_rows=batch_rows) == alone
+        assert traces.duplicate_packet_count == 6
+        assert traces.event_counts == {(0, "ros2:x"): 18}
+
+
+def test_three_copies(tmp_path: Path, open_traces: Open) -> None:
+    for name in "abc":
+        write(tmp_path / name, 0, 10)
+    with open_traces(tmp_path) as traces:
+        events, packets = read(traces)
+        assert traces.duplicate_packet_count == 8
+    assert {trace for _, trace, _ in events} == set(packets) == {0}
+    assert len(events) == 12
+
+
+def test_overlapping_snapshots(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "1", 0, 10, 20)
+    write(tmp_path / "2", 20, 30)
+    write(tmp_path / "3", 10, 30, 40)
+    with open_traces(tmp_path) as traces:
+        events, packets = read(traces)
+        assert traces.duplicate_packet_count == 6
+    assert [event_id for event_id, _, _ in events] == list(range(30))
+    assert sorted(packets) == [0] * 6 + [1] * 2 + [2] * 2
+    assert {n: trace for _, trace, n in events if n % 10 == 0} == {0: 0, 10: 0, 20: 0, 30: 1, 40: 2}
+
+
+def test_empty_packets(tmp_path: Path, open_traces: Open) -> None:
+    for name in "ab":
+        streams = {0: [Packet(begin=5, end=5), packet(5), Packet(begin=15, end=20)]}
+        write_trace(tmp_path / name, TraceContent({"ros2:x": {"n": "u64"}}, streams))
+    with open_traces(tmp_path) as traces:
+        events, packets = read(traces)
+        assert traces.duplicate_packet_count == 3
+    assert len(events) == 3
+    assert packets == [0, 0, 0]
+
+
+def test_losses_of_a_skipped_packet_do_not_count(tmp_path: Path, open_traces: Open) -> None:
+    for name in "ab":
+        streams = {0: [packet(0), packet(10, discarded=5, sequence=3)]}
+        write_trace(tmp_path / name, TraceContent({"ros2:x": {"n": "u64"}}, streams))
+    with open_traces(tmp_path) as traces:
+        rows = [r for b in traces.batches() if b.name == PACKET for r in b.batch.to_pylist()]
+    assert [row["discarded_event_count"] for row in rows] == [0, 5]
+    assert [row["lost_packet_count"] for row in rows] == [0, 2]
+
+
+def test_other_trace_at_the_same_time_is_no_copy(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "a", 0, 10)
+    write(tmp_path / "b", 0, 10, trace_uuid=uuid4())
+    with open_traces(tmp_path) as traces:
+        events, packets = read(traces)
+        assert traces.duplicate_packet_count == 0
+    assert len(events) == 24
+    assert sorted(packets) == [0] * 4 + [1] * 4
+
+
+def test_breaking_off_in_between(tmp_path: Path, open_traces: Open) -> None:
+    for name in "ab":
+        write(tmp_path / name, 0, 10, 20)
+    with open_traces(tmp_path) as traces:
+        for _ in traces.batches(batch_rows=2):
+            break
+        assert len(read(traces)[0]) == 18
