@@ -1,0 +1,75 @@
+-- name: callback-duration
+-- title: Callback durations and periods
+-- description: How long callbacks ran, and how far apart their starts were. Runs that were never
+--     seen to end are counted apart.
+-- grain: one row per callback object that ran
+-- column: run_id BIGINT             Run
+-- column: node VARCHAR              Node of the callback
+-- column: callback VARCHAR          What triggers it
+-- column: count BIGINT              Runs that began in the time window
+-- column: open BIGINT               Runs never seen to end
+-- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
+-- column: period_median_ns BIGINT [ns]  Median time from one start to the next
+-- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
+-- column: min_ns BIGINT [ns]        Shortest duration
+-- column: median_ns BIGINT [ns]     Median duration
+-- column: mean_ns BIGINT [ns]       Mean duration
+-- column: p95_ns BIGINT [ns]        95 % of the durations are at most this
+-- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
+-- column: max_ns BIGINT [ns]        Longest duration
+-- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: symbol VARCHAR            Function registered for the callback
+-- column: callback_id BIGINT        Identity of the callback
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- needs: main.callback_instance, main.callback, main.callback_label
+WITH run AS (
+    SELECT
+        run_id,
+        callback_id,
+        end_ns - start_ns AS duration_ns,
+        start_ns - lag(start_ns) OVER (
+            PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
+        ) AS period_ns
+    FROM main.callback_instance
+    WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
+),
+measured AS (
+    SELECT
+        run_id,
+        callback_id,
+        count(*) AS count,
+        count(*) - count(duration_ns) AS open,
+        min(period_ns) AS period_min_ns,
+        quantile_disc(period_ns, 0.5) AS period_median_ns,
+        max(period_ns) AS period_max_ns,
+        min(duration_ns) AS min_ns,
+        quantile_disc(duration_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(duration_ns))::BIGINT AS mean_ns,
+        max(duration_ns) AS max_ns,
+        sum(duration_ns)::BIGINT AS total_ns
+    FROM run
+    GROUP BY run_id, callback_id
+)
+SELECT
+    m.run_id,
+    l.node,
+    l.label AS callback,
+    m.count,
+    m.open,
+    m.period_min_ns,
+    m.period_median_ns,
+    m.period_max_ns,
+    m.min_ns,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.quantiles[3] AS p99_ns,
+    m.max_ns,
+    m.total_ns,
+    c.symbol,
+    m.callback_id,
+    l.is_internal
+FROM measured AS m
+JOIN main.callback_label AS l ON m.callback_id = l.callback_id
+JOIN main.callback AS c ON m.callback_id = c.callback_id
+ORDER BY m.run_id, l.node, l.label, m.callback_id

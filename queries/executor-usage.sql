@@ -1,0 +1,89 @@
+-- name: executor-usage
+-- title: What executor threads spent their time on
+-- description: Time of each executor thread in the three states that its events tell (waiting for
+--     work, looking for what is ready, executing), and in callbacks. An executor without such
+--     events (events executor, static executor, rclpy) has callback time only. The callback share
+--     is that of the time for which the thread was seen.
+-- grain: one row per executor thread
+-- column: run_id BIGINT             Run
+-- column: host VARCHAR              Host
+-- column: process VARCHAR           Process name
+-- column: pid INTEGER               Process id
+-- column: tid INTEGER               Thread id
+-- column: executor_kind VARCHAR     Kind of executor
+-- column: seen_ns BIGINT [ns]       Time for which the thread was seen in the time window
+-- column: wait_ns BIGINT [ns]       Waiting for work
+-- column: process_ns BIGINT [ns]    Looking for what is ready
+-- column: execute_ns BIGINT [ns]    Executing, with taking messages
+-- column: callback_ns BIGINT [ns]   In callbacks, nested ones not counted twice
+-- column: callbacks BIGINT          Callbacks run
+-- column: callback_share DOUBLE     Callback time by time seen, 0 to 1
+-- column: executor_id BIGINT        Identity of the executor
+-- column: thread_id BIGINT          Identity of the thread
+-- needs: main.executor_thread, main.executor, main.executor_state, main.callback_instance,
+--     main.thread, main.process, main.host
+WITH member AS (
+    SELECT
+        x.run_id, x.executor_id, x.thread_id, e.kind, t.tid, p.pid, p.name, h.hostname,
+        greatest(t.first_seen_ns, $start_ns) AS first_ns,
+        least(t.last_seen_ns, $end_ns) AS last_ns
+    FROM main.executor_thread AS x
+    JOIN main.executor AS e ON x.executor_id = e.executor_id
+    JOIN main.thread AS t ON x.thread_id = t.thread_id
+    JOIN main.process AS p ON t.process_id = p.process_id
+    JOIN main.host AS h ON p.host_id = h.host_id
+    WHERE list_contains($runs, x.run_id)
+),
+in_state AS (
+    SELECT
+        m.thread_id,
+        s.state,
+        greatest(
+            least(coalesce(s.end_ns, m.last_ns), m.last_ns) - greatest(s.start_ns, m.first_ns), 0
+        ) AS duration_ns
+    FROM member AS m
+    JOIN main.executor_state AS s ON m.thread_id = s.thread_id
+),
+state AS (
+    SELECT
+        thread_id,
+        sum(CASE WHEN state = 'wait' THEN duration_ns END)::BIGINT AS wait_ns,
+        sum(CASE WHEN state = 'process' THEN duration_ns END)::BIGINT AS process_ns,
+        sum(CASE WHEN state = 'execute' THEN duration_ns END)::BIGINT AS execute_ns
+    FROM in_state
+    GROUP BY thread_id
+),
+callback AS (
+    SELECT
+        m.thread_id,
+        count(*) AS callbacks,
+        sum(
+            greatest(least(i.end_ns, m.last_ns) - greatest(i.start_ns, m.first_ns), 0)
+        )::BIGINT AS callback_ns
+    FROM member AS m
+    JOIN main.callback_instance AS i ON m.thread_id = i.thread_id
+    WHERE i.parent_id IS NULL AND i.start_ns < m.last_ns
+        AND coalesce(i.end_ns, i.start_ns) >= m.first_ns
+    GROUP BY m.thread_id
+)
+SELECT
+    m.run_id,
+    m.hostname AS host,
+    m.name AS process,
+    m.pid,
+    m.tid,
+    m.kind AS executor_kind,
+    greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
+    s.wait_ns,
+    s.process_ns,
+    s.execute_ns,
+    coalesce(c.callback_ns, 0) AS callback_ns,
+    coalesce(c.callbacks, 0) AS callbacks,
+    coalesce(c.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
+        AS callback_share,
+    m.executor_id,
+    m.thread_id
+FROM member AS m
+LEFT JOIN state AS s ON m.thread_id = s.thread_id
+LEFT JOIN callback AS c ON m.thread_id = c.thread_id
+ORDER BY m.run_id, m.hostname, m.pid, m.tid, m.thread_id

@@ -1,0 +1,76 @@
+-- name: objects
+-- title: ROS objects
+-- description: Every publisher, subscription, timer, service and client with its node and process.
+-- grain: one row per object
+-- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object; all when NULL
+-- column: run_id BIGINT             Run
+-- column: host VARCHAR              Host
+-- column: process VARCHAR           Process name
+-- column: pid INTEGER               Process id
+-- column: node VARCHAR              Full name of the node; NULL: not known
+-- column: kind VARCHAR              Kind of object
+-- column: name VARCHAR              Topic, service, or period of the timer
+-- column: queue_depth BIGINT        History depth asked for
+-- column: created_ns BIGINT [epoch ns]  First initialisation event
+-- column: symbols VARCHAR           Functions registered for its callbacks
+-- column: object_id BIGINT          Identity within its kind
+-- column: is_inferred BOOLEAN       Its initialisation was not traced
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- needs: main.publisher, main.subscription, main.timer, main.service, main.client, main.callback,
+--     main.node, main.process, main.host
+WITH object AS (
+    SELECT
+        run_id, process_id, node_id, 'publisher' AS kind, topic_name AS name, queue_depth,
+        created_ns, publisher_id AS object_id, is_inferred, is_internal
+    FROM main.publisher
+    UNION ALL
+    SELECT
+        run_id, process_id, node_id, 'subscription', topic_name, queue_depth, created_ns,
+        subscription_id, is_inferred, is_internal
+    FROM main.subscription
+    UNION ALL
+    SELECT
+        run_id, process_id, node_id, 'timer', printf('%.10g ms', period_ns / 1e6), NULL,
+        created_ns, timer_id, false, false
+    FROM main.timer
+    UNION ALL
+    SELECT
+        run_id, process_id, node_id, 'service', service_name, NULL, created_ns, service_id, false,
+        is_internal
+    FROM main.service
+    UNION ALL
+    SELECT
+        run_id, process_id, node_id, 'client', service_name, NULL, created_ns, client_id, false,
+        is_internal
+    FROM main.client
+),
+symbol AS (
+    SELECT
+        kind,
+        coalesce(subscription_id, timer_id, service_id) AS object_id,
+        string_agg(DISTINCT symbol, '; ' ORDER BY symbol) AS symbols
+    FROM main.callback
+    WHERE symbol IS NOT NULL AND kind <> 'unknown'
+    GROUP BY ALL
+)
+SELECT
+    o.run_id,
+    h.hostname AS host,
+    p.name AS process,
+    p.pid,
+    n.full_name AS node,
+    o.kind,
+    o.name,
+    o.queue_depth,
+    o.created_ns,
+    s.symbols,
+    o.object_id,
+    o.is_inferred,
+    o.is_internal
+FROM object AS o
+JOIN main.process AS p ON o.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+LEFT JOIN main.node AS n ON o.node_id = n.node_id
+LEFT JOIN symbol AS s ON o.kind = s.kind AND o.object_id = s.object_id
+WHERE list_contains($runs, o.run_id) AND ($kind IS NULL OR o.kind = $kind)
+ORDER BY o.run_id, host, p.pid, p.process_id, node NULLS LAST, o.kind, o.name, o.object_id

@@ -1,0 +1,63 @@
+-- name: publication-rate
+-- title: Publication rates and periods
+-- description: How many messages publishers published, at what rate, and how regularly. The rate is
+--     that between the first and the last publication in the time window.
+-- grain: one row per publisher
+-- column: run_id BIGINT             Run
+-- column: topic_name VARCHAR        Topic
+-- column: publisher VARCHAR         Node that published
+-- column: count BIGINT              Publications in the time window
+-- column: rate_hz DOUBLE [Hz]       Publications per second
+-- column: period_min_ns BIGINT [ns]     Shortest time from one publication to the next
+-- column: period_median_ns BIGINT [ns]  Median time from one publication to the next
+-- column: period_p95_ns BIGINT [ns]     95 % of these times are at most this
+-- column: period_max_ns BIGINT [ns]     Longest time from one publication to the next
+-- column: period_deviation_ns BIGINT [ns]  Standard deviation of these times (jitter)
+-- column: publisher_id BIGINT       Identity of the publisher
+-- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- needs: main.publication, main.publisher, main.node, main.process
+WITH published AS (
+    SELECT
+        run_id,
+        publisher_id,
+        start_ns,
+        start_ns - lag(start_ns) OVER (
+            PARTITION BY publisher_id ORDER BY start_ns, publication_id
+        ) AS period_ns
+    FROM main.publication
+    WHERE list_contains($runs, run_id)
+        AND publisher_id IS NOT NULL
+        AND start_ns >= $start_ns
+        AND start_ns < $end_ns
+),
+measured AS (
+    SELECT
+        run_id,
+        publisher_id,
+        count(*) AS count,
+        (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
+        min(period_ns) AS period_min_ns,
+        quantile_disc(period_ns, [0.5, 0.95]) AS quantiles,
+        max(period_ns) AS period_max_ns,
+        round(stddev_samp(period_ns))::BIGINT AS period_deviation_ns
+    FROM published
+    GROUP BY run_id, publisher_id
+)
+SELECT
+    m.run_id,
+    b.topic_name,
+    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS publisher,
+    m.count,
+    m.rate_hz,
+    m.period_min_ns,
+    m.quantiles[1] AS period_median_ns,
+    m.quantiles[2] AS period_p95_ns,
+    m.period_max_ns,
+    m.period_deviation_ns,
+    m.publisher_id,
+    b.is_internal
+FROM measured AS m
+JOIN main.publisher AS b ON m.publisher_id = b.publisher_id
+JOIN main.process AS p ON b.process_id = p.process_id
+LEFT JOIN main.node AS n ON b.node_id = n.node_id
+ORDER BY m.run_id, b.topic_name NULLS LAST, publisher, m.publisher_id

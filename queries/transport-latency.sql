@@ -1,0 +1,67 @@
+-- name: transport-latency
+-- title: Transport latency by topic and subscription
+-- description: How long messages took from the end of their publication to their take, which
+--     includes the time they waited for the receiving executor. A negative latency means that the
+--     clocks of two hosts are apart. Takes without a known publication are counted, not measured.
+-- grain: one row per topic, receiving node and subscription
+-- column: run_id BIGINT             Run
+-- column: topic_name VARCHAR        Topic
+-- column: subscriber VARCHAR        Node that received
+-- column: takes BIGINT              Messages received in the time window
+-- column: linked BIGINT             Takes whose publication is known
+-- column: ambiguous BIGINT          Links with more than one candidate
+-- column: negative BIGINT           Links with negative latency
+-- column: min_ns BIGINT [ns]        Shortest latency
+-- column: median_ns BIGINT [ns]     Median latency
+-- column: mean_ns BIGINT [ns]       Mean latency
+-- column: p95_ns BIGINT [ns]        95 % of the latencies are at most this
+-- column: p99_ns BIGINT [ns]        99 % of the latencies are at most this
+-- column: max_ns BIGINT [ns]        Longest latency
+-- column: subscription_id BIGINT    Identity of the subscription
+-- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- needs: main.take, main.link_transport, main.subscription, main.node, main.process
+WITH received AS (
+    SELECT t.run_id, t.subscription_id, t.take_id, l.candidate_count, l.latency_ns
+    FROM main.take AS t
+    LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
+    WHERE list_contains($runs, t.run_id)
+        AND t.taken_ns >= $start_ns
+        AND t.taken_ns < $end_ns
+        AND t.method <> 'callback_only'
+),
+measured AS (
+    SELECT
+        run_id,
+        subscription_id,
+        count(*) AS takes,
+        count(latency_ns) AS linked,
+        count(*) FILTER (WHERE candidate_count > 1) AS ambiguous,
+        count(*) FILTER (WHERE latency_ns < 0) AS negative,
+        min(latency_ns) AS min_ns,
+        quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(latency_ns))::BIGINT AS mean_ns,
+        max(latency_ns) AS max_ns
+    FROM received
+    GROUP BY run_id, subscription_id
+)
+SELECT
+    m.run_id,
+    s.topic_name,
+    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS subscriber,
+    m.takes,
+    m.linked,
+    m.ambiguous,
+    m.negative,
+    m.min_ns,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.quantiles[3] AS p99_ns,
+    m.max_ns,
+    m.subscription_id,
+    coalesce(s.is_internal, false) AS is_internal
+FROM measured AS m
+LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
+LEFT JOIN main.process AS p ON s.process_id = p.process_id
+LEFT JOIN main.node AS n ON s.node_id = n.node_id
+ORDER BY m.run_id, s.topic_name NULLS LAST, subscriber, m.subscription_id
