@@ -8,20 +8,20 @@
 -- grain: one row per path
 -- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
 -- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that stops it
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
+--     the clock
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
+--     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
 -- param: max_depth BIGINT = 32     Longest path, in topics
 -- param: max_paths BIGINT = 10000  Most chains followed per length
 -- column: run_id BIGINT            Run
--- column: path VARCHAR             Nodes and topics
 -- column: roots BIGINT             Flows that began in the time window
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
 -- column: lost BIGINT              Roots lost on the way although later ones arrived
 -- column: edge BIGINT              Roots too close to the begin or end of the trace to tell
--- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are from
 -- column: min_ns BIGINT [ns]       Shortest latency
 -- column: median_ns BIGINT [ns]    Median latency
@@ -30,6 +30,8 @@
 -- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
 -- column: max_ns BIGINT [ns]       Longest latency
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
+-- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
+-- column: path VARCHAR             Nodes and topics
 -- needs: main.flow_path, main.end_to_end
 WITH flow AS (
     SELECT
@@ -52,7 +54,10 @@ root AS (
     GROUP BY run_id, path_id, root_kind, root_id
 ),
 reason AS (
-    SELECT run_id, path_id, string_agg(reason || ' ' || number, ', ' ORDER BY reason) AS lost_reasons
+    SELECT
+        run_id,
+        path_id,
+        string_agg(reason || ' ' || number, ', ' ORDER BY reason) AS lost_reasons
     FROM (
         SELECT run_id, path_id, reason, count(*) AS number
         FROM root
@@ -88,13 +93,11 @@ latency AS (
 )
 SELECT
     p.run_id,
-    p.path,
     coalesce(c.roots, 0) AS roots,
     coalesce(c.reached, 0) AS reached,
     coalesce(c.superseded, 0) AS superseded,
     coalesce(c.lost, 0) AS lost,
     coalesce(c.edge, 0) AS edge,
-    r.lost_reasons,
     coalesce(l.pairs, 0) AS pairs,
     l.min_ns,
     l.quantiles[1] AS median_ns,
@@ -102,7 +105,9 @@ SELECT
     l.quantiles[2] AS p95_ns,
     l.quantiles[3] AS p99_ns,
     l.max_ns,
-    p.is_cut
+    p.is_cut,
+    r.lost_reasons,
+    p.path
 FROM main.flow_path(
     $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
 ) AS p

@@ -5,14 +5,15 @@
 -- grain: one row per path and root, or per pair of root and arrival
 -- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
 -- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that stops it
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
+--     the clock
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
+--     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
 -- param: max_depth BIGINT = 32     Longest path, in topics
 -- param: max_paths BIGINT = 10000  Most chains followed per length
 -- column: run_id BIGINT            Run
--- column: path VARCHAR             Nodes and topics
 -- column: root_kind VARCHAR        'callback_instance' or 'publication'
 -- column: root_id BIGINT           Identity of the root
 -- column: root_ns BIGINT [epoch ns]  Start of the root
@@ -21,10 +22,10 @@
 -- column: latency_ns BIGINT [ns]   From the start of the root to the end
 -- column: status VARCHAR           'reached', 'superseded', 'lost' or 'edge'
 -- column: reason VARCHAR           Why it did not arrive
+-- column: path VARCHAR             Nodes and topics
 -- needs: main.flow_path, main.end_to_end
 SELECT
     f.run_id,
-    p.path,
     f.root_kind,
     f.root_id,
     f.root_ns,
@@ -32,7 +33,8 @@ SELECT
     f.sink_ns,
     f.latency_ns,
     f.status,
-    f.reason
+    f.reason,
+    p.path
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
     max_depth := $max_depth, max_paths := $max_paths

@@ -2,7 +2,8 @@
 -- title: ROS objects
 -- description: Every publisher, subscription, timer, service and client with its node and process.
 -- grain: one row per object
--- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object; all when NULL
+-- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object;
+--     all when NULL
 -- column: run_id BIGINT             Run
 -- column: host VARCHAR              Host
 -- column: process VARCHAR           Process name

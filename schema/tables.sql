@@ -103,8 +103,8 @@ CREATE TABLE store.thread (
     process_id     BIGINT NOT NULL,              -- Process it lives in -> process.process_id
     tid            INTEGER NOT NULL,             -- Thread id, virtual where the trace has no other
     name           VARCHAR,                      -- Name of the thread
-    first_event_id BIGINT,                       -- First event; position in the event order of the run
-    last_event_id  BIGINT,                       -- Last event; position in the event order of the run
+    first_event_id BIGINT,                       -- First event [event order]
+    last_event_id  BIGINT,                       -- Last event [event order]
     first_seen_ns  BIGINT,                       -- First event [epoch ns]
     last_seen_ns   BIGINT                        -- Last event [epoch ns]
 );
@@ -282,8 +282,8 @@ CREATE TABLE store.publication (
     rmw_ns              BIGINT,                  -- rmw_publish [epoch ns]
     dds_ns              BIGINT,                  -- dds:write [epoch ns]
     source_timestamp_ns BIGINT,                  -- Stamp that the middleware sent along, clock of ROS [epoch ns]
-    start_event_id      BIGINT,                  -- First layer seen; position in the event order of the run
-    end_event_id        BIGINT                   -- Last layer seen; position in the event order of the run
+    start_event_id      BIGINT,                  -- First layer seen [event order]
+    end_event_id        BIGINT                   -- Last layer seen [event order]
 );
 
 -- One row per message handed over to a subscription.
@@ -297,8 +297,8 @@ CREATE TABLE store.take (
     taken_ns            BIGINT NOT NULL,         -- Moment of the hand-over [epoch ns]
     source_timestamp_ns BIGINT,                  -- Stamp that came with the message, clock of ROS [epoch ns]
     method              VARCHAR NOT NULL,        -- 'rmw', 'ring_buffer', 'caret' or 'callback_only'
-    start_event_id      BIGINT,                  -- First layer seen; position in the event order of the run
-    end_event_id        BIGINT                   -- Last layer seen; position in the event order of the run
+    start_event_id      BIGINT,                  -- First layer seen [event order]
+    end_event_id        BIGINT                   -- Last layer seen [event order]
 );
 
 -- One row per run of a callback.
@@ -316,9 +316,9 @@ CREATE TABLE store.callback_instance (
     is_intra_process       BOOLEAN NOT NULL,     -- Called with an intra-process message
     parent_id              BIGINT,               -- Run it is nested in -> callback_instance.callback_instance_id
     depth                  INTEGER NOT NULL,     -- Nesting depth on its thread, from 1
-    start_event_id         BIGINT,               -- callback_start; position in the event order of the run
-    end_event_id           BIGINT,               -- callback_end; NULL: never seen to end; position in the event order of the run
-    effective_end_event_id BIGINT                -- callback_end, else the first event that cannot be inside; position in the event order of the run
+    start_event_id         BIGINT,               -- callback_start [event order]
+    end_event_id           BIGINT,               -- callback_end; NULL: never seen to end [event order]
+    effective_end_event_id BIGINT                -- callback_end, else the first event that cannot be inside [event order]
 );
 
 -- One row per service request.
@@ -358,7 +358,7 @@ CREATE TABLE store.executor_state (
     start_ns             BIGINT NOT NULL,        -- Executor event that began it [epoch ns]
     end_ns               BIGINT,                 -- Next executor event of the thread; NULL: the last [epoch ns]
     callback_instance_id BIGINT,                 -- First callback run in it -> callback_instance.callback_instance_id
-    start_event_id       BIGINT                  -- Executor event that began it; position in the event order of the run
+    start_event_id       BIGINT                  -- Executor event that began it [event order]
 );
 
 -- One row per take whose publication is known.

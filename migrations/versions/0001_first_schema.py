@@ -253,16 +253,8 @@ def upgrade() -> None:
             comment="Thread id, virtual where the trace has no other",
         ),
         sa.Column("name", sa.String(), comment="Name of the thread"),
-        sa.Column(
-            "first_event_id",
-            sa.BigInteger(),
-            comment="First event; position in the event order of the run",
-        ),
-        sa.Column(
-            "last_event_id",
-            sa.BigInteger(),
-            comment="Last event; position in the event order of the run",
-        ),
+        sa.Column("first_event_id", sa.BigInteger(), comment="First event [event order]"),
+        sa.Column("last_event_id", sa.BigInteger(), comment="Last event [event order]"),
         sa.Column("first_seen_ns", sa.BigInteger(), comment="First event [epoch ns]"),
         sa.Column("last_seen_ns", sa.BigInteger(), comment="Last event [epoch ns]"),
         schema="store",
@@ -619,16 +611,8 @@ def upgrade() -> None:
             sa.BigInteger(),
             comment="Stamp that the middleware sent along, clock of ROS [epoch ns]",
         ),
-        sa.Column(
-            "start_event_id",
-            sa.BigInteger(),
-            comment="First layer seen; position in the event order of the run",
-        ),
-        sa.Column(
-            "end_event_id",
-            sa.BigInteger(),
-            comment="Last layer seen; position in the event order of the run",
-        ),
+        sa.Column("start_event_id", sa.BigInteger(), comment="First layer seen [event order]"),
+        sa.Column("end_event_id", sa.BigInteger(), comment="Last layer seen [event order]"),
         schema="store",
         comment="One row per publish() call",
     )
@@ -657,16 +641,8 @@ def upgrade() -> None:
             nullable=False,
             comment="'rmw', 'ring_buffer', 'caret' or 'callback_only'",
         ),
-        sa.Column(
-            "start_event_id",
-            sa.BigInteger(),
-            comment="First layer seen; position in the event order of the run",
-        ),
-        sa.Column(
-            "end_event_id",
-            sa.BigInteger(),
-            comment="Last layer seen; position in the event order of the run",
-        ),
+        sa.Column("start_event_id", sa.BigInteger(), comment="First layer seen [event order]"),
+        sa.Column("end_event_id", sa.BigInteger(), comment="Last layer seen [event order]"),
         schema="store",
         comment="One row per message handed over to a subscription",
     )
@@ -696,20 +672,16 @@ def upgrade() -> None:
         sa.Column(
             "depth", sa.Integer(), nullable=False, comment="Nesting depth on its thread, from 1"
         ),
-        sa.Column(
-            "start_event_id",
-            sa.BigInteger(),
-            comment="callback_start; position in the event order of the run",
-        ),
+        sa.Column("start_event_id", sa.BigInteger(), comment="callback_start [event order]"),
         sa.Column(
             "end_event_id",
             sa.BigInteger(),
-            comment="callback_end; NULL: never seen to end; position in the event order of the run",
+            comment="callback_end; NULL: never seen to end [event order]",
         ),
         sa.Column(
             "effective_end_event_id",
             sa.BigInteger(),
-            comment="callback_end, else the first event that cannot be inside; position in the event order of the run",
+            comment="callback_end, else the first event that cannot be inside [event order]",
         ),
         schema="store",
         comment="One row per run of a callback",
@@ -765,9 +737,7 @@ def upgrade() -> None:
         ),
         sa.Column("callback_instance_id", sa.BigInteger(), comment="First callback run in it"),
         sa.Column(
-            "start_event_id",
-            sa.BigInteger(),
-            comment="Executor event that began it; position in the event order of the run",
+            "start_event_id", sa.BigInteger(), comment="Executor event that began it [event order]"
         ),
         schema="store",
         comment="One row per interval between two executor events of a thread",

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import duckdb
 
 from msgflow.db.objects import definition_hash, head_revision
 from msgflow.errors import DatabaseError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 # Older clients (DBeaver, Grafana, notebooks) read files of this storage version.
 STORAGE_VERSION = "v1.4.0"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import duckdb
+from typing import TYPE_CHECKING
 
 from msgflow.db import objects
+
+if TYPE_CHECKING:
+    import duckdb
 
 # Tables of `store` that hold the rows of the view of that name in `derive`.
 DERIVED = ("link_transport", "link_causal")

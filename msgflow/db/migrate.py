@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import duckdb
 
 from msgflow.db import objects
 from msgflow.db.connection import (
@@ -24,6 +21,9 @@ from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import duckdb
     from sqlalchemy.engine import Connection
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
-
-import duckdb
+from typing import TYPE_CHECKING
 
 from msgflow.query.header import Header, parse
 from msgflow.resources import resource_directory
 from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    import duckdb
 
 # Folders whose objects live in the database; each may need only those to its left, and itself.
 VIEW_LAYERS = ("link", "flow", "stat", "public")

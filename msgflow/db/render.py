@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from duckdb_engine import Dialect
-from sqlalchemy import Table
 
 from msgflow.db.tables import metadata
+
+if TYPE_CHECKING:
+    from sqlalchemy import Table
 
 HEADING = """\
 -- Generated from msgflow/db/tables.py by `python -m msgflow.db.render`; do not edit.

@@ -10,7 +10,7 @@ in one transaction, so `schema/check` proves them instead.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from duckdb_engine.datatypes import UBigInteger
 from sqlalchemy import (
@@ -24,7 +24,9 @@ from sqlalchemy import (
     String,
     Table,
 )
-from sqlalchemy.types import TypeEngine
+
+if TYPE_CHECKING:
+    from sqlalchemy.types import TypeEngine
 
 SCHEMA = "store"
 metadata = MetaData(schema=SCHEMA)
@@ -91,7 +93,7 @@ def _time(name: str, comment: str, *, required: bool = False) -> Column[Any]:
 
 
 def _order(name: str, comment: str) -> Column[Any]:
-    return _column(name, BigInteger, f"{comment}; position in the event order of the run")
+    return _column(name, BigInteger, f"{comment} [event order]")
 
 
 def _text(name: str, comment: str, *, required: bool = False) -> Column[Any]:

@@ -6,22 +6,28 @@ import contextlib
 import itertools
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import duckdb
+from typing import TYPE_CHECKING
 
 from msgflow import trace as trace_package
 from msgflow.db import migrate, objects
+from msgflow.db.check import run_checks
 from msgflow.db.connection import connect
 from msgflow.db.derive import derive
-from msgflow.errors import TraceError, UsageError
+from msgflow.db.store import delete, store
+from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
-from msgflow.ingest.store import delete, store
 from msgflow.ingest.workspace import workspace
-from msgflow.trace import Progress, TraceInfo
+from msgflow.query.interrupt import interruptible
 from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    import duckdb
+
+    from msgflow.trace import Progress, TraceInfo
 
 # Enough for a run of any size: what does not fit goes to the workspace on disk.
 DEFAULT_MEMORY_LIMIT = "640MB"
@@ -61,16 +67,16 @@ class IngestReport:
     Attributes:
         run_id: the new run.
         run_name: its name.
-        event_count: events read.
-        seconds: wall time, by stage, in the order of the stages.
         diagnostics: what is worth knowing about the input.
+        event_count: events read.
+        stage_seconds: wall time by stage [s], in the order of the stages.
     """
 
     run_id: int
     run_name: str
+    diagnostics: tuple[Diagnostic, ...]
     event_count: int
     stage_seconds: Mapping[str, float]
-    diagnostics: tuple[Diagnostic, ...]
 
     @property
     def seconds(self) -> float:
@@ -119,9 +125,11 @@ def ingest(
         hostnames = _hostnames(traces.traces, hosts or {})
         migrate.require_ingestable(database)
         with workspace(database) as directory, _target(database, directory) as target:
-            con = connect(target, read_only=False, memory_limit=memory_limit or DEFAULT_MEMORY_LIMIT)
+            con = connect(
+                target, read_only=False, memory_limit=memory_limit or DEFAULT_MEMORY_LIMIT
+            )
             try:
-                con.execute(f"SET temp_directory = '{str(directory).replace(chr(39), chr(39) * 2)}'")
+                con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET preserve_insertion_order = false")
                 if name is not None and not replace:
                     _require_free_name(con, name)
@@ -136,62 +144,88 @@ def ingest(
                     progress=watch.reading,
                 )
                 judge.require_ros_events(traces.traces, loaded.event_counts)
-                event_count = sum(loaded.event_counts.values())
-                watch.enter("building the model")
-                model.build(con)
-                if keep_staging is not None:
-                    watch.enter("writing the staged events")
-                    staging.export(con, keep_staging)
-                watch.enter("storing the run")
-                con.begin()
-                try:
-                    run_name = name or Path(paths[0]).resolve().name or "run"
-                    run_id = _write(con, run_name, name is not None, loaded, event_count, watch)
-                    con.commit()
-                except BaseException:
-                    con.rollback()
-                    raise
-                diagnostics = _diagnostics(con, run_id)
+                fallback = Path(paths[0]).resolve().name or "run"
+                run = interruptible(
+                    con, lambda: _write(con, name, fallback, loaded, keep_staging, watch)
+                )
                 watch.enter("closing the database")
             finally:
                 con.close()
-    return IngestReport(run_id, run_name, event_count, watch.finish(), diagnostics)
+    return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
 
 
 def _write(
     con: duckdb.DuckDBPyConnection,
-    run_name: str,
-    is_named_by_user: bool,
+    name: str | None,
+    fallback: str,
     loaded: staging.Loaded,
-    event_count: int,
+    keep_staging: Path | None,
     watch: _Watch,
-) -> int:
-    row = con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchone()
-    run_id = 1 if row is None else int(row[0])
+) -> tuple[int, str, tuple[Diagnostic, ...]]:
+    watch.enter("building the model")
+    model.build(con, keep=keep_staging is not None)
+    if keep_staging is not None:
+        watch.enter("writing the staged events")
+        staging.export(con, keep_staging)
+    con.begin()
+    try:
+        watch.enter("storing the run")
+        run_id, run_name = _store(con, name, fallback, loaded)
+        watch.enter("linking messages")
+        derive(con, run_id)
+        watch.enter("checking the database")
+        _check(con, run_id)
+        con.commit()
+    except BaseException:
+        con.rollback()
+        raise
+    return run_id, run_name, _diagnostics(con, run_id)
+
+
+def _store(
+    con: duckdb.DuckDBPyConnection, name: str | None, fallback: str, loaded: staging.Loaded
+) -> tuple[int, str]:
+    run_id = int(con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchall()[0][0])
     replaced = set(loaded.replaced_runs)
-    if is_named_by_user:
-        named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [run_name]).fetchall()
+    if name is not None:
+        named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [name]).fetchall()
         replaced |= {number for (number,) in named}
     store(con, run_id)
     delete(con, sorted(replaced))
-    if not is_named_by_user:
-        run_name = _free_name(con, run_name)
+    run_name = name or _free_name(con, fallback)
     con.execute(
         "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "
         "start_ns, end_ns, event_count) SELECT ?, ?, now() AT TIME ZONE 'UTC', ?, ?, "
-        "min(start_ns), max(end_ns), ? FROM store.trace WHERE run_id = ?",
-        [run_id, run_name, __version__, objects.derivation_hash(), event_count, run_id],
+        "min(start_ns), max(end_ns), sum(event_count) FROM store.trace WHERE run_id = ?",
+        [run_id, run_name, __version__, objects.derivation_hash(), run_id],
     )
     if loaded.duplicate_packet_count:
-        con.execute(
-            "INSERT INTO store.diagnostic (run_id, name, severity, count, detail) "
-            "VALUES (?, 'duplicate_packet', 'info', ?, 'packets that several of the given traces "
-            "hold were read once')",
-            [run_id, loaded.duplicate_packet_count],
+        _add_diagnostic(
+            con,
+            run_id,
+            "duplicate_packet",
+            "info",
+            loaded.duplicate_packet_count,
+            "packets that several of the given traces hold were read once",
         )
-    watch.enter("linking messages")
-    derive(con, run_id)
-    return run_id
+    return run_id, run_name
+
+
+def _check(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    for result in run_checks(con, run_id):
+        if result.row_count:
+            detail = f"{result.name}: {result.description}"
+            _add_diagnostic(con, run_id, "check_failed", result.severity, result.row_count, detail)
+
+
+def _add_diagnostic(
+    con: duckdb.DuckDBPyConnection, run_id: int, name: str, severity: str, count: int, detail: str
+) -> None:
+    con.execute(
+        "INSERT INTO store.diagnostic (run_id, name, severity, count, detail) "
+        "VALUES (?, ?, ?, ?, ?)",
+        [run_id, name, severity, count, detail],
+    )
 
 
 def _diagnostics(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Diagnostic, ...]:
@@ -243,7 +277,14 @@ def _target(database: Path, directory: Path) -> Iterator[Path]:
     fresh = directory / "target.duckdb"
     migrate.create(fresh)
     yield fresh
-    os.replace(fresh, database)
+    try:
+        os.link(fresh, database)
+    except FileExistsError:
+        raise DatabaseError(
+            f"another process created the database meanwhile — {database}", "ingest again"
+        ) from None
+    except OSError:
+        os.replace(fresh, database)  # a file system without hard links
 
 
 class _Watch:

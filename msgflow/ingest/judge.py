@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.ingest.catalogue import load
-from msgflow.trace import TraceInfo
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from msgflow.trace import TraceInfo
 
 _SHOWN = 5
 

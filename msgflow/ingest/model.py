@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import duckdb
+from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.tables import metadata
-from msgflow.query.header import Header
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import duckdb
+
+    from msgflow.query.header import Header
 
 
 def build(

@@ -10,16 +10,19 @@ from __future__ import annotations
 
 import fnmatch
 import time
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-
-import duckdb
-import pyarrow as pa
+from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Tracepoint, load
 from msgflow.trace import PACKET, Progress, TraceInfo, TraceSet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    import duckdb
+    import pyarrow as pa
 
 _PACKET_TABLE = """
 CREATE TABLE raw.packet (
@@ -177,9 +180,7 @@ def _insert(con: duckdb.DuckDBPyConnection, table: str, batch: pa.RecordBatch) -
     con.unregister("event_batch")
 
 
-def _same_packets(
-    con: duckdb.DuckDBPyConnection, batch: pa.RecordBatch, replace: bool
-) -> set[int]:
+def _same_packets(con: duckdb.DuckDBPyConnection, batch: pa.RecordBatch, replace: bool) -> set[int]:
     con.register("packet_batch", batch)
     try:
         runs = con.execute(_SAME_PACKETS).fetchall()

@@ -7,10 +7,13 @@ import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgflow.errors import DatabaseError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 _PREFIX = ".msgflow-ingest-"
 _LOCK = "lock"

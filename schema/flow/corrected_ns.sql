@@ -2,7 +2,6 @@
 -- kind: macro
 -- description: A time of some clock on the common time axis: its offset, and its drift since the
 --     reference.
--- needs: store.clock
 CREATE OR REPLACE MACRO derive.corrected_ns(time_ns, offset_ns, drift_ppb, reference_ns) AS
 time_ns + offset_ns
 + CASE

@@ -2,22 +2,34 @@
 -- kind: macro
 -- description: The vertices that can be reached from one vertex along the edges of a table or view
 --     with columns from_kind, from_id, to_kind, to_id. Each vertex comes once; the walk ends on
---     any graph, at the latest after max_depth steps.
+--     any graph. Without max_depth its cost grows with the edges alone, with it also with depth:
+--     only then every step has to look at all that was reached before.
 -- grain: one row per vertex
--- needs: derive.flow_link
 CREATE OR REPLACE MACRO derive.graph_reachable(
-    edges, start_kind, start_id, max_depth := 100000
+    edges, start_kind, start_id, max_depth := NULL
 ) AS TABLE
 WITH RECURSIVE edge AS MATERIALIZED (
     SELECT from_kind, from_id, to_kind, to_id FROM query_table(edges)
 ),
-reached (kind, id, depth) USING KEY (kind, id) AS (
-    SELECT start_kind::VARCHAR, start_id::BIGINT, 0
+reached (kind, id) AS (
+    SELECT start_kind::VARCHAR, start_id::BIGINT
+    WHERE max_depth IS NULL
     UNION
-    SELECT e.to_kind, e.to_id, min(r.depth) + 1
+    SELECT e.to_kind, e.to_id
     FROM reached AS r
     JOIN edge AS e ON r.kind = e.from_kind AND r.id = e.from_id
-    WHERE r.depth < max_depth
+),
+near (kind, id, depth) USING KEY (kind, id) AS (
+    SELECT start_kind::VARCHAR, start_id::BIGINT, 0
+    WHERE max_depth IS NOT NULL
+    UNION
+    SELECT e.to_kind, e.to_id, min(n.depth) + 1
+    FROM near AS n
+    JOIN edge AS e ON n.kind = e.from_kind AND n.id = e.from_id
+    ANTI JOIN recurring.near AS k ON e.to_kind = k.kind AND e.to_id = k.id
+    WHERE n.depth < max_depth
     GROUP BY e.to_kind, e.to_id
 )
-SELECT kind, id, depth FROM reached
+SELECT kind, id FROM reached
+UNION ALL
+SELECT kind, id FROM near

@@ -6,5 +6,7 @@
 CREATE OR REPLACE MACRO staging.gid_bytes(gid) AS
 CASE
     WHEN gid IS NULL OR len(gid) < 16 OR list_sum(gid[1:16]) = 0 THEN NULL
-    ELSE unhex(list_aggregate(list_transform(gid[1:16], lambda b: printf('%02x', b)), 'string_agg', ''))
+    ELSE unhex(
+        list_aggregate(list_transform(gid[1:16], lambda b: printf('%02x', b)), 'string_agg', '')
+    )
 END

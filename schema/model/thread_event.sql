@@ -1,64 +1,75 @@
 -- name: staging.thread_event
--- description: What threads do at run time, each event with `previous`, the one directly
---     before it on its thread. `handle` is the object, `message` the message that a layer was called with, `value`
---     the source stamp (of callback_start: is_intra_process). Initialisation is left out, and so
---     are providers that may stand between two layers of one call without meaning anything.
+-- description: What threads do at run time, each event with `previous`, the one directly before it
+--     on its thread. `handle` is the object, `message` the message that a layer was called with,
+--     `value` the source stamp (of callback_start: is_intra_process). Initialisation is left out,
+--     and so is every provider that may stand between two layers of one call by accident.
 -- grain: one row per run-time event of a thread
 -- needs: staging.context, raw
 WITH runtime AS (
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'intra' AS kind, publisher_handle AS handle, message AS message, NULL::BIGINT AS value
+        'intra' AS kind,
+        publisher_handle AS handle, message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_intra_publish
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'enqueue' AS kind, buffer AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'enqueue' AS kind,
+        buffer AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_ring_buffer_enqueue
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'rclcpp' AS kind, publisher_handle AS handle, message AS message, NULL::BIGINT AS value
+        'rclcpp' AS kind,
+        publisher_handle AS handle, message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_publish
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'rcl' AS kind, publisher_handle AS handle, message AS message, NULL::BIGINT AS value
+        'rcl' AS kind,
+        publisher_handle AS handle, message, NULL::BIGINT AS value
     FROM raw.ros2_rcl_publish
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'rmw' AS kind, rmw_publisher_handle AS handle, message AS message, timestamp::BIGINT AS value
+        'rmw' AS kind,
+        rmw_publisher_handle AS handle, message, timestamp::BIGINT AS value
     FROM raw.ros2_rmw_publish
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'dds_data' AS kind, writer AS handle, data AS message, NULL::BIGINT AS value
+        'dds_data' AS kind,
+        writer AS handle, data AS message, NULL::BIGINT AS value
     FROM raw.dds_write_pre
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'dds' AS kind, writer AS handle, data AS message, timestamp::BIGINT AS value
+        'dds' AS kind,
+        writer AS handle, data AS message, timestamp::BIGINT AS value
     FROM raw.dds_write
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'caret_write' AS kind, NULL::UBIGINT AS handle, message AS message, NULL::BIGINT AS value
+        'caret_write' AS kind,
+        NULL::UBIGINT AS handle, message, NULL::BIGINT AS value
     FROM raw.ros2_caret_dds_write
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'caret_copy' AS kind, NULL::UBIGINT AS handle, addr_from AS message, NULL::BIGINT AS value
+        'caret_copy' AS kind,
+        NULL::UBIGINT AS handle, addr_from AS message, NULL::BIGINT AS value
     FROM raw.ros2_caret_dds_bind_addr_to_addr
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'caret_stamp' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, source_stamp::BIGINT AS value
+        'caret_stamp' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, source_stamp::BIGINT AS value
     FROM raw.ros2_caret_dds_bind_addr_to_stamp
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'dds_read' AS kind, reader AS handle, buffer AS message, NULL::BIGINT AS value
+        'dds_read' AS kind,
+        reader AS handle, buffer AS message, NULL::BIGINT AS value
     FROM raw.dds_read
     UNION ALL
     SELECT
@@ -69,67 +80,80 @@ WITH runtime AS (
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'rcl_take' AS kind, NULL::UBIGINT AS handle, message AS message, NULL::BIGINT AS value
+        'rcl_take' AS kind,
+        NULL::UBIGINT AS handle, message, NULL::BIGINT AS value
     FROM raw.ros2_rcl_take
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'rclcpp_take' AS kind, NULL::UBIGINT AS handle, message AS message, NULL::BIGINT AS value
+        'rclcpp_take' AS kind,
+        NULL::UBIGINT AS handle, message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_take
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'caret_take' AS kind, callback AS handle, message AS message, source_stamp::BIGINT AS value
+        'caret_take' AS kind,
+        callback AS handle, message, source_stamp::BIGINT AS value
     FROM raw.ros2_dispatch_subscription_callback
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'dequeue' AS kind, buffer AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'dequeue' AS kind,
+        buffer AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_ring_buffer_dequeue
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'callback_start' AS kind, callback AS handle, NULL::UBIGINT AS message, is_intra_process::BIGINT AS value
+        'callback_start' AS kind,
+        callback AS handle, NULL::UBIGINT AS message, is_intra_process::BIGINT AS value
     FROM raw.ros2_callback_start
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'callback_end' AS kind, callback AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'callback_end' AS kind,
+        callback AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_callback_end
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'process' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'process' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_executor_get_next_ready
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'wait' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'wait' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_executor_wait_for_work
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'execute' AS kind, handle AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'execute' AS kind,
+        handle AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rclcpp_executor_execute
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'service' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'service' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rmw_send_request
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'service' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'service' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rmw_take_request
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'service' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'service' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rmw_send_response
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'service' AS kind, NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
+        'service' AS kind,
+        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rmw_take_response
 ),
 located AS (

@@ -6,6 +6,29 @@
 --     the roots. A message is lost between the first and the last that passed the same step, and
 --     at the edge of the trace before and after.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
+-- param: runs BIGINT[]  Runs to look at
+-- param: from_topic VARCHAR  Topic where flows start; every source when NULL
+-- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR  Event that starts the clock: 'callback_start' or 'publish'
+-- param: to_event VARCHAR  Event that stops it: 'take', 'callback_start' or 'callback_end'
+-- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
+-- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
+-- param: max_depth INTEGER = 32  Longest chain, in topics
+-- param: max_paths INTEGER = 10000  Most chains followed per run and length
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: take_id BIGINT  Take at the end of the path; NULL: not reached
+-- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: status VARCHAR  'reached', 'superseded', 'lost' or 'edge'
+-- column: reason VARCHAR  Why it did not arrive: 'not_delivered', 'not_published',
+--     'superseded' or 'callback_not_finished'
+-- column: is_first BOOLEAN  First arrival of the root
+-- column: is_last BOOLEAN  Last arrival of the root
+-- column: is_newest BOOLEAN  Newest root of the arrival
 -- needs: main.flow_path, derive.flow_root, derive.flow_transport, derive.flow_continuation,
 --     main.publication, main.callback_instance, main.take, store.publisher
 CREATE OR REPLACE MACRO main.end_to_end(
@@ -36,7 +59,7 @@ root AS MATERIALIZED (
         ON from_event <> 'publish'
         AND r.root_kind = 'callback_instance'
         AND r.root_id = i.callback_instance_id
-       
+
     WHERE list_contains(runs, r.run_id)
         AND CASE WHEN from_topic IS NULL THEN r.is_source ELSE p.topic_name = from_topic END
         AND coalesce(i.start_ns, b.start_ns) >= window_start_ns

@@ -1,13 +1,17 @@
 -- name: main.flow_both
 -- kind: macro
 -- description: The flow of one message: everything that a publication, take or callback run causes
---     or is caused by. Depth is positive towards effects, negative towards causes.
+--     and is caused by, itself included. What its causes lead to besides is left out.
 -- grain: one row per vertex
+-- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_id BIGINT  Identity of the vertex to start from
+-- param: max_depth INTEGER = NULL  Most steps; any number when NULL
+-- column: kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- column: id BIGINT  Identity of the vertex
 -- needs: main.flow_forward, main.flow_backward
-CREATE OR REPLACE MACRO main.flow_both(start_kind, start_id, max_depth := 100000) AS TABLE
-SELECT kind, id, depth
+CREATE OR REPLACE MACRO main.flow_both(start_kind, start_id, max_depth := NULL) AS TABLE
+SELECT kind, id
 FROM main.flow_forward(start_kind, start_id, max_depth := max_depth)
-UNION ALL
-SELECT kind, id, -depth
+UNION
+SELECT kind, id
 FROM main.flow_backward(start_kind, start_id, max_depth := max_depth)
-WHERE depth > 0

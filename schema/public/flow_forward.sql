@@ -1,8 +1,16 @@
 -- name: main.flow_forward
 -- kind: macro
--- description: Everything that a publication, take or callback run causes, directly or through others, itself included (depth 0).
+-- description: Everything that a publication, take or callback run causes, directly or through
+--     others, itself included.
 -- grain: one row per vertex
+-- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_id BIGINT  Identity of the vertex to start from
+-- param: max_depth INTEGER = NULL  Most steps; any number when NULL
+-- column: kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- column: id BIGINT  Identity of the vertex
 -- needs: derive.graph_reachable, derive.flow_link
-CREATE OR REPLACE MACRO main.flow_forward(start_kind, start_id, max_depth := 100000) AS TABLE
-SELECT kind, id, depth
-FROM derive.graph_reachable('derive.flow_link', start_kind, start_id, max_depth := max_depth)
+CREATE OR REPLACE MACRO main.flow_forward(start_kind, start_id, max_depth := NULL) AS TABLE
+SELECT kind, id
+FROM derive.graph_reachable(
+    'derive.flow_link', start_kind, start_id, max_depth := max_depth
+)

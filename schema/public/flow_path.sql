@@ -5,7 +5,26 @@
 --     ends at the topic asked for, or where it cannot be continued. Chains longer than max_depth
 --     and beyond max_paths per length are cut; where that happened is_cut says so.
 -- grain: one row per run and chain
--- needs: derive.flow_hop, derive.node_label, store.publisher, store.subscription, store.node, store.process
+-- param: runs BIGINT[]  Runs to look at
+-- param: from_topic VARCHAR  Topic where flows start; every source when NULL
+-- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
+-- param: max_depth INTEGER = 32  Longest chain, in topics
+-- param: max_paths INTEGER = 10000  Most chains followed per run and length
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Number of the chain in this result
+-- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
+-- column: depth BIGINT  Steps (topics) of the chain
+-- column: publishers BIGINT[]  Publishers in order
+-- column: subscriptions BIGINT[]  Subscriptions in order
+-- column: topics VARCHAR[]  Topics in order
+-- column: path VARCHAR  Nodes and topics in order, for people
+-- column: publisher_id BIGINT  Last publisher
+-- column: subscription_id BIGINT  Last subscription
+-- column: is_cached BOOLEAN  The last step may wait in its node for other messages
+-- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
+-- column: is_cut BOOLEAN  The chain goes on or has siblings beyond the limits
+-- needs: derive.flow_hop, derive.node_label, store.publisher, store.subscription, store.node,
+--     store.process
 CREATE OR REPLACE MACRO main.flow_path(
     runs, from_topic, to_topic, max_depth := 32, max_paths := 10000
 ) AS TABLE

@@ -19,8 +19,10 @@ SELECT
     self.pid,
     self.name,
     self.tracetools_version,
-    derive.corrected_ns(self.first_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS first_seen_ns,
-    derive.corrected_ns(self.last_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS last_seen_ns,
+    derive.corrected_ns(self.first_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
+        AS first_seen_ns,
+    derive.corrected_ns(self.last_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
+        AS last_seen_ns,
     self.pid_namespace,
     self.life
 FROM store.process AS self

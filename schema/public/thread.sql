@@ -15,7 +15,9 @@ SELECT
     self.process_id,
     self.tid,
     self.name,
-    derive.corrected_ns(self.first_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS first_seen_ns,
-    derive.corrected_ns(self.last_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS last_seen_ns
+    derive.corrected_ns(self.first_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
+        AS first_seen_ns,
+    derive.corrected_ns(self.last_seen_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
+        AS last_seen_ns
 FROM store.thread AS self
 JOIN derive.process_clock AS c ON self.process_id = c.process_id

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-import duckdb
-from sqlalchemy import Column, Table
+from typing import TYPE_CHECKING
 
 from msgflow.db.tables import metadata
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import duckdb
+    from sqlalchemy import Column, Table
 
 
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
@@ -47,14 +50,10 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     return bases
 
 
-def _copy(
-    con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]
-) -> None:
+def _copy(con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]) -> None:
     names = ", ".join(column.name for column in table.columns)
     values = ", ".join(_value(table, column, run_id, bases) for column in table.columns)
-    con.execute(
-        f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}"
-    )
+    con.execute(f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}")
 
 
 def _value(table: Table, column: Column[object], run_id: int, bases: dict[str, int]) -> str:

@@ -1,0 +1,10 @@
+-- name: check.interval_is_ordered
+-- description: Nothing ends before it begins.
+-- grain: one row per publication, callback run or executor state that does
+-- severity: error
+-- needs: store.publication, store.callback_instance, store.executor_state
+SELECT 'publication' AS kind, start_event_id FROM store.publication WHERE end_ns < start_ns
+UNION ALL
+SELECT 'callback_instance', start_event_id FROM store.callback_instance WHERE end_ns < start_ns
+UNION ALL
+SELECT 'executor_state', start_event_id FROM store.executor_state WHERE end_ns < start_ns

@@ -1,0 +1,10 @@
+-- name: check.publication_has_one_direct_cause
+-- description: A publication is made inside at most one run of a callback.
+-- grain: one row per publication with several
+-- severity: error
+-- needs: store.link_causal
+SELECT publication_id, count(*) AS link_count
+FROM store.link_causal
+WHERE kind = 'direct'
+GROUP BY publication_id
+HAVING count(*) > 1

@@ -1,0 +1,10 @@
+-- name: check.take_has_one_callback_instance
+-- description: A take leads to at most one run of a callback.
+-- grain: one row per take with several
+-- severity: error
+-- needs: store.callback_instance
+SELECT take_id, count(*) AS run_count
+FROM store.callback_instance
+WHERE take_id IS NOT NULL
+GROUP BY take_id
+HAVING count(*) > 1

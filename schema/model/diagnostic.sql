@@ -1,0 +1,99 @@
+-- name: staging.diagnostic
+-- description: What was found in the input while the model was built.
+-- grain: one row per finding
+-- needs: staging.event_count, staging.loss_interval, staging.process, staging.callback_instance,
+--     staging.callback_event, staging.callback_pair, staging.node, staging.publisher,
+--     staging.subscription, staging.callback, staging.host
+WITH unmatched_end AS (
+    SELECT e.trace_index
+    FROM staging.callback_event AS e
+    ANTI JOIN staging.callback_pair AS p ON e.event_id = p.end_event_id
+    WHERE NOT e.is_start
+),
+process_label AS (
+    SELECT p.process_id, p.life, printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname)
+        AS label
+    FROM staging.process AS p
+    JOIN staging.host AS h ON p.host_id = h.host_id
+),
+inferred AS (
+    SELECT 'node' AS kind, process_id FROM staging.node WHERE is_inferred
+    UNION ALL
+    SELECT 'publisher', process_id FROM staging.publisher WHERE is_inferred
+    UNION ALL
+    SELECT 'subscription', process_id FROM staging.subscription WHERE is_inferred
+    UNION ALL
+    SELECT 'callback', process_id FROM staging.callback WHERE created_ns IS NULL
+)
+SELECT
+    trace_index + 1 AS trace_id,
+    'unknown_event' AS name,
+    'info' AS severity,
+    sum(event_count)::BIGINT AS count,
+    'events that are not in the catalogue and were not loaded: '
+    || string_agg(printf('%s (%d)', name, event_count), ', ' ORDER BY name) AS detail
+FROM staging.event_count
+WHERE NOT is_known
+GROUP BY trace_index
+UNION ALL
+SELECT
+    trace_id,
+    CASE kind WHEN 'loss' THEN 'discarded_events' WHEN 'packets' THEN 'lost_packets'
+        ELSE 'pause' END,
+    CASE kind WHEN 'pause' THEN 'warning' ELSE 'data_loss' END,
+    CASE kind WHEN 'loss' THEN coalesce(sum(event_count), count(*)) ELSE count(*) END::BIGINT,
+    CASE kind
+        WHEN 'loss' THEN printf(
+            'events that the tracer discarded in %d places, %.3f s in all: use more or larger '
+            || 'sub-buffers',
+            count(*), sum(end_ns - start_ns) / 1e9
+        )
+        WHEN 'packets' THEN 'places where whole packets were overwritten or are missing'
+        ELSE printf(
+            'times at which tracing was paused, %.3f s in all', sum(end_ns - start_ns) / 1e9
+        )
+    END
+FROM staging.loss_interval
+GROUP BY trace_id, kind
+UNION ALL
+SELECT
+    NULL,
+    'process_restart',
+    'info',
+    count(*),
+    'process ids that were used again by a new process: '
+    || string_agg(label, ', ' ORDER BY process_id)
+FROM process_label
+WHERE life > 1
+HAVING count(*) > 0
+UNION ALL
+SELECT
+    trace_id,
+    'open_callback',
+    'info',
+    count(*),
+    'runs of callbacks that were never seen to end: the trace or the process ended, a callback '
+    || 'threw, or events were lost'
+FROM staging.callback_instance
+WHERE end_ns IS NULL
+GROUP BY trace_id
+UNION ALL
+SELECT
+    trace_index + 1,
+    'unmatched_callback_end',
+    'warning',
+    count(*),
+    'ends of callbacks without a begin: tracing started inside a callback, or events were lost'
+FROM unmatched_end
+GROUP BY trace_index
+UNION ALL
+SELECT
+    NULL,
+    'inferred_' || i.kind,
+    'warning',
+    count(*),
+    'objects that were used but whose initialisation was not traced (tracing started late, or '
+    || 'events were lost), in ' || string_agg(DISTINCT l.label, ', ' ORDER BY l.label)
+FROM inferred AS i
+JOIN process_label AS l ON i.process_id = l.process_id
+GROUP BY i.kind

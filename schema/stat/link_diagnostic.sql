@@ -1,0 +1,67 @@
+-- name: derive.link_diagnostic
+-- description: What the links say about the input: takes without a publication, links that are a
+--     guess, and messages that seem to arrive before they were published.
+-- grain: one row per finding
+-- needs: store.take, store.subscription, store.publication, store.link_transport,
+--     derive.process_clock, derive.corrected_ns
+WITH unmatched AS (
+    SELECT t.run_id, t.trace_id, s.topic_name, t.source_timestamp_ns IS NULL AS has_no_stamp
+    FROM store.take AS t
+    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
+    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
+),
+by_topic AS (
+    SELECT run_id, trace_id, has_no_stamp, coalesce(topic_name, '?') AS topic_name,
+        count(*) AS number
+    FROM unmatched
+    GROUP BY ALL
+),
+latency AS (
+    SELECT
+        l.run_id,
+        derive.corrected_ns(t.taken_ns, tc.offset_ns, tc.drift_ppb, tc.reference_ns)
+        - derive.corrected_ns(b.end_ns, bc.offset_ns, bc.drift_ppb, bc.reference_ns)
+            AS latency_ns
+    FROM store.link_transport AS l
+    JOIN store.publication AS b ON l.publication_id = b.publication_id
+    JOIN derive.process_clock AS bc ON b.process_id = bc.process_id
+    JOIN store.take AS t ON l.take_id = t.take_id
+    JOIN derive.process_clock AS tc ON t.process_id = tc.process_id
+)
+SELECT
+    run_id,
+    trace_id,
+    'unmatched_take' AS name,
+    'warning' AS severity,
+    sum(number)::BIGINT AS count,
+    'messages received whose publication is not in the traces'
+    || CASE WHEN has_no_stamp THEN ', and that carry no stamp: ' ELSE ': ' END
+    || string_agg(printf('%s (%d)', topic_name, number), ', ' ORDER BY topic_name) AS detail
+FROM by_topic
+GROUP BY run_id, trace_id, has_no_stamp
+UNION ALL
+SELECT
+    l.run_id,
+    NULL,
+    'ambiguous_link',
+    'warning',
+    count(*),
+    'messages that several publications could have been: see candidate_count of link_transport'
+FROM store.link_transport AS l
+WHERE l.candidate_count > 1
+GROUP BY l.run_id
+UNION ALL
+SELECT
+    run_id,
+    NULL,
+    'negative_latency',
+    'warning',
+    count(*),
+    printf(
+        'messages that seem to be received up to %.3f ms before they were published: the clocks '
+        || 'of the hosts are apart',
+        -min(latency_ns) / 1e6
+    )
+FROM latency
+WHERE latency_ns < 0
+GROUP BY run_id

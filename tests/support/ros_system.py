@@ -1,0 +1,229 @@
+"""The event sequences of a ROS 2 system in words: what creating, publishing, taking ... record.
+
+Handles are small numbers chosen by the test. Where a publisher has handle 0x10, its rmw handle is
+0x1010 and its DDS writer 0x2010 unless the test says otherwise; likewise for subscriptions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from staged_events import StagedEvents, Thread
+
+RMW = 0x1000
+WRITER = 0x2000
+
+
+class RosSystem(StagedEvents):
+    """Staged events with words for the sequences that belong together.
+
+    Every method adds its events one after the other on the given thread; see `StagedEvents.add`.
+    Layouts differ in who stamps a message: rmw_publish (since Jazzy) or the DDS write.
+    """
+
+    def context(self, thread: Thread, handle: int = 0xC0) -> int:
+        """rcl_init."""
+        return self.add("ros2:rcl_init", thread, context_handle=handle, version="4.1.0")
+
+    def node(self, thread: Thread, handle: int, name: str, namespace: str = "/") -> int:
+        """rcl_node_init."""
+        return self.add(
+            "ros2:rcl_node_init", thread, node_handle=handle, node_name=name, namespace=namespace
+        )
+
+    def publisher(
+        self,
+        thread: Thread,
+        handle: int,
+        topic: str,
+        *,
+        node: int = 0x1,
+        rmw: int | None = None,
+        depth: int = 10,
+    ) -> int:
+        """rmw_publisher_init and rcl_publisher_init; returns the time of the latter."""
+        rmw_handle = handle + RMW if rmw is None else rmw
+        self.add("ros2:rmw_publisher_init", thread, rmw_publisher_handle=rmw_handle)
+        return self.add(
+            "ros2:rcl_publisher_init",
+            thread,
+            publisher_handle=handle,
+            node_handle=node,
+            rmw_publisher_handle=rmw_handle,
+            topic_name=topic,
+            queue_depth=depth,
+        )
+
+    def writer(self, thread: Thread, handle: int, topic: str) -> int:
+        """dds:create_writer of a publisher; topic as ROS has it."""
+        return self.add(
+            "dds:create_writer", thread, writer=handle + WRITER, topic_name=f"rt{topic}"
+        )
+
+    def subscription(
+        self,
+        thread: Thread,
+        handle: int,
+        topic: str,
+        *,
+        node: int = 0x1,
+        callback: int | None = None,
+        rmw: int | None = None,
+    ) -> int:
+        """The rcl subscription and, with a callback, its rclcpp object."""
+        rmw_handle = handle + RMW if rmw is None else rmw
+        self.add("ros2:rmw_subscription_init", thread, rmw_subscription_handle=rmw_handle)
+        created = self.add(
+            "ros2:rcl_subscription_init",
+            thread,
+            subscription_handle=handle,
+            node_handle=node,
+            rmw_subscription_handle=rmw_handle,
+            topic_name=topic,
+            queue_depth=10,
+        )
+        if callback is not None:
+            self.add(
+                "ros2:rclcpp_subscription_init",
+                thread,
+                subscription_handle=handle,
+                subscription=handle + WRITER,
+            )
+            self.subscription_callback(thread, handle + WRITER, callback)
+        return created
+
+    def subscription_callback(self, thread: Thread, subscription: int, callback: int) -> None:
+        """A callback is attached to an rclcpp subscription object and registered."""
+        self.add(
+            "ros2:rclcpp_subscription_callback_added",
+            thread,
+            subscription=subscription,
+            callback=callback,
+        )
+        self.add(
+            "ros2:rclcpp_callback_register", thread, callback=callback, symbol=f"f{callback:x}"
+        )
+
+    def buffer(self, thread: Thread, buffer: int, subscription: int) -> None:
+        """The ring buffer of an rclcpp subscription object."""
+        ipb = buffer + RMW
+        self.add("ros2:rclcpp_construct_ring_buffer", thread, buffer=buffer, capacity=10)
+        self.add("ros2:rclcpp_buffer_to_ipb", thread, buffer=buffer, ipb=ipb)
+        self.add("ros2:rclcpp_ipb_to_subscription", thread, ipb=ipb, subscription=subscription)
+
+    def timer(
+        self,
+        thread: Thread,
+        handle: int,
+        callback: int,
+        *,
+        node: int | None = 0x1,
+        period: int = 5_000_000,
+    ) -> int:
+        """A timer with its callback, linked to a node."""
+        created = self.add("ros2:rcl_timer_init", thread, timer_handle=handle, period=period)
+        self.add(
+            "ros2:rclcpp_timer_callback_added", thread, timer_handle=handle, callback=callback
+        )
+        self.add(
+            "ros2:rclcpp_callback_register", thread, callback=callback, symbol=f"f{callback:x}"
+        )
+        if node is not None:
+            self.add(
+                "ros2:rclcpp_timer_link_node", thread, timer_handle=handle, node_handle=node
+            )
+        return created
+
+    def publish(
+        self,
+        thread: Thread,
+        handle: int,
+        stamp: int | None = None,
+        *,
+        message: int = 0xA,
+        rmw: int | None = None,
+        layers: str = "rclcpp rcl rmw",
+    ) -> int:
+        """A publish() call whose rmw layer has the stamp; returns the time of its first layer."""
+        rmw_handle = handle + RMW if rmw is None else rmw
+        fields: dict[str, dict[str, Any]] = {
+            "rclcpp": {},
+            "rcl": {"publisher_handle": handle},
+            "rmw": {"rmw_publisher_handle": rmw_handle, "timestamp": stamp},
+        }
+        return min(
+            self.add(f"ros2:{layer}_publish", thread, message=message, **fields[layer])
+            for layer in layers.split()
+        )
+
+    def publish_dds(
+        self,
+        thread: Thread,
+        handle: int,
+        stamp: int,
+        *,
+        message: int = 0xA,
+        writer: int | None = None,
+        layers: str = "rclcpp rcl rmw write_pre write",
+    ) -> int:
+        """A publish() call whose stamp only the DDS write has; rmw_publish has no handle."""
+        fields: dict[str, tuple[str, dict[str, Any]]] = {
+            "rclcpp": ("ros2:rclcpp_publish", {"message": message}),
+            "rcl": ("ros2:rcl_publish", {"publisher_handle": handle, "message": message}),
+            "rmw": ("ros2:rmw_publish", {"message": message}),
+            "write_pre": ("dds:write_pre", {"writer": handle + WRITER, "data": message}),
+            "write": ("dds:write", {"writer": handle + WRITER, "timestamp": stamp}),
+        }
+        if writer is not None:
+            for layer in ("write_pre", "write"):
+                fields[layer][1]["writer"] = writer
+        return min(self.add(fields[layer][0], thread, **fields[layer][1]) for layer in layers.split())
+
+    def take(
+        self,
+        thread: Thread,
+        handle: int,
+        stamp: int,
+        *,
+        message: int = 0xB,
+        taken: int = 1,
+        rmw: int | None = None,
+        layers: str = "rmw rcl rclcpp",
+    ) -> int:
+        """A take of the rcl subscription `handle`; returns the time of rmw_take."""
+        rmw_handle = handle + RMW if rmw is None else rmw
+        fields: dict[str, dict[str, Any]] = {
+            "rmw": {
+                "rmw_subscription_handle": rmw_handle,
+                "source_timestamp": stamp,
+                "taken": taken,
+            },
+            "rcl": {},
+            "rclcpp": {},
+        }
+        return min(
+            self.add(f"ros2:{layer}_take", thread, message=message, **fields[layer])
+            for layer in layers.split()
+        )
+
+    def start(self, thread: Thread, callback: int, *, intra: bool = False) -> int:
+        """callback_start."""
+        return self.add(
+            "ros2:callback_start", thread, callback=callback, is_intra_process=int(intra)
+        )
+
+    def end(self, thread: Thread, callback: int) -> int:
+        """callback_end."""
+        return self.add("ros2:callback_end", thread, callback=callback)
+
+    def ready(self, thread: Thread) -> int:
+        """rclcpp_executor_get_next_ready."""
+        return self.add("ros2:rclcpp_executor_get_next_ready", thread)
+
+    def idle(self, thread: Thread) -> int:
+        """rclcpp_executor_wait_for_work."""
+        return self.add("ros2:rclcpp_executor_wait_for_work", thread, timeout=-1)
+
+    def execute(self, thread: Thread, handle: int) -> int:
+        """rclcpp_executor_execute."""
+        return self.add("ros2:rclcpp_executor_execute", thread, handle=handle)

@@ -1,0 +1,222 @@
+"""Staged events from readable rows: what a reader would have delivered, without any trace file.
+
+    events = StagedEvents()
+    events.add("ros2:rcl_publish", Thread(100), publisher_handle=0x10, message=0xA)
+
+`write` fills the tables of `raw` and `staging` that the model is built from; `Analysis` runs the
+rest of an ingest on them.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pyarrow as pa
+
+from msgflow.db.connection import connect
+from msgflow.db.derive import derive
+from msgflow.db.store import store
+from msgflow.ingest import model, staging
+from msgflow.ingest.catalogue import load
+from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
+
+STEP_NS = 10
+
+
+@dataclass(frozen=True)
+class Thread:
+    """Where an event happens; the main thread of its process where no tid is given."""
+
+    pid: int = 100
+    tid: int | None = None
+    name: str = "main"
+    cpu: int = 0
+    trace: int = 0
+    pid_ns: int | None = None
+
+    @property
+    def vtid(self) -> int:
+        return self.pid if self.tid is None else self.tid
+
+
+@dataclass(frozen=True)
+class Source:
+    """A trace: of which host, by which clock."""
+
+    hostname: str = "alpha"
+    clock: str = "boot"
+
+
+class StagedEvents:
+    """Events, packets and traces of one ingest, in the order in which they are added.
+
+    The total order is that of the time stamps, and of addition where they are equal. Without a
+    time stamp an event comes `STEP_NS` after the one added before. A trace has one packet per
+    CPU, which spans all its events, unless packets of it are added.
+    """
+
+    def __init__(self) -> None:
+        self.sources: dict[int, Source] = {0: Source()}
+        self._events: list[tuple[str, dict[str, Any]]] = []
+        self._packets: dict[int, list[dict[str, Any]]] = defaultdict(list)
+        self._now = 1_000
+
+    def add(self, name: str, thread: Thread, *, ts: int | None = None, **fields: Any) -> int:
+        """Add an event; fields left out are NULL. Returns its time stamp."""
+        known = {field.name for field in load().tracepoints[name].fields}
+        if fields.keys() - known:
+            raise ValueError(f"{name} has no field {', '.join(sorted(fields.keys() - known))}")
+        self._now = self._now + STEP_NS if ts is None else ts
+        self._events.append(
+            (
+                name,
+                {
+                    "ts_ns": self._now,
+                    "trace_index": thread.trace,
+                    "cpu_id": thread.cpu,
+                    "vpid": thread.pid,
+                    "vtid": thread.vtid,
+                    "procname": thread.name,
+                    "pid_ns": thread.pid_ns,
+                    **fields,
+                },
+            )
+        )
+        return self._now
+
+    def wait(self, duration_ns: int) -> None:
+        """Let time pass before the next event."""
+        self._now += duration_ns
+
+    def add_source(self, trace: int, hostname: str, clock: str) -> None:
+        """Add a trace, or change the one there is."""
+        self.sources[trace] = Source(hostname, clock)
+
+    def add_packet(
+        self,
+        begin: int,
+        end: int,
+        *,
+        last_event: int | None = None,
+        count: int = 1,
+        discarded: int = 0,
+        lost_packets: int = 0,
+        cpu: int = 0,
+        trace: int = 0,
+    ) -> None:
+        """Add a packet to the stream of a CPU; its last event is at its end unless given."""
+        position = sum(packet["cpu_id"] == cpu for packet in self._packets[trace])
+        self._packets[trace].append(
+            {
+                "trace_index": trace,
+                "stream_index": cpu,
+                "stream_class_id": 0,
+                "stream_instance_id": cpu,
+                "cpu_id": cpu,
+                "position": position,
+                "begin_ns": begin,
+                "end_ns": end,
+                "last_event_ns": (end if last_event is None else last_event) if count else None,
+                "event_count": count,
+                "discarded_event_count": discarded,
+                "lost_packet_count": lost_packets,
+            }
+        )
+
+    def lose(self, *, cpu: int = 0, trace: int = 0, count: int = 5) -> None:
+        """Declare that events are lost between the event added last and the next one added."""
+        self.add_packet(
+            self._now, self._now + 1, last_event=self._now, discarded=count, cpu=cpu, trace=trace
+        )
+
+    def ordered(self) -> list[tuple[str, dict[str, Any]]]:
+        """Return (name, columns) of all events in their total order, with their `event_id`."""
+        ordered = sorted(self._events, key=lambda event: event[1]["ts_ns"])
+        return [(name, {"event_id": n, **row}) for n, (name, row) in enumerate(ordered)]
+
+    def write(self, con: duckdb.DuckDBPyConnection) -> None:
+        """Fill `raw` and `staging` as reading the traces would."""
+        for index, source in sorted(self.sources.items()):
+            con.execute(
+                "INSERT INTO staging.source "
+                "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL)",
+                [
+                    index,
+                    f"trace-{index}",
+                    f"uuid-{index}",
+                    source.hostname,
+                    source.clock,
+                    source.clock,
+                ],
+            )
+        rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
+        for name, row in self.ordered():
+            rows[name].append(row)
+        for name, events in rows.items():
+            tracepoint = load().tracepoints[name]
+            schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
+            _insert(con, f"raw.{tracepoint.table}", events, schema)
+        _insert(con, "raw.packet", self._all_packets(), PACKET_SCHEMA)
+
+    def _all_packets(self) -> list[dict[str, Any]]:
+        whole = StagedEvents()
+        for trace in self.sources.keys() - self._packets.keys():
+            rows = [row for _, row in self._events if row["trace_index"] == trace]
+            for cpu in sorted({row["cpu_id"] for row in rows}):
+                times = [row["ts_ns"] for row in rows if row["cpu_id"] == cpu]
+                begin, end = min(r["ts_ns"] for r in rows), max(r["ts_ns"] for r in rows)
+                whole.add_packet(
+                    begin, end, last_event=max(times), count=len(times), cpu=cpu, trace=trace
+                )
+        packets = {**self._packets, **whole._packets}
+        return [packet for trace in sorted(packets) for packet in packets[trace]]
+
+
+def _insert(
+    con: duckdb.DuckDBPyConnection, table: str, rows: list[dict[str, Any]], schema: pa.Schema
+) -> None:
+    con.register("staged_rows", pa.Table.from_pylist(rows, schema=schema))
+    con.execute(f"INSERT INTO {table} SELECT * FROM staged_rows")
+    con.unregister("staged_rows")
+
+
+class Analysis:
+    """What an ingest makes of staged events: run 1 of a database."""
+
+    def __init__(self, empty_database: Path, directory: Path, events: StagedEvents) -> None:
+        path = directory / "analysis.duckdb"
+        shutil.copyfile(empty_database, path)
+        self.connection = connect(path, read_only=False)
+        self.connection.execute("SET threads = 1")
+        staging.attach(self.connection, Path(":memory:"))
+        events.write(self.connection)
+        model.build(self.connection, keep=True)
+        self.connection.begin()
+        store(self.connection, 1)
+        self.connection.execute(
+            "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
+            "VALUES (1, 'case', TIMESTAMP '1970-01-01', '', '')"
+        )
+        derive(self.connection, 1)
+        self.connection.commit()
+
+    def rows(self, sql: str) -> list[tuple[Any, ...]]:
+        """Return the rows of a query."""
+        return self.connection.execute(sql).fetchall()
+
+    def value(self, sql: str) -> Any:
+        """Return the only value of a query that gives one row of one column."""
+        ((value,),) = self.rows(sql)
+        return value
+
+    def column(self, sql: str) -> list[Any]:
+        """Return the values of a query that gives one column."""
+        return [value for (value,) in self.rows(sql)]
+
+    def close(self) -> None:
+        self.connection.close()
