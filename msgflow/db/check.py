@@ -56,25 +56,30 @@ def _audits(con: duckdb.DuckDBPyConnection) -> Iterator[CheckResult]:
 
 
 def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
-    for table in metadata.tables.values():
-        for column in table.columns:
-            reference = column.info.get("references")
-            if reference is None or reference == f"{table.name}.{column.name}":
-                continue
-            parent, key = reference.split(".")
-            offending = _count(
-                con,
-                f"SELECT count(*) FROM {table.fullname} AS child "
-                f"ANTI JOIN {SCHEMA}.{parent} AS parent ON child.{column.name} = parent.{key} "
-                f"WHERE child.{column.name} IS NOT NULL "
-                + ("" if run_id is None else f"AND child.run_id = {run_id:d}"),
-            )
-            yield CheckResult(
-                f"relation.{table.name}.{column.name}",
-                "error",
-                offending,
-                f"Every {column.name} of {table.name} is a row of {parent}.",
-            )
+    relations = [
+        (table, column, reference)
+        for table in metadata.tables.values()
+        for column in table.columns
+        if (reference := column.info.get("references")) not in (None, f"{table.name}.{column.name}")
+    ]
+    of_run = "" if run_id is None else f"AND child.run_id = {run_id:d}"
+    counts = con.execute(
+        " UNION ALL ".join(
+            f"SELECT {number}, count(*) FROM {table.fullname} AS child "
+            f"ANTI JOIN {SCHEMA}.{reference.partition('.')[0]} AS parent "
+            f"ON child.{column.name} = parent.{reference.partition('.')[2]} "
+            f"WHERE child.{column.name} IS NOT NULL {of_run}"
+            for number, (table, column, reference) in enumerate(relations)
+        )
+    ).fetchall()
+    for number, row_count in sorted(counts):
+        table, column, reference = relations[number]
+        yield CheckResult(
+            f"relation.{table.name}.{column.name}",
+            "error",
+            row_count,
+            f"Every {column.name} of {table.name} is a row of {reference.partition('.')[0]}.",
+        )
 
 
 def _count(con: duckdb.DuckDBPyConnection, query: str) -> int:

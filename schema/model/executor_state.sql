@@ -4,24 +4,24 @@
 -- grain: one row per executor event
 -- needs: staging.thread_event, staging.thread_gap, staging.executor_thread,
 --     staging.callback_instance
-WITH numbered AS (
+WITH lasting AS (
     SELECT
-        thread_id, event_id, row_number() OVER (PARTITION BY thread_id ORDER BY event_id) AS segment
-    FROM staging.thread_gap
+        event_id, ts_ns, thread_id, kind,
+        lead(ts_ns) OVER (PARTITION BY thread_id ORDER BY event_id) AS next_ns
+    FROM staging.thread_event
+    WHERE kind IN ('process', 'wait', 'execute')
 ),
-executor_event AS (
-    SELECT
-        e.event_id, e.ts_ns, e.thread_id, e.kind::VARCHAR AS state,
-        coalesce(g.segment, 0) AS segment
-    FROM staging.thread_event AS e
-    ASOF LEFT JOIN numbered AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id
-    WHERE e.kind IN ('process', 'wait', 'execute')
+interrupted AS (
+    SELECT DISTINCT l.event_id
+    FROM staging.thread_gap AS g
+    ASOF JOIN lasting AS l ON g.thread_id = l.thread_id AND g.event_id > l.event_id
 ),
 state AS (
     SELECT
-        event_id, ts_ns, thread_id, state,
-        lead(ts_ns) OVER (PARTITION BY thread_id, segment ORDER BY event_id) AS end_ns
-    FROM executor_event
+        l.event_id, l.ts_ns, l.thread_id, l.kind::VARCHAR AS state,
+        CASE WHEN i.event_id IS NULL THEN l.next_ns END AS end_ns
+    FROM lasting AS l
+    LEFT JOIN interrupted AS i ON l.event_id = i.event_id
 ),
 first_run AS (
     SELECT s.event_id, min(c.callback_instance_id) AS callback_instance_id
@@ -42,4 +42,3 @@ SELECT
 FROM state AS s
 LEFT JOIN staging.executor_thread AS t ON s.thread_id = t.thread_id
 LEFT JOIN first_run AS r ON s.event_id = r.event_id
-ORDER BY s.event_id

@@ -59,7 +59,6 @@ root AS MATERIALIZED (
         ON from_event <> 'publish'
         AND r.root_kind = 'callback_instance'
         AND r.root_id = i.callback_instance_id
-
     WHERE list_contains(runs, r.run_id)
         AND CASE WHEN from_topic IS NULL THEN r.is_source ELSE p.topic_name = from_topic END
         AND coalesce(i.start_ns, b.start_ns) >= window_start_ns

@@ -1,13 +1,11 @@
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from ros_system import RosSystem
-from staged_events import Analysis
-
-Analyse = Callable[[RosSystem], Analysis]
+from staged_events import Analyse, Analysis, StagedEvents
 
 
 @pytest.fixture
@@ -21,7 +19,7 @@ def analyse(empty_database: Path, tmp_path: Path) -> Iterator[Analyse]:
     """Builds the model of a system and derives its links."""
     opened: list[Analysis] = []
 
-    def run(events: RosSystem) -> Analysis:
+    def run(events: StagedEvents) -> Analysis:
         directory = tmp_path / str(len(opened))
         directory.mkdir()
         opened.append(Analysis(empty_database, directory, events))

@@ -122,16 +122,12 @@ class RosSystem(StagedEvents):
     ) -> int:
         """A timer with its callback, linked to a node."""
         created = self.add("ros2:rcl_timer_init", thread, timer_handle=handle, period=period)
-        self.add(
-            "ros2:rclcpp_timer_callback_added", thread, timer_handle=handle, callback=callback
-        )
+        self.add("ros2:rclcpp_timer_callback_added", thread, timer_handle=handle, callback=callback)
         self.add(
             "ros2:rclcpp_callback_register", thread, callback=callback, symbol=f"f{callback:x}"
         )
         if node is not None:
-            self.add(
-                "ros2:rclcpp_timer_link_node", thread, timer_handle=handle, node_handle=node
-            )
+            self.add("ros2:rclcpp_timer_link_node", thread, timer_handle=handle, node_handle=node)
         return created
 
     def publish(
@@ -177,7 +173,9 @@ class RosSystem(StagedEvents):
         if writer is not None:
             for layer in ("write_pre", "write"):
                 fields[layer][1]["writer"] = writer
-        return min(self.add(fields[layer][0], thread, **fields[layer][1]) for layer in layers.split())
+        return min(
+            self.add(fields[layer][0], thread, **fields[layer][1]) for layer in layers.split()
+        )
 
     def take(
         self,

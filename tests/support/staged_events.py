@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import shutil
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -220,3 +221,6 @@ class Analysis:
 
     def close(self) -> None:
         self.connection.close()
+
+
+Analyse = Callable[[StagedEvents], Analysis]
