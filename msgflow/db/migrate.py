@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import duckdb
+    from alembic.config import Config
     from sqlalchemy.engine import Connection
 
 
@@ -145,15 +146,37 @@ def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
     return tuple(name for _, name in stale)
 
 
+def downgrade(con: duckdb.DuckDBPyConnection, revision: str) -> None:
+    """Take the tables back to an older revision; the views go with them.
+
+    Args:
+        con: a writable connection.
+        revision: the revision to go back to, or 'base' for no tables at all.
+    """
+    from alembic import command
+
+    with con.cursor() as cursor:
+        cursor.begin()
+        objects.drop(cursor)
+        cursor.commit()
+    with sqlalchemy_connection(con) as connection:
+        command.downgrade(_alembic_config(connection), revision)
+
+
 def _alembic_upgrade(connection: Connection) -> None:
     from alembic import command
+
+    command.upgrade(_alembic_config(connection), "head")
+
+
+def _alembic_config(connection: Connection) -> Config:
     from alembic.config import Config
 
     config = Config()
     config.set_main_option("script_location", str(resource_directory("migrations")))
     config.set_main_option("path_separator", "os")
     config.attributes["connection"] = connection
-    command.upgrade(config, "head")
+    return config
 
 
 @contextmanager

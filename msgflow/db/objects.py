@@ -103,7 +103,7 @@ def apply(con: duckdb.DuckDBPyConnection) -> None:
 
     Objects that no longer exist in `schema/` are dropped.
     """
-    _drop(con)
+    drop(con)
     for header in views():
         con.execute(create_statement(header))
         if header.kind == "view":
@@ -122,7 +122,8 @@ def create_statement(header: Header) -> str:
     return f"CREATE OR REPLACE VIEW {header.name} AS\n{header.body}"
 
 
-def _drop(con: duckdb.DuckDBPyConnection) -> None:
+def drop(con: duckdb.DuckDBPyConnection) -> None:
+    """Drop all views and macros, inside the open transaction."""
     con.execute("CREATE SCHEMA IF NOT EXISTS derive")
     for schema, name in con.execute(
         "SELECT schema_name, view_name FROM duckdb_views() WHERE NOT internal "

@@ -16,8 +16,11 @@ layer AS (
     SELECT
         e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.kind, e.handle, e.message, e.value,
         e.previous.event_id AS previous_event_id,
-        e.previous.kind IN ('intra', 'enqueue') AND e.kind = 'rclcpp' AS follows_intra,
-        CASE
+        coalesce(
+            e.previous.kind IN ('intra', 'enqueue') AND e.kind = 'rclcpp' AND g.event_id IS NULL,
+            false
+        ) AS follows_intra,
+        coalesce(CASE
             WHEN g.event_id IS NOT NULL THEN false
             WHEN e.kind = 'enqueue' THEN e.previous.kind IN ('intra', 'enqueue')
             WHEN e.kind = 'rcl' THEN e.previous.kind = 'rclcpp' AND e.previous.message = e.message
@@ -37,7 +40,7 @@ layer AS (
             WHEN e.kind IN ('caret_copy', 'caret_stamp') THEN
                 e.previous.kind IN ('rcl', 'rmw', 'caret_write', 'caret_copy')
             ELSE false
-        END AS continues
+        END, false) AS continues
     FROM staging.thread_event AS e
     LEFT JOIN staging.thread_gap AS g ON e.event_id = g.event_id
     LEFT JOIN write_first AS w ON e.event_id = w.event_id

@@ -1,14 +1,16 @@
 -- name: staging.publication_origin
 -- description: The publisher of each call: by rcl handle, else rmw handle, else DDS writer, each as
 --     initialised last before the call. The rcl handle of /rosout is that of a temporary object:
---     a call without rclcpp layer whose handle was never initialised belongs to the process's only
---     /rosout publisher. What only the middleware publishes has none.
+--     a call without rclcpp layer whose handle was never initialised, and that nothing else
+--     identifies, belongs to the process's only /rosout publisher. What only the middleware
+--     publishes has none.
 -- grain: one row per publish() call
 -- needs: staging.publication_call, staging.publisher_known, staging.thread
 WITH call AS (
     SELECT
         c.start_event_id, t.process_id, c.publisher_handle, c.rmw_handle, c.writer,
-        c.rclcpp_ns IS NULL AND c.intra_ns IS NULL AS is_below_rclcpp
+        c.rclcpp_ns IS NULL AND c.intra_ns IS NULL AND c.publisher_handle IS NOT NULL
+        AND c.rmw_handle IS NULL AND c.writer IS NULL AS may_be_rosout
     FROM staging.publication_call AS c
     JOIN staging.thread AS t ON c.thread_id = t.thread_id
 ),
@@ -22,7 +24,7 @@ by_rcl AS (
 ),
 not_by_rcl AS (
     SELECT c.start_event_id, c.process_id, c.publisher_handle, c.rmw_handle, c.writer,
-        c.is_below_rclcpp
+        c.may_be_rosout
     FROM call AS c
     ANTI JOIN by_rcl AS r ON c.start_event_id = r.start_event_id
 ),
@@ -57,12 +59,10 @@ resolved AS (
             m.publisher_event_id,
             w.publisher_event_id,
             CASE
-                WHEN c.is_below_rclcpp AND c.publisher_handle IS NOT NULL
-                    AND o.publisher_count = 1
-                    THEN o.publisher_event_id
+                WHEN c.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id
             END
         ) AS publisher_event_id,
-        c.is_below_rclcpp AND o.publisher_count > 1 AS is_rosout
+        c.may_be_rosout AND o.publisher_count > 1 AS is_rosout
     FROM not_by_rcl AS c
     LEFT JOIN by_rmw AS m ON c.start_event_id = m.start_event_id
     LEFT JOIN by_writer AS w ON c.start_event_id = w.start_event_id

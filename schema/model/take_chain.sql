@@ -1,12 +1,13 @@
 -- name: staging.take_chain
 -- description: Layers of one take stitched together, as for publications. An rmw take that failed
---     is none; one that no rcl take follows is the middleware's own where rcl takes are traced.
+--     is none; one without rcl take is the middleware's own, where its reader belongs to no rcl
+--     subscription although rcl takes are traced.
 -- grain: one row per successful take or dequeue
--- needs: staging.thread_event, staging.thread_gap, staging.thread
+-- needs: staging.thread_event, staging.thread_gap, staging.thread, staging.subscription_known
 WITH layer AS (
     SELECT
         e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.kind, e.handle, e.value,
-        CASE
+        coalesce(CASE
             WHEN g.event_id IS NOT NULL THEN false
             WHEN e.kind IN ('rmw_take', 'rmw_take_failed') THEN
                 e.previous.kind = 'dds_read' AND e.previous.message = e.message
@@ -18,7 +19,7 @@ WITH layer AS (
                 e.previous.kind IN ('rmw_take', 'rcl_take', 'rclcpp_take')
                 AND e.previous.message = e.message
             ELSE false
-        END AS continues
+        END, false) AS continues
     FROM staging.thread_event AS e
     LEFT JOIN staging.thread_gap AS g ON e.event_id = g.event_id
     WHERE e.kind IN (
@@ -52,6 +53,9 @@ chain AS (
     FROM chained
     GROUP BY chain_id
 ),
+known_reader AS (
+    SELECT DISTINCT process_id, rmw_handle FROM staging.subscription_known
+),
 rcl_traced AS (
     SELECT DISTINCT t.process_id
     FROM chain AS c
@@ -77,7 +81,12 @@ SELECT
 FROM chain AS c
 JOIN staging.thread AS t ON c.thread_id = t.thread_id
 LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
+LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND c.rmw_handle = k.rmw_handle
 WHERE c.dequeue_ns IS NOT NULL
     OR c.rcl_ns IS NOT NULL
     OR c.caret_ns IS NOT NULL
-    OR (c.rmw_ns IS NOT NULL AND r.process_id IS NULL AND c.source_timestamp_ns IS NOT NULL)
+    OR (
+        c.rmw_ns IS NOT NULL
+        AND c.source_timestamp_ns IS NOT NULL
+        AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
+    )
