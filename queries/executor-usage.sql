@@ -15,8 +15,8 @@
 -- column: wait_ns BIGINT [ns]       Waiting for work
 -- column: process_ns BIGINT [ns]    Looking for what is ready
 -- column: execute_ns BIGINT [ns]    Executing, with taking messages
--- column: callback_ns BIGINT [ns]   In callbacks, nested ones not counted twice
--- column: callbacks BIGINT          Callbacks run
+-- column: callback_ns BIGINT [ns]   In callbacks that were seen to end, nested time counted once
+-- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE     Callback time by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
 -- column: thread_id BIGINT          Identity of the thread
@@ -47,23 +47,21 @@ in_state AS (
 state AS (
     SELECT
         thread_id,
-        sum(CASE WHEN state = 'wait' THEN duration_ns END)::BIGINT AS wait_ns,
-        sum(CASE WHEN state = 'process' THEN duration_ns END)::BIGINT AS process_ns,
-        sum(CASE WHEN state = 'execute' THEN duration_ns END)::BIGINT AS execute_ns
+        sum(CASE WHEN state = 'wait' THEN duration_ns ELSE 0 END)::BIGINT AS wait_ns,
+        sum(CASE WHEN state = 'process' THEN duration_ns ELSE 0 END)::BIGINT AS process_ns,
+        sum(CASE WHEN state = 'execute' THEN duration_ns ELSE 0 END)::BIGINT AS execute_ns
     FROM in_state
     GROUP BY thread_id
 ),
 callback AS (
     SELECT
         m.thread_id,
-        count(*) AS callbacks,
+        count(*) FILTER (WHERE i.start_ns >= $start_ns AND i.start_ns < $end_ns) AS callbacks,
         sum(
             greatest(least(i.end_ns, m.last_ns) - greatest(i.start_ns, m.first_ns), 0)
-        )::BIGINT AS callback_ns
+        ) FILTER (WHERE i.parent_id IS NULL AND i.end_ns IS NOT NULL)::BIGINT AS callback_ns
     FROM member AS m
     JOIN main.callback_instance AS i ON m.thread_id = i.thread_id
-    WHERE i.parent_id IS NULL AND i.start_ns < m.last_ns
-        AND coalesce(i.end_ns, i.start_ns) >= m.first_ns
     GROUP BY m.thread_id
 )
 SELECT

@@ -135,7 +135,8 @@ CREATE TABLE store.publisher (
     queue_depth      BIGINT,                     -- History depth asked for
     created_ns       BIGINT,                     -- First initialisation event [epoch ns]
     is_internal      BOOLEAN NOT NULL,           -- Infrastructure of ROS (/rosout, /parameter_events, ...)
-    is_inferred      BOOLEAN NOT NULL            -- Its initialisation was not traced
+    is_inferred      BOOLEAN NOT NULL,           -- Its initialisation was not traced
+    is_topic_learned BOOLEAN                     -- Its topic was deduced from a link; NULL: no
 );
 
 -- One row per subscription.
@@ -151,7 +152,8 @@ CREATE TABLE store.subscription (
     queue_depth         BIGINT,                  -- History depth asked for
     created_ns          BIGINT,                  -- First initialisation event [epoch ns]
     is_internal         BOOLEAN NOT NULL,        -- Infrastructure of ROS (/parameter_events, /clock, ...)
-    is_inferred         BOOLEAN NOT NULL         -- Its initialisation was not traced
+    is_inferred         BOOLEAN NOT NULL,        -- Its initialisation was not traced
+    is_topic_learned    BOOLEAN                  -- Its topic was deduced from a link; NULL: no
 );
 
 -- One row per timer.

@@ -321,6 +321,9 @@ def upgrade() -> None:
         sa.Column(
             "is_inferred", sa.Boolean(), nullable=False, comment="Its initialisation was not traced"
         ),
+        sa.Column(
+            "is_topic_learned", sa.Boolean(), comment="Its topic was deduced from a link; NULL: no"
+        ),
         schema="store",
         comment="One row per publisher",
     )
@@ -358,6 +361,9 @@ def upgrade() -> None:
         ),
         sa.Column(
             "is_inferred", sa.Boolean(), nullable=False, comment="Its initialisation was not traced"
+        ),
+        sa.Column(
+            "is_topic_learned", sa.Boolean(), comment="Its topic was deduced from a link; NULL: no"
         ),
         schema="store",
         comment="One row per subscription",

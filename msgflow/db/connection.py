@@ -55,7 +55,10 @@ def open_file(
     if not read_only:
         config["storage_compatibility_version"] = STORAGE_VERSION
     try:
-        return duckdb.connect(str(path), read_only=read_only, config=config)
+        con = duckdb.connect(str(path), read_only=read_only, config=config)
+        # stdout is for data: DuckDB would draw its bar there when a statement takes long.
+        con.execute("SET enable_progress_bar = false")
+        return con
     except duckdb.IOException as error:
         text = str(error)
         if "lock" in text.lower():

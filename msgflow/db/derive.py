@@ -12,6 +12,26 @@ if TYPE_CHECKING:
 # Tables of `store` that hold the rows of the view of that name in `derive`.
 DERIVED = ("link_transport", "link_causal")
 
+# Tables of `store` whose rows can learn their topic from a link.
+_TOPIC_OWNERS = ("publisher", "subscription")
+
+_PATHS_SHOWN = 3
+
+_PATH_CUT = """
+INSERT INTO store.diagnostic (run_id, name, severity, count, detail)
+SELECT
+    run_id,
+    'path_cut',
+    'warning',
+    count(*),
+    'chains of topics that go on or have siblings beyond the limits of path enumeration (give '
+    || 'e2e-latency --from, --to, --max-depth or --max-paths), among them '
+    || array_to_string(list(path ORDER BY path_id)[1:$shown], '; ')
+FROM main.flow_path([$run_id], NULL, NULL)
+WHERE is_cut
+GROUP BY run_id
+"""
+
 
 def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Derive the links of a run anew, inside the open transaction.
@@ -20,6 +40,7 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         con: a writable connection to a database with current views.
         run_id: the run; nothing happens to others.
     """
+    _forget_topics(con, run_id)
     for name in DERIVED:
         columns = ", ".join(
             row[0]
@@ -35,10 +56,37 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
             f"SELECT {columns} FROM derive.{name} WHERE run_id = ?",
             [run_id],
         )
+    _learn_topics(con, run_id)
+    con.execute(
+        "DELETE FROM store.diagnostic WHERE run_id = ? AND name = 'path_cut'",
+        [run_id],
+    )
+    con.execute(_PATH_CUT, {"run_id": run_id, "shown": _PATHS_SHOWN})
     con.execute(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [objects.derivation_hash(), run_id],
     )
+
+
+def _forget_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    for kind in _TOPIC_OWNERS:
+        con.execute(
+            f"UPDATE store.{kind} SET topic_name = NULL, is_internal = false, "
+            "is_topic_learned = false WHERE run_id = ? AND is_topic_learned",
+            [run_id],
+        )
+
+
+def _learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    for kind in _TOPIC_OWNERS:
+        con.execute(
+            f"UPDATE store.{kind} SET topic_name = learned.topic_name, "
+            "is_internal = learned.is_internal, is_topic_learned = true "
+            "FROM derive.topic_learned AS learned "
+            f"WHERE learned.kind = '{kind}' AND {kind}.{kind}_id = learned.id "
+            f"AND {kind}.run_id = ? AND learned.run_id = ?",
+            [run_id, run_id],
+        )
 
 
 def stale_runs(con: duckdb.DuckDBPyConnection) -> list[tuple[int, str]]:

@@ -283,6 +283,7 @@ publisher = _table(
     _time("created_ns", "First initialisation event"),
     _flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
     _flag("is_inferred", "Its initialisation was not traced"),
+    _column("is_topic_learned", Boolean, "Its topic was deduced from a link; NULL: no"),
 )
 
 subscription = _table(
@@ -300,6 +301,7 @@ subscription = _table(
     _time("created_ns", "First initialisation event"),
     _flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
     _flag("is_inferred", "Its initialisation was not traced"),
+    _column("is_topic_learned", Boolean, "Its topic was deduced from a link; NULL: no"),
 )
 
 timer = _table(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 RESERVED = ("runs", "start_ns", "end_ns")
 INTERNAL_COLUMN = "is_internal"
+CUT_COLUMN = "is_cut"
 
 
 def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
@@ -84,6 +85,7 @@ def run_query(
         if hidden:
             rows = "1 internal row is" if hidden == 1 else f"{hidden} internal rows are"
             notes.append(f"{rows} hidden; --internal shows them")
+    notes += _cut(table)
     return QueryResult(table, header, runs, notes)
 
 
@@ -136,6 +138,15 @@ def _fit(param: Param, value: Value) -> Value:
             f"{param.name} has no such value — {value}", f"choose {' or '.join(param.choices)}"
         )
     return value
+
+
+def _cut(table: pa.Table) -> list[str]:
+    from pyarrow import compute
+
+    if CUT_COLUMN not in table.column_names or not compute.any(table[CUT_COLUMN]).as_py():
+        return []
+    number = compute.sum(table[CUT_COLUMN]).as_py()
+    return [f"{number} of the rows are cut off by the limits of the query, see {CUT_COLUMN}"]
 
 
 def _parameters(header: Header) -> str:

@@ -1,8 +1,9 @@
 -- name: derive.link_transport_exact
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
 --     known. A topic unknown on a side counts only where the stamp alone has a single candidate in
---     the run. Of several publications with equal topic and stamp the k-th belongs to the k-th
---     such take of a subscription. Equal values need no clocks: a take may seem to precede.
+--     the run, and does not put one publication on two topics. Of several publications with equal
+--     topic and stamp the k-th belongs to the k-th such take of a subscription. Equal values need
+--     no clocks: a take may seem to precede.
 -- grain: one row per take whose publication is known by its stamp
 -- needs: store.publication, store.publisher, store.take, store.subscription
 WITH published AS (
@@ -30,6 +31,7 @@ candidate AS (
         r.start_event_id AS take_event_id,
         p.publication_id,
         p.start_event_id AS publication_event_id,
+        r.topic_name AS take_topic,
         coalesce(r.topic_name = p.topic_name, false) AS is_topic_known
     FROM received AS r
     JOIN published AS p
@@ -42,9 +44,13 @@ counted AS (
         run_id, take_id, subscription_id, source_timestamp_ns, take_event_id, publication_id,
         publication_event_id, is_topic_known,
         count(*) OVER same_take AS candidate_count,
-        count(CASE WHEN is_topic_known THEN 1 END) OVER same_take AS known_count
+        count(CASE WHEN is_topic_known THEN 1 END) OVER same_take AS known_count,
+        min(take_topic) OVER same_publication IS DISTINCT FROM max(take_topic)
+            OVER same_publication AS has_several_topics
     FROM candidate
-    WINDOW same_take AS (PARTITION BY run_id, take_id)
+    WINDOW
+        same_take AS (PARTITION BY run_id, take_id),
+        same_publication AS (PARTITION BY run_id, publication_id)
 ),
 unique_match AS (
     SELECT
@@ -52,7 +58,7 @@ unique_match AS (
         CASE WHEN is_topic_known THEN 'exact' ELSE 'exact_stamp' END AS method
     FROM counted
     WHERE CASE WHEN known_count > 0 THEN is_topic_known AND known_count = 1
-        ELSE candidate_count = 1 END
+        ELSE candidate_count = 1 AND NOT has_several_topics END
 ),
 ordered AS (
     SELECT

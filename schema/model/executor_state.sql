@@ -12,23 +12,25 @@ WITH lasting AS (
     WHERE kind IN ('process', 'wait', 'execute')
 ),
 interrupted AS (
-    SELECT DISTINCT l.event_id
+    SELECT l.event_id, min(g.event_id) AS gap_event_id
     FROM staging.thread_gap AS g
     ASOF JOIN lasting AS l ON g.thread_id = l.thread_id AND g.event_id > l.event_id
+    GROUP BY l.event_id
 ),
 state AS (
     SELECT
         l.event_id, l.ts_ns, l.thread_id, l.kind::VARCHAR AS state,
-        CASE WHEN i.event_id IS NULL THEN l.next_ns END AS end_ns
+        CASE WHEN i.event_id IS NULL THEN l.next_ns END AS end_ns,
+        i.gap_event_id
     FROM lasting AS l
     LEFT JOIN interrupted AS i ON l.event_id = i.event_id
 ),
 first_run AS (
     SELECT s.event_id, min(c.callback_instance_id) AS callback_instance_id
-    FROM (SELECT * FROM staging.callback_instance WHERE depth = 1) AS c
+    FROM staging.callback_instance AS c
     ASOF JOIN state AS s
         ON c.thread_id = s.thread_id AND c.start_event_id > s.event_id
-    WHERE s.end_ns IS NULL OR c.start_ns <= s.end_ns
+    WHERE s.gap_event_id IS NULL OR c.start_event_id < s.gap_event_id
     GROUP BY s.event_id
 )
 SELECT

@@ -2,8 +2,8 @@
 -- description: Gaps of the traces. Lost events lie between the last event of a packet whose
 --     discard counter rose and that packet's end, on its CPU only. Lost packets lie between the
 --     packets around them. Tracing was paused where all streams of a trace are silent at once
---     between packets: continuous packets begin where the previous one ended. An empty packet
---     ends no pause: stopping flushes one into every stream.
+--     between packets: continuous packets begin where the previous one ended. What comes after the
+--     last packet with events is no pause: stopping flushes an empty one into every stream.
 -- grain: one row per gap in a trace
 -- needs: staging.packet
 WITH lost_event AS (
@@ -43,7 +43,8 @@ covered AS (
     SELECT
         trace_index,
         begin_ns,
-        event_count,
+        max(CASE WHEN event_count > 0 THEN begin_ns END) OVER (PARTITION BY trace_index)
+            AS last_begin_ns,
         max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) OVER (
             PARTITION BY trace_index ORDER BY begin_ns, stream_index, position
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
@@ -59,7 +60,7 @@ pause AS (
         begin_ns AS end_ns,
         NULL::BIGINT AS event_count
     FROM covered
-    WHERE begin_ns > covered_until_ns AND event_count > 0
+    WHERE begin_ns > covered_until_ns AND begin_ns <= last_begin_ns
 )
 SELECT trace_id, cpu, kind, start_ns, end_ns, event_count FROM lost_event
 UNION ALL

@@ -14,7 +14,7 @@ SELECT
     c.run_id,
     derive.node_label(n.full_name, p.name, p.pid) AS node,
     CASE c.kind
-        WHEN 'timer' THEN printf('Timer(%.10g ms)', t.period_ns / 1e6)
+        WHEN 'timer' THEN coalesce(printf('Timer(%.10g ms)', t.period_ns / 1e6), 'Timer(?)')
         WHEN 'subscription' THEN printf('Subscription(%s)', coalesce(s.topic_name, '?'))
         WHEN 'service' THEN printf('Service(%s)', coalesce(v.service_name, '?'))
         ELSE printf('Callback(0x%x)', c.callback_handle)

@@ -51,7 +51,8 @@ root AS MATERIALIZED (
         r.publisher_id,
         CASE WHEN i.callback_instance_id IS NULL THEN -r.publication_id
             ELSE i.callback_instance_id END AS root_key,
-        coalesce(i.start_ns, b.start_ns) AS root_ns
+        coalesce(i.start_ns, b.start_ns) AS root_ns,
+        b.start_ns AS published_ns
     FROM derive.flow_root AS r
     JOIN main.publication AS b ON r.publication_id = b.publication_id
     JOIN store.publisher AS p ON r.publisher_id = p.publisher_id
@@ -65,7 +66,7 @@ root AS MATERIALIZED (
         AND coalesce(i.start_ns, b.start_ns) < window_end_ns
 ),
 transport AS MATERIALIZED (
-    SELECT run_id, publication_id, publisher_id, take_id, subscription_id
+    SELECT publication_id, publisher_id, take_id, subscription_id
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
@@ -117,7 +118,7 @@ pair AS MATERIALIZED (
 expected AS MATERIALIZED (
     SELECT
         p.run_id, p.path_id, r.root_key, min(r.root_ns) AS root_ns,
-        max(r.publication_id) AS publication_id
+        arg_max(r.publication_id, r.published_ns) AS publication_id
     FROM path AS p
     JOIN root AS r ON p.first_publisher_id = r.publisher_id
     WHERE p.is_path
@@ -135,45 +136,66 @@ lineage (path_id, prefix_id, depth, parent_path_id) AS (
     FROM lineage AS l
     JOIN path AS p ON l.parent_path_id = p.path_id
 ),
+-- How far each root that did not arrive came: its last take on the way, by depth, then time.
 progress AS (
     SELECT
         m.path_id, m.root_key,
-        coalesce(max(l.depth) FILTER (WHERE r.take_id IS NOT NULL), 0) AS depth,
-        arg_max(r.take_id, l.depth) FILTER (WHERE r.take_id IS NOT NULL) AS take_id
+        max(
+            CASE WHEN r.take_id IS NOT NULL THEN
+                struct_pack(depth := l.depth, taken_ns := t.taken_ns, take_id := r.take_id)
+            END
+        ) AS last_take
     FROM missing AS m
     JOIN lineage AS l ON m.path_id = l.path_id
     LEFT JOIN reached AS r ON l.prefix_id = r.path_id AND m.root_key = r.root_key
+    LEFT JOIN main.take AS t ON r.take_id = t.take_id
     GROUP BY m.path_id, m.root_key
 ),
 -- The step at which each root that did not arrive got stuck; none where only the end is missing.
 stuck AS (
     SELECT
-        m.path_id, m.root_key, p.take_id, p.depth, n.publisher_id, n.subscription_id,
-        n.is_cached,
-        CASE WHEN p.depth = 0 THEN m.publication_id ELSE c.publication_id END AS publication_id
+        m.path_id, m.root_key, p.last_take.take_id AS take_id, p.last_take.taken_ns AS taken_ns,
+        n.publisher_id, n.subscription_id, n.is_cached,
+        CASE WHEN p.last_take IS NULL THEN m.publication_id ELSE c.publication_id END
+            AS publication_id
     FROM missing AS m
     JOIN progress AS p ON m.path_id = p.path_id AND m.root_key = p.root_key
-    LEFT JOIN lineage AS l ON m.path_id = l.path_id AND l.depth = p.depth + 1
+    LEFT JOIN lineage AS l
+        ON m.path_id = l.path_id AND l.depth = coalesce(p.last_take.depth, 0) + 1
     LEFT JOIN path AS n ON l.prefix_id = n.path_id
     LEFT JOIN (
         SELECT take_id, publisher_id, max(publication_id) AS publication_id
         FROM continuation
         GROUP BY take_id, publisher_id
-    ) AS c ON p.take_id = c.take_id AND n.publisher_id = c.publisher_id
+    ) AS c ON p.last_take.take_id = c.take_id AND n.publisher_id = c.publisher_id
 ),
+-- When messages passed each step, as far as a root got stuck there.
 delivered AS (
     SELECT
-        publisher_id, subscription_id,
-        min(publication_id) AS first_publication_id,
-        max(publication_id) AS last_publication_id
-    FROM transport
-    GROUP BY publisher_id, subscription_id
+        t.publisher_id, t.subscription_id,
+        min(b.start_ns) AS first_ns,
+        max(b.start_ns) AS last_ns
+    FROM transport AS t
+    JOIN main.publication AS b ON t.publication_id = b.publication_id
+    WHERE t.publisher_id IN (SELECT publisher_id FROM stuck)
+    GROUP BY t.publisher_id, t.subscription_id
 ),
 continued AS (
     SELECT
-        subscription_id, publisher_id, min(take_id) AS first_take_id, max(take_id) AS last_take_id
-    FROM continuation
-    GROUP BY subscription_id, publisher_id
+        c.subscription_id, c.publisher_id,
+        min(t.taken_ns) AS first_ns,
+        max(t.taken_ns) AS last_ns
+    FROM continuation AS c
+    JOIN main.take AS t ON c.take_id = t.take_id
+    WHERE c.publisher_id IN (SELECT publisher_id FROM stuck)
+    GROUP BY c.subscription_id, c.publisher_id
+),
+finished AS (
+    SELECT a.path_id, min(t.taken_ns) AS first_ns, max(t.taken_ns) AS last_ns
+    FROM pair AS a
+    JOIN main.take AS t ON a.take_id = t.take_id
+    WHERE a.path_id IN (SELECT path_id FROM stuck WHERE publisher_id IS NULL)
+    GROUP BY a.path_id
 ),
 explained AS (
     SELECT
@@ -182,19 +204,24 @@ explained AS (
         CASE
             WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
             WHEN s.publication_id IS NOT NULL THEN 'not_delivered'
-            WHEN s.is_cached THEN 'superseded'
             ELSE 'not_published'
         END AS reason,
-        CASE
-            WHEN s.publisher_id IS NULL THEN true
-            WHEN s.publication_id IS NOT NULL THEN
-                s.publication_id < d.first_publication_id
-                OR s.publication_id > d.last_publication_id
-            ELSE s.take_id < c.first_take_id OR s.take_id > c.last_take_id
-        END AS is_edge
+        s.publication_id IS NULL AND s.is_cached AS is_cached,
+        coalesce(
+            CASE
+                WHEN s.publisher_id IS NULL THEN
+                    s.taken_ns < f.first_ns OR s.taken_ns > f.last_ns
+                WHEN s.publication_id IS NOT NULL THEN
+                    b.start_ns < d.first_ns OR b.start_ns > d.last_ns
+                ELSE s.taken_ns < c.first_ns OR s.taken_ns > c.last_ns
+            END,
+            true
+        ) AS is_edge
     FROM stuck AS s
+    LEFT JOIN main.publication AS b ON s.publication_id = b.publication_id
     LEFT JOIN delivered AS d
         ON s.publisher_id = d.publisher_id AND s.subscription_id = d.subscription_id
+    LEFT JOIN finished AS f ON s.path_id = f.path_id
     LEFT JOIN main.take AS t ON s.take_id = t.take_id
     LEFT JOIN continued AS c
         ON t.subscription_id = c.subscription_id AND s.publisher_id = c.publisher_id
@@ -233,10 +260,10 @@ SELECT
     NULL,
     CASE
         WHEN x.is_edge THEN 'edge'
-        WHEN x.reason = 'superseded' THEN 'superseded'
+        WHEN x.is_cached THEN 'superseded'
         ELSE 'lost'
     END,
-    x.reason,
+    CASE WHEN x.is_cached AND NOT x.is_edge THEN 'superseded' ELSE x.reason END,
     true,
     true,
     true

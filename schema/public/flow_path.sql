@@ -2,8 +2,9 @@
 -- kind: macro
 -- description: Chains of publishers and subscriptions that flows can take, with all their
 --     beginnings (prefixes). No subscription comes twice in a chain. A chain is a path where it
---     ends at the topic asked for, or where it cannot be continued. Chains longer than max_depth
---     and beyond max_paths per length are cut; where that happened is_cut says so.
+--     ends at the topic asked for, or where it is not continued. Chains longer than max_depth and
+--     beyond max_paths per length are cut; is_cut says so of each chain that has more to it, or,
+--     where a topic to end at was given, of all chains of the run.
 -- grain: one row per run and chain
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR  Topic where flows start; every source when NULL
@@ -22,7 +23,7 @@
 -- column: subscription_id BIGINT  Last subscription
 -- column: is_cached BOOLEAN  The last step may wait in its node for other messages
 -- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
--- column: is_cut BOOLEAN  The chain goes on or has siblings beyond the limits
+-- column: is_cut BOOLEAN  The chain goes on, or has siblings, beyond the limits
 -- needs: derive.flow_hop, derive.node_label, store.publisher, store.subscription, store.node,
 --     store.process
 CREATE OR REPLACE MACRO main.flow_path(
@@ -73,9 +74,12 @@ chain AS (
         [topic_name] AS topics,
         from_node || ' → ' || coalesce(topic_name, '?') || ' → ' || to_node AS path,
         is_cached,
-        false AS is_crowded
+        count(*) OVER (PARTITION BY run_id) > max_paths AS is_crowded
     FROM useful
     WHERE is_start
+    QUALIFY row_number() OVER (
+        PARTITION BY run_id ORDER BY publisher_id, subscription_id
+    ) <= max_paths
     UNION ALL
     SELECT run_id, publishers, subscriptions, topics, path, is_cached, is_crowded
     FROM (
@@ -104,31 +108,45 @@ numbered AS MATERIALIZED (
         row_number() OVER (ORDER BY run_id, publishers, subscriptions) AS path_id
     FROM chain
 ),
-extended AS (
-    SELECT DISTINCT n.run_id, n.path_id
+continuable AS (
+    SELECT DISTINCT n.path_id
     FROM numbered AS n
     JOIN useful AS u ON n.subscriptions[-1] = u.from_subscription_id
     WHERE NOT list_contains(n.subscriptions, u.subscription_id)
+        AND (to_topic IS NULL OR n.topics[-1] IS DISTINCT FROM to_topic)
+),
+parented AS MATERIALIZED (
+    SELECT n.path_id, p.path_id AS parent_path_id
+    FROM numbered AS n
+    JOIN numbered AS p
+        ON p.publishers = n.publishers[:-2] AND p.subscriptions = n.subscriptions[:-2]
+),
+limited AS (
+    SELECT
+        n.run_id, n.path_id, n.publishers, n.subscriptions, n.topics, n.path, n.is_cached,
+        p.parent_path_id,
+        n.path_id NOT IN (SELECT parent_path_id FROM parented) AS is_end,
+        n.is_crowded
+        OR (
+            n.path_id IN (SELECT path_id FROM continuable)
+            AND n.path_id NOT IN (SELECT parent_path_id FROM parented)
+        ) AS is_cut
+    FROM numbered AS n
+    LEFT JOIN parented AS p ON n.path_id = p.path_id
 )
 SELECT
-    n.run_id,
-    n.path_id,
-    p.path_id AS parent_path_id,
-    len(n.subscriptions) AS depth,
-    n.publishers,
-    n.subscriptions,
-    n.topics,
-    n.path,
-    n.publishers[-1] AS publisher_id,
-    n.subscriptions[-1] AS subscription_id,
-    n.is_cached,
-    CASE
-        WHEN to_topic IS NOT NULL THEN n.topics[-1] = to_topic
-        ELSE e.path_id IS NULL OR len(n.subscriptions) >= max_depth
-    END AS is_path,
-    (e.path_id IS NOT NULL AND len(n.subscriptions) >= max_depth) OR n.is_crowded AS is_cut
-FROM numbered AS n
-LEFT JOIN numbered AS p
-    ON p.publishers = n.publishers[:-2]
-    AND p.subscriptions = n.subscriptions[:-2]
-LEFT JOIN extended AS e ON n.path_id = e.path_id
+    run_id,
+    path_id,
+    parent_path_id,
+    len(subscriptions) AS depth,
+    publishers,
+    subscriptions,
+    topics,
+    path,
+    publishers[-1] AS publisher_id,
+    subscriptions[-1] AS subscription_id,
+    is_cached,
+    CASE WHEN to_topic IS NULL THEN is_end ELSE topics[-1] = to_topic END AS is_path,
+    CASE WHEN to_topic IS NULL THEN is_cut ELSE bool_or(is_cut) OVER (PARTITION BY run_id) END
+        AS is_cut
+FROM limited

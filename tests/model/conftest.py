@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from ros_system import RosSystem
-from staged_events import Analyse, Analysis, StagedEvents
+from staged_events import Analyse, Analysis
 
 
 @pytest.fixture
@@ -14,17 +14,15 @@ def system() -> RosSystem:
     return RosSystem()
 
 
+@pytest.fixture(scope="session")
+def analysis(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Analysis]:
+    """A database for one system after the other."""
+    bench = Analysis(empty_database, tmp_path_factory.mktemp("analysis"))
+    yield bench
+    bench.close()
+
+
 @pytest.fixture
-def analyse(empty_database: Path, tmp_path: Path) -> Iterator[Analyse]:
+def analyse(analysis: Analysis) -> Analyse:
     """Builds the model of a system and derives its links."""
-    opened: list[Analysis] = []
-
-    def run(events: StagedEvents) -> Analysis:
-        directory = tmp_path / str(len(opened))
-        directory.mkdir()
-        opened.append(Analysis(empty_database, directory, events))
-        return opened[-1]
-
-    yield run
-    for analysis in opened:
-        analysis.close()
+    return analysis.build

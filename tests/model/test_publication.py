@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from ros_system import WRITER, RosSystem
 from staged_events import STEP_NS, Analyse, Thread
 
@@ -26,14 +25,20 @@ def test_layers_of_a_stamping_rmw(system: RosSystem, analyse: Analyse) -> None:
     assert model.rows("SELECT start_ns, end_ns FROM publication") == [at(first, 0, 2)]
 
 
-@pytest.mark.parametrize("writes", ["write_pre write", "write write_pre"])
-def test_layers_of_a_stamping_dds(system: RosSystem, analyse: Analyse, writes: str) -> None:
+def test_layers_of_a_stamping_dds(system: RosSystem, analyse: Analyse) -> None:
+    """Its two events come in either order."""
     system.publisher(MAIN, 0x10, "/chatter")
-    first = system.publish_dds(MAIN, 0x10, 777, layers=f"rclcpp rcl rmw {writes}")
-    write = 4 if writes.endswith("write") else 3
+    pre = system.publish_dds(MAIN, 0x10, 777, layers="rclcpp rcl rmw write_pre write")
+    post = system.publish_dds(MAIN, 0x10, 778, layers="rclcpp rcl rmw write write_pre")
     model = analyse(system)
-    assert model.rows(LAYERS) == [(None, *at(first, 0, 1, 2, write), 777)]
-    assert model.rows("SELECT start_ns, end_ns FROM publication") == [at(first, 0, 4)]
+    assert model.rows(LAYERS) == [
+        (None, *at(pre, 0, 1, 2, 4), 777),
+        (None, *at(post, 0, 1, 2, 3), 778),
+    ]
+    assert model.rows("SELECT start_ns, end_ns FROM publication ORDER BY 1") == [
+        at(pre, 0, 4),
+        at(post, 0, 4),
+    ]
 
 
 def test_write_with_its_data_needs_no_write_pre(system: RosSystem, analyse: Analyse) -> None:
@@ -44,20 +49,21 @@ def test_write_with_its_data_needs_no_write_pre(system: RosSystem, analyse: Anal
     assert analyse(system).rows(LAYERS) == [(None, *at(first, 0, 1, 2, 3), 777)]
 
 
-@pytest.mark.parametrize(
-    ("layers", "positions"),
-    [("rcl rmw", (None, 0, 1)), ("rmw", (None, None, 0)), ("rcl", (None, 0, None))],
-)
-def test_calls_that_begin_below_rclcpp(
-    system: RosSystem, analyse: Analyse, layers: str, positions: tuple[int | None, ...]
-) -> None:
-    """Serialized messages, rclpy, and layers that were lost."""
+def test_calls_that_begin_below_rclcpp(system: RosSystem, analyse: Analyse) -> None:
+    """Serialized messages, rclpy, and layers that were lost; nothing comes before them."""
     system.publisher(MAIN, 0x10, "/chatter")
-    first = system.publish(MAIN, 0x10, 777, layers=layers)
-    stamp = 777 if "rmw" in layers else None
+    threads = [Thread(100, 101 + n) for n in range(3)]
+    first = [
+        system.publish(thread, 0x10, 777 + n, layers=layers)
+        for n, (thread, layers) in enumerate(zip(threads, ("rcl rmw", "rmw", "rcl"), strict=True))
+    ]
     model = analyse(system)
-    assert model.rows(LAYERS) == [(None, *at(first, *positions), None, stamp)]
-    assert model.column("SELECT publisher_id FROM publication") == [1]
+    assert model.rows(LAYERS) == [
+        (None, None, *at(first[0], 0, 1), None, 777),
+        (None, None, None, first[1], None, 778),
+        (None, None, first[2], None, None, None),
+    ]
+    assert model.column("SELECT publisher_id FROM publication") == [1, 1, 1]
 
 
 def test_a_layer_with_another_message_is_another_call(system: RosSystem, analyse: Analyse) -> None:
@@ -217,17 +223,22 @@ def test_a_replay_of_kept_messages_is_no_publication(system: RosSystem, analyse:
     ]
 
 
-@pytest.mark.parametrize("address", [0xA, 0])
-def test_layers_of_caret(system: RosSystem, analyse: Analyse, address: int) -> None:
+def test_layers_of_caret(system: RosSystem, analyse: Analyse) -> None:
     """Its hooks tell the stamp after the write; with Fast DDS without the address."""
     system.publisher(MAIN, 0x10, "/chatter")
-    first = system.publish(MAIN, 0x10, layers="rclcpp rcl")
-    system.add("ros2_caret:dds_write", MAIN, message=0xA)
-    system.add("ros2_caret:dds_bind_addr_to_addr", MAIN, addr_from=0xA, addr_to=0xAA)
-    system.add("ros2_caret:dds_bind_addr_to_stamp", MAIN, addr=address, source_stamp=777)
+    first = []
+    for stamp, address in ((777, 0xA), (778, 0)):
+        first.append(system.publish(MAIN, 0x10, layers="rclcpp rcl"))
+        system.add("ros2_caret:dds_write", MAIN, message=0xA)
+        system.add("ros2_caret:dds_bind_addr_to_addr", MAIN, addr_from=0xA, addr_to=0xAA)
+        system.add("ros2_caret:dds_bind_addr_to_stamp", MAIN, addr=address, source_stamp=stamp)
     model = analyse(system)
-    assert model.rows(LAYERS) == [(None, *at(first, 0, 1, None, None), 777)]
-    assert model.column("SELECT end_ns FROM publication") == [first + 4 * STEP_NS]
+    assert model.rows(LAYERS) == [
+        (None, *at(time, 0, 1, None, None), 777 + n) for n, time in enumerate(first)
+    ]
+    assert model.column("SELECT end_ns FROM publication ORDER BY 1") == [
+        time + 4 * STEP_NS for time in first
+    ]
 
 
 def test_what_only_the_middleware_publishes_has_no_publisher(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import shutil
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ import pyarrow as pa
 
 from msgflow.db.connection import connect
 from msgflow.db.derive import derive
-from msgflow.db.store import store
+from msgflow.db.store import delete, store
 from msgflow.ingest import model, staging
 from msgflow.ingest.catalogue import load
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
@@ -89,6 +89,11 @@ class StagedEvents:
             )
         )
         return self._now
+
+    def add_row(self, name: str, columns: Mapping[str, Any]) -> None:
+        """Add an event of another system, as `ordered` returned it."""
+        self._now = columns["ts_ns"]
+        self._events.append((name, {k: v for k, v in columns.items() if k != "event_id"}))
 
     def wait(self, duration_ns: int) -> None:
         """Let time pass before the next event."""
@@ -187,14 +192,23 @@ def _insert(
 
 
 class Analysis:
-    """What an ingest makes of staged events: run 1 of a database."""
+    """What an ingest makes of staged events: run 1 of a database with nothing else.
 
-    def __init__(self, empty_database: Path, directory: Path, events: StagedEvents) -> None:
+    One connection serves many tests, as opening and attaching takes as long as the rest: `build`
+    replaces what was built before.
+    """
+
+    def __init__(self, empty_database: Path, directory: Path) -> None:
         path = directory / "analysis.duckdb"
         shutil.copyfile(empty_database, path)
         self.connection = connect(path, read_only=False)
         self.connection.execute("SET threads = 1")
         staging.attach(self.connection, Path(":memory:"))
+        self._tables = self._tables_of("raw"), self._tables_of("staging")
+
+    def build(self, events: StagedEvents) -> Analysis:
+        """Build the model of these events and derive its links."""
+        self._clear()
         events.write(self.connection)
         model.build(self.connection, keep=True)
         self.connection.begin()
@@ -205,6 +219,7 @@ class Analysis:
         )
         derive(self.connection, 1)
         self.connection.commit()
+        return self
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
         """Return the rows of a query."""
@@ -221,6 +236,27 @@ class Analysis:
 
     def close(self) -> None:
         self.connection.close()
+
+    def _tables_of(self, database: str) -> set[str]:
+        return set(
+            self.column(
+                "SELECT table_name FROM duckdb_tables() "
+                f"WHERE database_name = '{database}' AND schema_name = 'main'"
+            )
+        )
+
+    def _clear(self) -> None:
+        raw, given = self._tables
+        for table in self._tables_of("staging") - given:
+            self.connection.execute(f"DROP TABLE staging.{table}")
+        for database, tables in (("raw", raw), ("staging", given)):
+            self.connection.begin()
+            for table in tables:
+                self.connection.execute(f"DELETE FROM {database}.{table}")
+            self.connection.commit()
+        self.connection.begin()
+        delete(self.connection, [1])
+        self.connection.commit()
 
 
 Analyse = Callable[[StagedEvents], Analysis]

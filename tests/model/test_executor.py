@@ -1,0 +1,117 @@
+"""Executors, which stock traces do not name, and the states of their threads."""
+
+from __future__ import annotations
+
+from ros_system import RosSystem
+from staged_events import Analyse, Thread
+
+MAIN = Thread(100)
+STATES = (
+    "SELECT state, start_ns, end_ns, callback_instance_id FROM executor_state ORDER BY start_ns"
+)
+
+
+def run(system: RosSystem, thread: Thread, callback: int) -> None:
+    system.execute(thread, 0x20)
+    system.start(thread, callback)
+    system.end(thread, callback)
+
+
+def test_threads_that_share_callbacks_are_one_executor(system: RosSystem, analyse: Analyse) -> None:
+    """Directly or through others; the second process has the same callback address."""
+    first, second, third, alone = (Thread(100, tid) for tid in (101, 102, 103, 104))
+    other = Thread(200, 101)
+    for thread, callback in (
+        (first, 0xC1),
+        (second, 0xC1),
+        (second, 0xC2),
+        (third, 0xC2),
+        (alone, 0xC3),
+        (other, 0xC1),
+    ):
+        run(system, thread, callback)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT p.pid, e.kind, e.is_inferred, list(t.tid ORDER BY t.tid) FROM executor AS e "
+        "JOIN executor_thread AS m USING (executor_id) JOIN thread AS t USING (thread_id) "
+        "JOIN process AS p ON e.process_id = p.process_id GROUP BY ALL ORDER BY ALL"
+    ) == [
+        (100, "multi_threaded", True, [101, 102, 103]),
+        (100, "single_threaded", True, [104]),
+        (200, "single_threaded", True, [101]),
+    ]
+    assert model.value("SELECT count(*) FROM executor_state WHERE executor_id IS NULL") == 0
+
+
+def test_threads_without_executor_events(system: RosSystem, analyse: Analyse) -> None:
+    """One may run callbacks without any (static executors, Python); others are no executor."""
+    system.start(Thread(100), 0xC1)
+    system.publish(Thread(200), 0x10)
+    system.take(Thread(300, 309), 0x66, 1)
+    system.idle(Thread(400))
+    assert analyse(system).rows(
+        "SELECT p.pid, e.kind FROM executor AS e JOIN process AS p USING (process_id) ORDER BY 1"
+    ) == [(100, "unknown"), (400, "single_threaded")]
+
+
+def test_states_are_what_the_events_literally_say(system: RosSystem, analyse: Analyse) -> None:
+    system.timer(MAIN, 0x20, 0xC1)
+    times = [system.ready(MAIN), system.idle(MAIN), system.ready(MAIN), system.execute(MAIN, 0x20)]
+    system.start(MAIN, 0xC1)
+    system.end(MAIN, 0xC1)
+    times += [system.ready(MAIN), system.ready(MAIN)]
+    kinds = ["process", "wait", "process", "execute", "process", "process"]
+    assert analyse(system).rows(STATES) == [
+        (kind, start, end, 1 if kind == "execute" else None)
+        for kind, start, end in zip(kinds, times, [*times[1:], None], strict=True)
+    ]
+
+
+def test_states_of_threads_are_apart(system: RosSystem, analyse: Analyse) -> None:
+    other = Thread(100, 101)
+    first, second = system.idle(MAIN), system.idle(other)
+    third, fourth = system.ready(MAIN), system.ready(other)
+    assert analyse(system).rows(
+        "SELECT tid, start_ns, end_ns FROM executor_state JOIN thread USING (thread_id) "
+        "WHERE state = 'wait' ORDER BY tid"
+    ) == [(100, first, third), (101, second, fourth)]
+
+
+def test_a_state_before_a_gap_has_no_end(system: RosSystem, analyse: Analyse) -> None:
+    """Nor does a callback behind the gap belong to it."""
+    before = system.execute(MAIN, 0x20)
+    system.lose()
+    system.start(MAIN, 0xC1)
+    system.end(MAIN, 0xC1)
+    after = system.ready(MAIN)
+    assert analyse(system).rows(STATES) == [
+        ("execute", before, None, None),
+        ("process", after, None, None),
+    ]
+
+
+def test_an_executor_inside_a_callback(system: RosSystem, analyse: Analyse) -> None:
+    """A callback that spins: states follow each other all the same, each with its callback."""
+    outer = system.execute(MAIN, 0x20)
+    system.start(MAIN, 0xC1)
+    nested = [system.ready(MAIN), system.execute(MAIN, 0x21)]
+    system.start(MAIN, 0xC2)
+    system.end(MAIN, 0xC2)
+    system.end(MAIN, 0xC1)
+    last = system.ready(MAIN)
+    assert analyse(system).rows(STATES) == [
+        ("execute", outer, nested[0], 1),
+        ("process", nested[0], nested[1], None),
+        ("execute", nested[1], last, 2),
+        ("process", last, None, None),
+    ]
+
+
+def test_the_first_of_several_callbacks_names_a_state(system: RosSystem, analyse: Analyse) -> None:
+    """Services run while the executor looks for work: they emit no executor event."""
+    system.ready(MAIN)
+    for callback in (0xC1, 0xC2):
+        system.start(MAIN, callback)
+        system.end(MAIN, callback)
+    system.idle(MAIN)
+    assert [row[3] for row in analyse(system).rows(STATES)] == [1, None]

@@ -1,0 +1,132 @@
+"""Gaps of the traces, read from their packets."""
+
+from __future__ import annotations
+
+from ros_system import RosSystem
+from staged_events import Analyse, Thread
+
+GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM loss_interval ORDER BY start_ns, cpu"
+
+
+def test_continuous_packets_have_no_gap(system: RosSystem, analyse: Analyse) -> None:
+    for cpu in (0, 1):
+        for begin in (0, 100, 200):
+            system.add_packet(begin, begin + 100, cpu=cpu)
+    assert analyse(system).rows(GAPS) == []
+
+
+def test_events_are_lost_behind_the_last_event_of_their_packet(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """On the CPU of the packet only."""
+    system.add_packet(0, 100, last_event=90)
+    system.add_packet(100, 200, last_event=120, discarded=7)
+    system.add_packet(200, 300)
+    system.add_packet(0, 300, cpu=1)
+    model = analyse(system)
+    assert model.rows(GAPS) == [("loss", 0, 120, 200, 7)]
+    assert model.rows("SELECT discarded_event_count, event_count FROM trace") == [(7, 4)]
+    assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'discarded_events'") == [
+        ("data_loss", 7)
+    ]
+
+
+def test_a_packet_may_hold_nothing_but_a_loss(system: RosSystem, analyse: Analyse) -> None:
+    system.add_packet(0, 100)
+    system.add_packet(100, 200, count=0, discarded=7)
+    assert analyse(system).rows(GAPS) == [("loss", 0, 100, 200, 7)]
+
+
+def test_lost_packets_lie_between_those_around_them(system: RosSystem, analyse: Analyse) -> None:
+    system.add_packet(0, 100)
+    system.add_packet(400, 500, lost_packets=3)
+    system.add_packet(0, 500, cpu=1)
+    model = analyse(system)
+    assert model.rows(GAPS) == [("packets", 0, 100, 400, None)]
+    assert model.rows("SELECT severity FROM diagnostic WHERE name = 'lost_packets'") == [
+        ("data_loss",)
+    ]
+
+
+def test_a_pause_is_a_silence_of_all_streams(system: RosSystem, analyse: Analyse) -> None:
+    for cpu in (0, 1):
+        system.add_packet(0, 100 + cpu, cpu=cpu)
+        system.add_packet(500 - cpu, 600, cpu=cpu)
+    model = analyse(system)
+    assert model.rows(GAPS) == [("pause", None, 101, 499, None)]
+    assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'pause'") == [
+        ("warning", 1)
+    ]
+
+
+def test_a_silence_of_one_stream_is_none(system: RosSystem, analyse: Analyse) -> None:
+    """Nor are two that do not overlap."""
+    system.add_packet(0, 100)
+    system.add_packet(300, 600)
+    system.add_packet(0, 350, cpu=1)
+    system.add_packet(500, 600, cpu=1)
+    assert analyse(system).rows(GAPS) == []
+
+
+def test_traces_pause_apart(system: RosSystem, analyse: Analyse) -> None:
+    system.add_source(1, "beta", "boot-b")
+    system.add_packet(0, 600, trace=0)
+    system.add_packet(0, 100, trace=1)
+    system.add_packet(500, 600, trace=1)
+    assert analyse(system).rows("SELECT trace_id, kind, start_ns, end_ns FROM loss_interval") == [
+        (2, "pause", 100, 500)
+    ]
+
+
+def test_flushing_at_the_end_is_no_pause(system: RosSystem, analyse: Analyse) -> None:
+    """Stopping leaves an empty packet in every stream, long after the last event."""
+    for cpu in (0, 1):
+        system.add_packet(0, 100, cpu=cpu)
+        system.add_packet(900, 900, count=0, cpu=cpu)
+    assert analyse(system).rows(GAPS) == []
+
+
+def test_an_idle_stream_does_not_hide_a_pause(system: RosSystem, analyse: Analyse) -> None:
+    """Empty packets of an idle CPU, flushed while tracing was stopped and when it went on."""
+    system.add_packet(0, 100, cpu=0, count=0)
+    system.add_packet(500, 500, cpu=0, count=0)
+    system.add_packet(500, 600, cpu=0, count=0)
+    system.add_packet(0, 100, cpu=1)
+    system.add_packet(500, 600, cpu=1)
+    assert analyse(system).rows(GAPS) == [("pause", None, 100, 500, None)]
+
+
+def test_nothing_is_paired_across_a_pause(system: RosSystem, analyse: Analyse) -> None:
+    """Threads of any CPU of that trace, and only of that trace."""
+    system.add_source(1, "beta", "boot-b")
+    here, there = Thread(100, cpu=1), Thread(100, trace=1)
+    starts = [system.start(thread, 0xC1) for thread in (here, there)]
+    system.wait(500)
+    ends = [system.end(thread, 0xC1) for thread in (here, there)]
+    for cpu in (0, 1):
+        system.add_packet(1_000, starts[0], cpu=cpu)
+        system.add_packet(ends[0], 2_000, cpu=cpu)
+    system.add_packet(1_000, 2_000, trace=1)
+    assert analyse(system).rows(
+        "SELECT trace_id, start_ns, end_ns FROM callback_instance ORDER BY 1"
+    ) == [(1, starts[0], None), (2, starts[1], ends[1])]
+
+
+def test_events_around_a_gap_still_pair_on_their_side(system: RosSystem, analyse: Analyse) -> None:
+    """The event at the begin of the gap is the last one before it."""
+    thread = Thread(100)
+    before = (system.start(thread, 0xC1), system.end(thread, 0xC1))
+    system.lose()
+    after = (system.start(thread, 0xC1), system.end(thread, 0xC1))
+    assert analyse(system).rows("SELECT start_ns, end_ns FROM callback_instance ORDER BY 1") == [
+        before,
+        after,
+    ]
+
+
+def test_the_extent_of_a_trace(system: RosSystem, analyse: Analyse) -> None:
+    system.publish(Thread(100), 0x10)
+    system.add_packet(500, 2_000, last_event=1_030, count=3)
+    assert analyse(system).rows("SELECT start_ns, end_ns, event_count, domain FROM trace") == [
+        (500, 2_000, 3, "ust")
+    ]

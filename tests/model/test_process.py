@@ -1,0 +1,148 @@
+"""Hosts, processes and their lives, threads."""
+
+from __future__ import annotations
+
+from ros_system import RosSystem
+from staged_events import Analyse, Thread
+
+MAIN = Thread(100)
+LIVES = "SELECT pid, life, name, first_seen_ns, last_seen_ns FROM store.process ORDER BY process_id"
+RESTARTS = "SELECT severity, count FROM diagnostic WHERE name = 'process_restart'"
+
+
+def test_a_process_is_named_after_its_main_thread(system: RosSystem, analyse: Analyse) -> None:
+    """Another may be seen first."""
+    system.publish(Thread(100, 105, "dds.udp"), 0x10)
+    system.context(Thread(100, name="talker"))
+    system.publish(Thread(200, 205, "worker"), 0x10)
+    model = analyse(system)
+    assert model.rows("SELECT pid, name, tracetools_version FROM process ORDER BY pid") == [
+        (100, "talker", "4.1.0"),
+        (200, "worker", None),
+    ]
+    assert model.rows("SELECT tid, name FROM thread ORDER BY tid") == [
+        (100, "talker"),
+        (105, "dds.udp"),
+        (205, "worker"),
+    ]
+
+
+def test_hosts_may_use_the_same_process_ids(system: RosSystem, analyse: Analyse) -> None:
+    """Containers of one machine share its clock, traces of one host share its processes."""
+    system.add_source(0, "alpha", "boot-a")
+    system.add_source(1, "beta", "boot-b")
+    system.add_source(2, "container", "boot-a")
+    system.add_source(3, "alpha", "boot-a")
+    for trace in range(4):
+        system.publisher(Thread(100, trace=trace), 0x10, f"/{trace}")
+    system.publish(Thread(100, trace=3), 0x10, 1)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT h.hostname, c.uuid, p.pid FROM process AS p JOIN host AS h USING (host_id) "
+        "JOIN clock AS c USING (clock_id) ORDER BY p.process_id"
+    ) == [("alpha", "boot-a", 100), ("beta", "boot-b", 100), ("container", "boot-a", 100)]
+    assert model.value("SELECT count(*) FROM clock") == 2
+    assert model.column(
+        "SELECT topic_name FROM publication JOIN publisher USING (publisher_id)"
+    ) == ["/3"]
+
+
+def test_namespaces_of_process_ids_keep_processes_apart(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    for namespace in (1, 2):
+        system.publisher(Thread(1, pid_ns=namespace), 0x10, f"/{namespace}")
+    system.publish(Thread(1, pid_ns=1), 0x10, 1)
+    model = analyse(system)
+    assert model.rows("SELECT pid, pid_namespace FROM store.process ORDER BY ALL") == [
+        (1, 1),
+        (1, 2),
+    ]
+    assert model.column(
+        "SELECT topic_name FROM publication JOIN publisher USING (publisher_id)"
+    ) == ["/1"]
+
+
+def test_a_pid_used_again(system: RosSystem, analyse: Analyse) -> None:
+    """The same program once more, at the same addresses: nothing of the old one is meant."""
+    first = system.context(MAIN)
+    system.publisher(MAIN, 0x10, "/old")
+    old = system.publish(MAIN, 0x10, 1) + 20
+    second = system.context(MAIN)
+    system.publish(MAIN, 0x10, 2)
+    system.publisher(MAIN, 0x10, "/new")
+    new = system.publish(MAIN, 0x10, 3) + 20
+    model = analyse(system)
+    assert model.rows(LIVES) == [(100, 1, "main", first, old), (100, 2, "main", second, new)]
+    assert model.column(
+        "SELECT topic_name FROM publication JOIN publisher USING (publisher_id) "
+        "ORDER BY publication_id"
+    ) == ["/old", None, "/new"]
+    assert model.column("SELECT first_seen_ns FROM thread ORDER BY 1") == [first, second]
+    assert model.rows(RESTARTS) == [("info", 1)]
+
+
+def test_a_pid_used_again_by_another_program(system: RosSystem, analyse: Analyse) -> None:
+    """Or under another main thread, as in a container."""
+    for name, tid, context in (("talker", 100, 1), ("listener", 100, 2), ("listener", 101, 3)):
+        system.context(Thread(100, tid, name), context)
+    assert [row[:3] for row in analyse(system).rows(LIVES)] == [
+        (100, 1, "talker"),
+        (100, 2, "listener"),
+        (100, 3, "listener"),
+    ]
+
+
+def test_a_second_context_is_no_new_life(system: RosSystem, analyse: Analyse) -> None:
+    system.context(MAIN, 0xC1)
+    system.publisher(MAIN, 0x10, "/a")
+    system.context(MAIN, 0xC2)
+    system.publish(MAIN, 0x10, 1)
+    model = analyse(system)
+    assert len(model.rows(LIVES)) == 1
+    assert model.rows(RESTARTS) == []
+    assert model.column("SELECT topic_name FROM publisher") == ["/a"]
+
+
+def test_initialising_again_is_no_new_life_while_another_thread_goes_on(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    worker = Thread(100, 101, "worker")
+    system.context(MAIN)
+    system.publisher(MAIN, 0x10, "/a")
+    system.publish(worker, 0x10, 1)
+    system.context(MAIN)
+    system.context(Thread(100, 102, "other"), 0xC7)
+    system.publish(worker, 0x10, 2)
+    model = analyse(system)
+    assert len(model.rows(LIVES)) == 1
+    assert model.column("SELECT DISTINCT publisher_id FROM publication") == [1]
+
+
+def test_threads_belong_to_a_life(system: RosSystem, analyse: Analyse) -> None:
+    """A worker that goes on keeps the life going; the next life has the main thread's tid."""
+    worker, next_worker = Thread(100, 101, "worker"), Thread(100, 102, "worker")
+    system.context(MAIN)
+    start = system.start(worker, 0xC1)
+    system.context(MAIN)
+    end = system.end(worker, 0xC1)
+    system.context(MAIN)
+    system.publish(next_worker, 0x10, 1)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT life, tid, first_event_id FROM store.thread JOIN store.process USING (process_id) "
+        "ORDER BY thread_id"
+    ) == [(1, 100, 0), (1, 101, 1), (2, 100, 4), (2, 102, 5)]
+    assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, end)]
+
+
+def test_a_life_ends_the_runs_of_its_threads(system: RosSystem, analyse: Analyse) -> None:
+    system.context(MAIN)
+    system.start(MAIN, 0xC1)
+    system.context(MAIN)
+    system.end(MAIN, 0xC1)
+    system.publish(MAIN, 0x10, 1)
+    model = analyse(system)
+    assert len(model.rows(LIVES)) == 2
+    assert model.column("SELECT end_ns FROM callback_instance") == [None]
+    assert model.rows("SELECT * FROM link_causal") == []

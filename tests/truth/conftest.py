@@ -1,0 +1,58 @@
+"""Ingests shared by all comparisons: each trace is read once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
+from pathlib import Path
+
+import pytest
+from ingested import Ingested, ingest_one
+
+from msgflow.sim import scenarios, simulate
+
+_LENGTH = 0.1
+
+
+@pytest.fixture(scope="session")
+def simulations(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Ingested]]:
+    """Simulates and ingests a scenario; what is true of it are the views truth_<table>."""
+    directory = tmp_path_factory.mktemp("simulated")
+    with ExitStack() as opened:
+
+        @cache
+        def get(name: str) -> Ingested:
+            simulation = simulate(name, directory / name, factor=_LENGTH)
+            path = directory / f"{name}.duckdb"
+            ingested = ingest_one(simulation.directory, path)
+            opened.callback(ingested.connection.close)
+            for table, file in simulation.truth.items():
+                ingested.connection.execute(f"CREATE TEMP VIEW truth_{table} AS FROM '{file}'")
+            return ingested
+
+        yield get
+
+
+@pytest.fixture(params=list(scenarios()))
+def simulated(request: pytest.FixtureRequest, simulations: Callable[[str], Ingested]) -> Ingested:
+    """Each built-in scenario in turn."""
+    return simulations(request.param)
+
+
+@pytest.fixture(scope="session")
+def recordings(
+    shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], Ingested]]:
+    """Ingests one of the recorded traces."""
+    directory = tmp_path_factory.mktemp("recorded")
+    with ExitStack() as opened:
+
+        @cache
+        def get(name: str) -> Ingested:
+            path = directory / f"{name}.duckdb"
+            ingested = ingest_one(shared_traces / name, path)
+            opened.callback(ingested.connection.close)
+            return ingested
+
+        yield get

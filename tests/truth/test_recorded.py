@@ -1,0 +1,98 @@
+"""Recorded systems whose truth is known, scored by the checker that comes with the recordings."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from ingested import Ingested
+
+EXPORTS = {
+    "pairs": """
+        SELECT bp.hostname AS pub_host, bp.pid AS pub_vpid, b.start_ns AS pub_ts,
+            tp.hostname AS take_host, tp.pid AS take_vpid, t.taken_ns AS take_ts
+        FROM link_transport AS l
+        JOIN publication AS b USING (publication_id)
+        JOIN place AS bp ON b.process_id = bp.process_id
+        JOIN take AS t ON l.take_id = t.take_id
+        JOIN place AS tp ON t.process_id = tp.process_id
+    """,
+    "links": """
+        SELECT p.hostname AS in_host, p.pid AS in_vpid, t.taken_ns AS in_ts,
+            p.hostname AS out_host, p.pid AS out_vpid, b.start_ns AS out_ts, l.kind AS type
+        FROM link_causal AS l
+        JOIN callback_instance AS i USING (callback_instance_id)
+        JOIN take AS t ON i.take_id = t.take_id
+        JOIN publication AS b USING (publication_id)
+        JOIN place AS p ON b.process_id = p.process_id
+    """,
+    "exec": """
+        SELECT p.hostname AS host, p.pid AS vpid, t.tid AS vtid, e.start_ns AS "start",
+            coalesce(e.end_ns, (SELECT max(end_ns) FROM trace)) AS "end",
+            replace(e.state, 'process', 'overhead') AS state
+        FROM executor_state AS e
+        JOIN thread AS t USING (thread_id)
+        JOIN place AS p ON t.process_id = p.process_id
+    """,
+    "e2e": """
+        SELECT rp.hostname AS root_host, rp.pid AS root_vpid, b.start_ns AS root_ts,
+            tp.hostname AS leaf_host, tp.pid AS leaf_vpid, t.taken_ns AS leaf_ts, e.latency_ns
+        FROM end_to_end(
+            [1], NULL, NULL, 'callback_start', 'callback_end', 0, 9223372036854775807
+        ) AS e
+        JOIN link_causal AS l ON e.root_id = l.callback_instance_id
+        JOIN publication AS b USING (publication_id)
+        JOIN publisher AS u ON b.publisher_id = u.publisher_id AND NOT u.is_internal
+        JOIN place AS rp ON b.process_id = rp.process_id
+        JOIN take AS t ON e.take_id = t.take_id
+        JOIN place AS tp ON t.process_id = tp.process_id
+        WHERE e.root_kind = 'callback_instance'
+    """,
+}
+PLACE = """
+CREATE TEMP VIEW IF NOT EXISTS place AS
+SELECT p.process_id, h.hostname, p.pid
+FROM process AS p
+JOIN host AS h ON p.host_id = h.host_id
+"""
+
+
+@pytest.fixture(scope="session")
+def checker(shared_traces: Path) -> Path:
+    path = shared_traces.parent / "tools" / "check_truth.py"
+    if not path.is_file():
+        pytest.skip("the checker of the recorded traces (../shared/tools) is not here")
+    return path
+
+
+@pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_jazzy", "pingpong"])
+def test_scores(
+    recordings: Callable[[str], Ingested],
+    shared_traces: Path,
+    checker: Path,
+    tmp_path: Path,
+    name: str,
+) -> None:
+    ingested = recordings(name)
+    ingested.connection.execute(PLACE)
+    arguments = []
+    for table, query in EXPORTS.items():
+        path = tmp_path / f"{table}.csv"
+        ingested.connection.execute(f"COPY ({query}) TO '{path}' (HEADER)")
+        arguments += [f"--{table}", str(path)]
+    done = subprocess.run(
+        [sys.executable, str(checker), str(shared_traces / name), "--builtin", *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    scores = re.findall(r"^(\w+) .* precision (\S+)  recall (\S+)", done.stdout, re.MULTILINE)
+    assert scores == [(table, "1.0000", "1.0000") for table in ("pairs", "links", "e2e")], (
+        done.stdout
+    )
+    (agreement,) = re.findall(r"^exec +agreement (\S+)", done.stdout, re.MULTILINE)
+    assert float(agreement) >= 0.99, done.stdout

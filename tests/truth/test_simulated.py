@@ -1,0 +1,178 @@
+"""Everything that a simulated system did is in the database, row by row, and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+from ingested import Ingested
+
+# Table of truth, what is compared of it, and the same from the public views.
+CASES = {
+    "publication": (
+        """
+        SELECT host, pid, tid, node, nullif(topic_name, 'ros_discovery_info') AS topic_name,
+            publisher_handle, rclcpp_ns, rcl_ns, rmw_ns, source_timestamp_ns
+        FROM truth_publication
+        """,
+        """
+        SELECT p.hostname, p.pid, p.tid, n.full_name, u.topic_name, u.publisher_handle,
+            b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.source_timestamp_ns
+        FROM publication AS b
+        JOIN place AS p USING (thread_id)
+        LEFT JOIN publisher AS u USING (publisher_id)
+        LEFT JOIN node AS n ON u.node_id = n.node_id
+        """,
+    ),
+    "take": (
+        """
+        SELECT host, pid, tid, node, topic_name, subscription_handle, rmw_ns, source_timestamp_ns
+        FROM truth_take
+        """,
+        """
+        SELECT p.hostname, p.pid, p.tid, n.full_name, s.topic_name, s.subscription_handle,
+            t.taken_ns, t.source_timestamp_ns
+        FROM take AS t
+        JOIN place AS p USING (thread_id)
+        JOIN subscription AS s USING (subscription_id)
+        JOIN node AS n ON s.node_id = n.node_id
+        WHERE t.method = 'rmw'
+        """,
+    ),
+    "callback_instance": (
+        """
+        SELECT c.host, c.pid, c.tid, c.node, c.kind, c.callback_handle, c.start_ns, c.end_ns,
+            t.rmw_ns
+        FROM truth_callback_instance AS c
+        LEFT JOIN truth_take AS t USING (take_id)
+        """,
+        """
+        SELECT p.hostname, p.pid, p.tid, n.full_name, c.kind, c.callback_handle, i.start_ns,
+            i.end_ns, t.taken_ns
+        FROM callback_instance AS i
+        JOIN place AS p USING (thread_id)
+        JOIN callback AS c USING (callback_id)
+        JOIN node AS n ON c.node_id = n.node_id
+        LEFT JOIN take AS t USING (take_id)
+        """,
+    ),
+    "transport": (
+        """
+        SELECT topic_name, publication_host, publication_pid, publication_tid, publication_rmw_ns,
+            source_timestamp_ns, take_host, take_pid, take_tid, take_rmw_ns
+        FROM truth_transport
+        """,
+        """
+        SELECT u.topic_name, bp.hostname, bp.pid, bp.tid, b.rmw_ns, b.source_timestamp_ns,
+            tp.hostname, tp.pid, tp.tid, t.taken_ns
+        FROM link_transport AS l
+        JOIN publication AS b USING (publication_id)
+        JOIN place AS bp USING (thread_id)
+        JOIN publisher AS u USING (publisher_id)
+        JOIN take AS t ON l.take_id = t.take_id
+        JOIN place AS tp ON t.thread_id = tp.thread_id
+        WHERE l.method = 'exact' AND l.candidate_count = 1 AND NOT l.is_loss_affected
+        """,
+    ),
+    "causal": (
+        """
+        SELECT host, pid, tid, kind, callback_start_ns, take_rmw_ns, topic_name,
+            publication_rcl_ns, publication_rmw_ns
+        FROM truth_causal
+        """,
+        """
+        SELECT p.hostname, p.pid, p.tid, l.kind, i.start_ns, t.taken_ns, u.topic_name, b.rcl_ns,
+            b.rmw_ns
+        FROM link_causal AS l
+        JOIN callback_instance AS i USING (callback_instance_id)
+        JOIN place AS p USING (thread_id)
+        JOIN publication AS b USING (publication_id)
+        JOIN publisher AS u USING (publisher_id)
+        LEFT JOIN take AS t ON i.take_id = t.take_id
+        """,
+    ),
+    "executor_state": (
+        "SELECT host, pid, tid, start_ns, end_ns, state FROM truth_executor_state",
+        """
+        SELECT p.hostname, p.pid, p.tid, e.start_ns, e.end_ns, e.state
+        FROM executor_state AS e
+        JOIN place AS p USING (thread_id)
+        """,
+    ),
+    "end_to_end": (
+        """
+        SELECT root_host, root_pid, root_tid, root_start_ns, path, sink_host, sink_pid, sink_tid,
+            sink_node, sink_take_ns, sink_end_ns
+        FROM truth_end_to_end
+        """,
+        """
+        SELECT rp.hostname, rp.pid, rp.tid, e.root_ns, h.topics, tp.hostname, tp.pid, tp.tid,
+            n.full_name, t.taken_ns, e.sink_ns
+        FROM end_to_end(
+            [1], NULL, NULL, 'callback_start', 'callback_end', 0, 9223372036854775807
+        ) AS e
+        JOIN flow_path([1], NULL, NULL) AS h USING (path_id)
+        JOIN callback_instance AS i
+            ON e.root_kind = 'callback_instance' AND e.root_id = i.callback_instance_id
+        JOIN place AS rp ON i.thread_id = rp.thread_id
+        JOIN take AS t ON e.take_id = t.take_id
+        JOIN place AS tp ON t.thread_id = tp.thread_id
+        JOIN subscription AS s ON t.subscription_id = s.subscription_id
+        JOIN node AS n ON s.node_id = n.node_id
+        WHERE e.status = 'reached'
+        """,
+    ),
+}
+PLACE = """
+CREATE TEMP VIEW IF NOT EXISTS place AS
+SELECT t.thread_id, h.hostname, p.pid, t.tid
+FROM thread AS t
+JOIN process AS p ON t.process_id = p.process_id
+JOIN host AS h ON p.host_id = h.host_id
+"""
+
+
+@pytest.mark.parametrize("table", CASES)
+def test_row_by_row(simulated: Ingested, table: str) -> None:
+    simulated.connection.execute(PLACE)
+    assert simulated.rows(f"SELECT count(*) FROM truth_{table}") > [(0,)]
+    assert simulated.differences(*CASES[table]) == ([], [])
+
+
+def test_latency_of_messages_on_one_clock(simulated: Ingested) -> None:
+    """From the end of the publication to the take, as far as one clock can tell."""
+    simulated.connection.execute(PLACE)
+    assert simulated.differences(
+        "SELECT take_rmw_ns, take_rmw_ns - publication_rmw_ns FROM truth_transport",
+        "SELECT taken_ns, latency_ns FROM link_transport JOIN take USING (take_id)",
+    ) == ([], [])
+
+
+def test_latency_of_flows(simulated: Ingested) -> None:
+    """The true duration is that of the trace, where begin and end are on one host."""
+    assert simulated.differences(
+        "SELECT latency_ns FROM truth_end_to_end WHERE root_host = sink_host",
+        """
+        SELECT latency_ns
+        FROM end_to_end(
+            [1], NULL, NULL, 'callback_start', 'callback_end', 0, 9223372036854775807
+        ) AS e
+        JOIN take AS t ON e.take_id = t.take_id
+        JOIN callback_instance AS i ON root_id = i.callback_instance_id
+        JOIN process AS rp ON i.process_id = rp.process_id
+        JOIN process AS tp ON t.process_id = tp.process_id
+        WHERE root_kind = 'callback_instance' AND status = 'reached' AND rp.host_id = tp.host_id
+        """,
+    ) == ([], [])
+
+
+def test_nothing_is_guessed_and_nothing_was_lost(simulated: Ingested) -> None:
+    for view in ("node", "publisher", "subscription"):
+        assert simulated.rows(f"SELECT * FROM {view} WHERE is_inferred") == []
+    assert simulated.rows("SELECT * FROM take WHERE method <> 'rmw'") == []
+    assert simulated.rows("SELECT * FROM callback WHERE kind = 'unknown'") == []
+    assert simulated.rows("SELECT * FROM loss_interval") == []
+
+
+def test_a_take_without_publication_is_none_of_a_traced_publisher(simulated: Ingested) -> None:
+    assert simulated.rows(
+        "SELECT * FROM take ANTI JOIN link_transport USING (take_id) WHERE method = 'rmw'"
+    ) == simulated.rows("SELECT * FROM truth_take WHERE publication_id IS NULL")
