@@ -2,7 +2,7 @@
 -- title: Publication rates and periods
 -- description: How many messages publishers published, at what rate, and how regularly. The rate is
 --     that between the first and the last publication in the time window.
--- grain: one row per publisher
+-- grain: one row per publisher that published
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR        Topic
 -- column: publisher VARCHAR         Node that published

@@ -6,51 +6,72 @@ import contextlib
 import fcntl
 import os
 import shutil
-import tempfile
-from pathlib import Path
+import uuid
 from typing import TYPE_CHECKING
 
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 _PREFIX = ".msgflow-ingest-"
-_LOCK = "lock"
+_LOCK = ".lock"
 
 
 @contextlib.contextmanager
 def workspace(beside: Path) -> Iterator[Path]:
     """Yield an empty directory in the directory of `beside`; it is gone afterwards.
 
-    What a killed ingest left behind is removed first: a directory whose lock nobody holds.
+    What a killed ingest left behind is removed first: a lock file that nobody holds tells.
 
     Raises:
         DatabaseError: the directory of the database cannot be written.
     """
     parent = beside.absolute().parent
-    _remove_abandoned(parent)
+    for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}"):
+        with contextlib.suppress(OSError), _locked(abandoned, wait=False):
+            shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
+    directory = parent / f"{_PREFIX}{uuid.uuid4().hex}"
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(_locked(directory.with_suffix(_LOCK), wait=True))
+            directory.mkdir()
+        except OSError as error:
+            raise DatabaseError(
+                f"cannot write — {parent}: {error.strerror}",
+                "give a database in a directory that exists and can be written with --db",
+            ) from error
+        stack.callback(shutil.rmtree, directory, ignore_errors=True)
+        yield directory
+
+
+@contextlib.contextmanager
+def _locked(path: Path, *, wait: bool) -> Iterator[None]:
+    """Hold the lock file `path`, which is removed with the lock.
+
+    Raises:
+        OSError: somebody else holds it and `wait` is false, or it cannot be created.
+    """
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            if _is_still(path, descriptor):
+                break
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)  # its last holder has removed it meanwhile
     try:
-        directory = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
-    except OSError as error:
-        raise DatabaseError(
-            f"cannot write — {parent}: {error.strerror}",
-            "give a database in a directory that exists and can be written with --db",
-        ) from error
-    try:
-        with open(directory / _LOCK, "wb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield directory
+        yield
     finally:
-        shutil.rmtree(directory, ignore_errors=True)
+        path.unlink(missing_ok=True)
+        os.close(descriptor)
 
 
-def _remove_abandoned(parent: Path) -> None:
-    for directory in parent.glob(f"{_PREFIX}*"):
-        with contextlib.suppress(OSError):
-            descriptor = os.open(directory / _LOCK, os.O_RDWR)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(directory, ignore_errors=True)
-            finally:
-                os.close(descriptor)
+def _is_still(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False

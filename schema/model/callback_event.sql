@@ -14,7 +14,7 @@ SELECT
     e.thread_id,
     e.handle AS callback_handle,
     e.kind = 'callback_start' AS is_start,
-    e.value = 1 AS is_intra_process,
+    coalesce(e.value = 1, false) AS is_intra_process,
     CASE WHEN g.event_id IS DISTINCT FROM e.event_id THEN e.previous.event_id END
         AS previous_event_id,
     coalesce(g.segment, 0) AS segment

@@ -90,7 +90,7 @@ chain AS (
             list_append(c.topics, u.topic_name) AS topics,
             c.path || ' → ' || coalesce(u.topic_name, '?') || ' → ' || u.to_node AS path,
             u.is_cached,
-            count(*) OVER (PARTITION BY c.run_id) > max_paths AS is_crowded
+            c.is_crowded OR count(*) OVER (PARTITION BY c.run_id) > max_paths AS is_crowded
         FROM chain AS c
         JOIN useful AS u
             ON c.subscriptions[-1] = u.from_subscription_id

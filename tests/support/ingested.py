@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
+import pytest
 
 from msgflow.db.connection import connect
+from msgflow.errors import TraceError
 from msgflow.ingest import IngestReport, ingest
+from msgflow.trace import bt2_library
 
 
 @dataclass(frozen=True)
@@ -34,3 +37,23 @@ class Ingested:
 def ingest_one(traces: Path, path: Path) -> Ingested:
     """Ingest the traces below a path into a new database."""
     return Ingested(ingest([traces], path), connect(path, read_only=True))
+
+
+def require_reader() -> None:
+    """Skip the test where traces cannot be read."""
+    try:
+        bt2_library.load()
+    except TraceError as error:
+        pytest.skip(error.message)
+
+
+def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:
+    """Return all rows of all tables of a database."""
+    with duckdb.connect(str(path), read_only=True) as connection:
+        tables = connection.execute(
+            "SELECT table_name FROM duckdb_tables() WHERE schema_name = 'store' ORDER BY 1"
+        ).fetchall()
+        return {
+            table: connection.execute(f"FROM store.{table} ORDER BY ALL").fetchall()
+            for (table,) in tables
+        }

@@ -24,30 +24,34 @@ class _Reader:
     pending: deque[int] = field(default_factory=deque)
 
 
-def random_system(seed: int, *, actions: int = 30) -> RosSystem:
-    """Make a system in which messages are published, dropped, taken and passed on."""
+def random_system(seed: int, *, actions: int = 20) -> RosSystem:
+    """Make a system in which messages are published, dropped, taken and passed on.
+
+    The first process is the source of a chain through the others, with more ways at random.
+    """
     random = Random(seed)
     system = RosSystem()
     system.add_source(0, "alpha", "boot-a")
     system.add_source(1, "beta", "boot-b")
-    threads = [Thread(100 + 100 * n, trace=n % 2) for n in range(random.randint(2, 4))]
+    threads = [Thread(100 + 100 * n, trace=n % 2) for n in range(random.randint(3, 5))]
     readers: dict[str, list[_Reader]] = {topic: [] for topic in TOPICS}
     publishers: dict[tuple[Thread, int], str] = {}
     timers: list[tuple[Thread, int, tuple[int, ...]]] = []
-    for thread in threads:
+    for position, thread in enumerate(threads):
         system.context(thread)
         system.node(thread, 0x1, f"node{thread.pid}")
         handles = []
         for number in range(random.randint(1, 2)):
             handles.append(0x10 + number)
-            publishers[thread, handles[-1]] = random.choice(TOPICS)
+            topic = random.choice(TOPICS) if number else TOPICS[min(position, 2)]
+            publishers[thread, handles[-1]] = topic
             system.publisher(thread, handles[-1], publishers[thread, handles[-1]])
-        for number in range(random.randint(0, 2)):
-            topic = random.choice(TOPICS)
+        for number in range(0 if thread is threads[0] else random.randint(1, 2)):
+            topic = random.choice(TOPICS) if number else TOPICS[min(position, 3) - 1]
             reader = _Reader(thread, 0x30 + number, 0xC0 + number, _some(random, handles))
             system.subscription(thread, reader.handle, topic, callback=reader.callback)
             readers[topic].append(reader)
-        if random.random() < 0.7 or thread is threads[0]:
+        if random.random() < 0.3 or thread is threads[0]:
             timers.append((thread, 0xD0, _some(random, handles) or (handles[0],)))
             system.timer(thread, 0x50, 0xD0)
     stamps = iter(range(1_000_000, 2_000_000, 7))
@@ -62,7 +66,7 @@ def random_system(seed: int, *, actions: int = 30) -> RosSystem:
 
     for _ in range(actions):
         waiting = [reader for group in readers.values() for reader in group if reader.pending]
-        if waiting and random.random() < 0.6:
+        if waiting and random.random() < 0.75:
             reader = random.choice(waiting)
             system.execute(reader.thread, reader.handle)
             system.take(reader.thread, reader.handle, reader.pending.popleft())
@@ -85,4 +89,4 @@ def random_system(seed: int, *, actions: int = 30) -> RosSystem:
 
 
 def _some(random: Random, handles: list[int]) -> tuple[int, ...]:
-    return tuple(random.choices(handles, k=random.randint(0, 2)))
+    return tuple(random.choices(handles, k=random.choice((0, 1, 1, 1, 2))))

@@ -8,16 +8,17 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one
+from ingested import Ingested, ingest_one, require_reader
 
 from msgflow.sim import scenarios, simulate
 
-_LENGTH = 0.1
+_LENGTH = 0.05
 
 
 @pytest.fixture(scope="session")
 def simulations(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Ingested]]:
     """Simulates and ingests a scenario; what is true of it are the views truth_<table>."""
+    require_reader()
     directory = tmp_path_factory.mktemp("simulated")
     with ExitStack() as opened:
 
@@ -45,6 +46,7 @@ def recordings(
     shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Ingested]]:
     """Ingests one of the recorded traces."""
+    require_reader()
     directory = tmp_path_factory.mktemp("recorded")
     with ExitStack() as opened:
 

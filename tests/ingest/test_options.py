@@ -1,0 +1,113 @@
+"""Options of an ingest, and what it reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+
+from msgflow.ingest import IngestProgress, ingest
+
+Make = Callable[..., Path]
+FIELDS = {
+    "ros2:rclcpp_publish": {"message": "u64"},
+    "ros2:rcl_publish": {"publisher_handle": "u64", "message": "u64"},
+    "ros2:rmw_publish": {"message": "u64"},
+    "dds:write_pre": {"writer": "u64", "data": "u64"},
+    "dds:write": {"writer": "u64", "timestamp": "i64"},
+    "ros2:from_the_future": {"x": "i32"},
+    "my_app:started": {"x": "i32"},
+}
+EVENTS = [
+    ("ros2:rclcpp_publish", (0xA,)),
+    ("ros2:rcl_publish", (0x10, 0xA)),
+    ("ros2:rmw_publish", (0xA,)),
+    ("dds:write_pre", (0x20, 0xA)),
+    ("dds:write", (0x20, 777)),
+    ("ros2:from_the_future", (1,)),
+    ("ros2:from_the_future", (2,)),
+    ("my_app:started", (1,)),
+]
+
+
+def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
+    with duckdb.connect(str(database), read_only=True) as connection:
+        return connection.execute(sql).fetchall()
+
+
+@pytest.mark.parametrize(
+    ("ignore", "stamp", "is_layer"), [((), 777, True), (("dds:*",), None, False)]
+)
+def test_events_may_be_ignored(
+    make_trace: Make, new_database: Path, ignore: tuple[str, ...], stamp: int | None, is_layer: bool
+) -> None:
+    """Everything is counted all the same; only what the catalogue lacks is reported."""
+    report = ingest([make_trace(FIELDS, EVENTS)], new_database, ignore=ignore)
+    assert report.event_count == len(EVENTS)
+    assert rows(
+        new_database, "SELECT source_timestamp_ns, dds_ns IS NOT NULL FROM publication"
+    ) == [(stamp, is_layer)]
+    assert rows(new_database, "SELECT event_count FROM trace") == [(len(EVENTS),)]
+    (unknown,) = (d for d in report.diagnostics if d.name == "unknown_event")
+    assert (unknown.severity, unknown.count) == ("info", 3)
+    assert "my_app:started (1), ros2:from_the_future (2)" in unknown.detail
+
+
+def test_staging_can_be_kept(trace: Path, new_database: Path, tmp_path: Path) -> None:
+    """Events as read and the objects of the model, as Parquet; without them nothing is left."""
+    kept = tmp_path / "kept" / "staging"
+    report = ingest([trace], new_database, keep_staging=kept)
+    files = {path.name for path in kept.iterdir()}
+    assert {"raw.ros2_rcl_publish.parquet", "raw.packet.parquet"} <= files
+    assert {"staging.publication.parquet", "staging.thread_event.parquet"} <= files
+    with duckdb.connect() as connection:
+        (count,) = connection.execute(
+            f"SELECT count(*) FROM '{kept}/raw.ros2_rcl_publish.parquet'"
+        ).fetchone()
+        (events,) = connection.execute(
+            f"SELECT sum(event_count) FROM '{kept}/raw.packet.parquet'"
+        ).fetchone()
+    assert (count,) == rows(
+        new_database, "SELECT count(*) FROM publication WHERE rcl_ns IS NOT NULL"
+    )[0]
+    assert events == report.event_count
+    assert [path.name for path in new_database.parent.iterdir()] == [new_database.name]
+
+
+def test_hosts_can_be_named(other_trace: Path, new_database: Path) -> None:
+    """All traces below a path; the others keep the name that they recorded."""
+    ingest([other_trace], new_database, hosts={"robot": str(other_trace / "alpha")})
+    assert rows(
+        new_database,
+        "SELECT hostname, count(*) FROM host JOIN process USING (host_id) GROUP BY 1 ORDER BY 1",
+    ) == [("beta", 1), ("robot", 2)]
+
+
+def test_progress_and_report(trace: Path, new_database: Path) -> None:
+    seen: list[IngestProgress] = []
+    report = ingest([trace], new_database, progress=seen.append)
+    stages = list(dict.fromkeys(state.stage for state in seen))
+    assert stages == list(report.stage_seconds)
+    assert stages[:2] == ["opening the traces", "reading the traces"]
+    fractions = [state.fraction for state in seen if state.fraction is not None]
+    assert fractions == sorted(fractions)
+    assert all(0 <= fraction <= 1 for fraction in fractions)
+    assert max(state.events for state in seen) <= report.event_count
+    assert report.seconds == pytest.approx(sum(report.stage_seconds.values()))
+    assert [d for d in report.diagnostics if d.name == "check_failed"] == []
+    assert rows(new_database, "SELECT run_id, name, event_count FROM store.run") == [
+        (report.run_id, report.run_name, report.event_count)
+    ]
+
+
+def test_a_session_is_found_from_any_directory_above(other_trace: Path, new_database: Path) -> None:
+    """Two hosts, each its own trace; the same one named twice is read once."""
+    report = ingest([other_trace.parent, other_trace / "alpha"], new_database)
+    assert rows(new_database, "SELECT hostname FROM host ORDER BY 1") == [("alpha",), ("beta",)]
+    assert rows(new_database, "SELECT sum(event_count)::BIGINT FROM trace") == [
+        (report.event_count,)
+    ]
+    assert report.run_name == other_trace.parent.name

@@ -1,0 +1,147 @@
+"""Runs of a database: added, refused, replaced, named; one says nothing about another."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+from ingested import contents
+
+from msgflow.db.tables import metadata
+from msgflow.errors import ExitCode, UsageError
+from msgflow.ingest import ingest
+
+RUNS = "SELECT run_id, name FROM run ORDER BY run_id"
+
+
+def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
+    with duckdb.connect(str(database), read_only=True) as connection:
+        return connection.execute(sql).fetchall()
+
+
+def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
+    """Rows of a run, its ids counted from 1 as in a database of its own."""
+    result = {}
+    with duckdb.connect(str(database), read_only=True) as connection:
+        for table in metadata.tables.values():
+            if "run_id" not in table.columns or table.name == "run":
+                continue
+            columns = []
+            for column in table.columns:
+                key = (column.info.get("references") or f"{table.name}.{column.name}").split(".")
+                base = ""
+                if column.name != "run_id" and key[1] == f"{key[0]}_id":
+                    base = f" - (SELECT min({key[1]}) FROM store.{key[0]} WHERE run_id = $run) + 1"
+                columns.append(f"{column.name}{base}" if column.name != "run_id" else "1")
+            result[table.name] = connection.execute(
+                f"SELECT {', '.join(columns)} FROM {table.fullname} WHERE run_id = $run "
+                "ORDER BY ALL",
+                {"run": run_id},
+            ).fetchall()
+    return result
+
+
+def test_a_second_run_has_the_ids_of_the_first_continued(
+    database: Path, new_database_of_other: Path, other_trace: Path
+) -> None:
+    """And the same rows as in an empty database; those of the first run stay."""
+    before = of_run(database, 1)
+    report = ingest([other_trace], database)
+    assert (report.run_id, report.run_name) == (2, "pair")
+    assert rows(database, RUNS) == [(1, "robot"), (2, "pair")]
+    assert of_run(database, 1) == before
+    assert of_run(database, 2) == of_run(new_database_of_other, 1)
+    assert rows(database, "SELECT max(publication_id) = count(*) FROM publication") == [(True,)]
+
+
+@pytest.fixture
+def new_database_of_other(other_trace: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "other.duckdb"
+    ingest([other_trace], path)
+    return path
+
+
+def test_the_same_trace_gives_the_same_rows_in_another_database(
+    database: Path, trace: Path, tmp_path: Path
+) -> None:
+    """Ids too; only the moment of the ingest differs."""
+    again = tmp_path / "again.duckdb"
+    ingest([trace], again)
+    first, second = contents(database), contents(again)
+    first.pop("run")
+    second.pop("run")
+    assert second == first
+
+
+def test_the_same_packets_are_refused(database: Path, trace: Path, tmp_path: Path) -> None:
+    """Also from a copy elsewhere, and under another name."""
+    before = contents(database)
+    copy = tmp_path / "copy"
+    shutil.copytree(trace, copy)
+    for path, name in ((trace, None), (copy, "another")):
+        with pytest.raises(UsageError, match=r"already — run robot \(1\)") as raised:
+            ingest([path], database, name=name)
+        assert raised.value.exit_code == ExitCode.USAGE
+        assert "--replace" in (raised.value.hint or "")
+    assert contents(database) == before
+
+
+def test_a_replacement_keeps_other_runs(database: Path, trace: Path, other_trace: Path) -> None:
+    ingest([other_trace], database)
+    before, other = of_run(database, 1), of_run(database, 2)
+    report = ingest([trace], database, replace=True)
+    assert rows(database, RUNS) == [(2, "pair"), (3, "robot")]
+    assert (report.run_id, report.run_name) == (3, "robot")
+    assert of_run(database, 2) == other
+    assert of_run(database, 3) == before
+    assert not any(of_run(database, 1).values())
+
+
+def test_one_ingest_may_replace_several_runs(
+    database: Path, trace: Path, other_trace: Path
+) -> None:
+    ingest([other_trace], database)
+    ingest([trace, other_trace], database, replace=True, name="both")
+    assert rows(database, RUNS) == [(3, "both")]
+    assert rows(database, "SELECT count(*) FROM trace") == [(3,)]
+
+
+def test_names_given_must_be_free(database: Path, trace: Path, other_trace: Path) -> None:
+    """Unless the run of that name is to be replaced."""
+    before = contents(database)
+    with pytest.raises(UsageError, match="name already — robot") as raised:
+        ingest([other_trace], database, name="robot")
+    assert "--replace" in (raised.value.hint or "")
+    assert contents(database) == before
+    ingest([other_trace], database, name="robot", replace=True)
+    assert rows(database, RUNS) == [(2, "robot")]
+    assert rows(database, "SELECT count(*) FROM trace") == [(2,)]
+
+
+def test_names_not_given_are_made_free(database: Path, other_trace: Path, tmp_path: Path) -> None:
+    shutil.copytree(other_trace, tmp_path / "robot")
+    assert ingest([tmp_path / "robot"], database).run_name == "robot-2"
+
+
+def test_packets_given_twice_are_read_once(
+    new_database: Path,
+    database_of_trace: dict[str, list[tuple[Any, ...]]],
+    trace: Path,
+    tmp_path: Path,
+) -> None:
+    """A copied directory is one more trace without anything in it."""
+    shutil.copytree(trace, tmp_path / "copy")
+    report = ingest([trace, tmp_path / "copy"], new_database)
+    (found,) = (d for d in report.diagnostics if d.name == "duplicate_packet")
+    assert found.count > 0
+    after = contents(new_database)
+    for table in ("publication", "take", "callback_instance", "link_transport", "link_causal"):
+        assert len(after[table]) == len(database_of_trace[table]) > 0
+
+
+@pytest.fixture
+def database_of_trace(_ingested: Path) -> dict[str, list[tuple[Any, ...]]]:
+    return contents(_ingested)
