@@ -14,8 +14,8 @@
 --     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
--- param: max_depth BIGINT = 32     Longest path, in topics
--- param: max_paths BIGINT = 10000  Most chains followed per length
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
 -- column: run_id BIGINT            Run
 -- column: roots BIGINT             Flows that began in the time window
 -- column: reached BIGINT           Roots that reached the end of the path
@@ -29,13 +29,16 @@
 -- column: p95_ns BIGINT [ns]       95 % of the latencies are at most this
 -- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
 -- column: max_ns BIGINT [ns]       Longest latency
+-- column: sink_event VARCHAR       Event that stopped the clock: to_event, or 'take' where the
+--     sink never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
 -- column: path VARCHAR             Nodes and topics
+-- note: clocks
 -- needs: main.flow_path, main.end_to_end
 WITH flow AS (
     SELECT
-        run_id, path_id, root_kind, root_id, latency_ns, status, reason,
+        run_id, path_id, root_kind, root_id, sink_event, latency_ns, status, reason,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last
@@ -83,6 +86,7 @@ latency AS (
         run_id,
         path_id,
         count(*) AS pairs,
+        any_value(sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
         round(avg(latency_ns))::BIGINT AS mean_ns,
@@ -105,6 +109,7 @@ SELECT
     l.quantiles[2] AS p95_ns,
     l.quantiles[3] AS p99_ns,
     l.max_ns,
+    l.sink_event,
     p.is_cut,
     r.lost_reasons,
     p.path

@@ -34,15 +34,26 @@ WITH member AS (
     JOIN main.host AS h ON p.host_id = h.host_id
     WHERE list_contains($runs, x.run_id)
 ),
+last_state AS (
+    SELECT thread_id, max(start_ns) AS start_ns
+    FROM main.executor_state
+    WHERE list_contains($runs, run_id)
+    GROUP BY thread_id
+),
+-- The last state of a thread lasts until the thread was seen last; one before a gap, nobody knows.
 in_state AS (
     SELECT
         m.thread_id,
         s.state,
         greatest(
-            least(coalesce(s.end_ns, m.last_ns), m.last_ns) - greatest(s.start_ns, m.first_ns), 0
+            least(coalesce(s.end_ns, m.last_ns), m.last_ns)
+            - greatest(s.start_ns, m.first_ns),
+            0
         ) AS duration_ns
     FROM member AS m
     JOIN main.executor_state AS s ON m.thread_id = s.thread_id
+    JOIN last_state AS l ON m.thread_id = l.thread_id
+    WHERE s.end_ns IS NOT NULL OR l.start_ns = s.start_ns
 ),
 state AS (
     SELECT

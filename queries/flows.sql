@@ -11,8 +11,8 @@
 --     stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
--- param: max_depth BIGINT = 32     Longest path, in topics
--- param: max_paths BIGINT = 10000  Most chains followed per length
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
 -- column: run_id BIGINT            Run
 -- column: root_kind VARCHAR        'callback_instance' or 'publication'
 -- column: root_id BIGINT           Identity of the root
@@ -23,6 +23,7 @@
 -- column: status VARCHAR           'reached', 'superseded', 'lost' or 'edge'
 -- column: reason VARCHAR           Why it did not arrive
 -- column: path VARCHAR             Nodes and topics
+-- note: clocks
 -- needs: main.flow_path, main.end_to_end
 SELECT
     f.run_id,

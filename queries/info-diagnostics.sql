@@ -1,7 +1,7 @@
 -- name: info-diagnostics
 -- title: Data quality
 -- description: What is worth knowing about the input before trusting a number: lost events,
---     unknown events, missing contexts. The worst comes first.
+--     unknown events, callbacks never seen to end, failed checks. The worst comes first.
 -- grain: one row per finding
 -- column: run_id BIGINT      Run
 -- column: severity VARCHAR   error, data_loss, warning or info

@@ -19,6 +19,7 @@
 -- column: max_ns BIGINT [ns]        Longest latency
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- note: clocks
 -- needs: main.take, main.link_transport, main.subscription, main.node, main.process
 WITH received AS (
     SELECT t.run_id, t.subscription_id, t.take_id, l.candidate_count, l.latency_ns

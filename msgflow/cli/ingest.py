@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption
 from msgflow.errors import UsageError
+from msgflow.query.interrupt import noted_interrupts
+
+if TYPE_CHECKING:
+    from msgflow.ingest import IngestReport
 
 
 class Reader(StrEnum):
@@ -21,7 +25,7 @@ class Reader(StrEnum):
 
 def command(
     traces: Annotated[
-        list[Path],
+        list[str],
         typer.Argument(
             metavar="TRACE...",
             help="Directories with CTF traces, at any depth; all of them become one run",
@@ -49,23 +53,29 @@ def command(
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Read LTTng traces of a ROS 2 system into a database, as one run."""
-    from msgflow.cli.output import count, print_note, print_status
-    from msgflow.cli.progress import ingest_progress
-    from msgflow.database import Database
-
     hosts = _hosts(host or [])
-    with Database(database) as opened, ingest_progress(quiet) as progress:
-        report = opened.ingest(
-            traces,
-            name=name,
-            replace=replace,
-            hosts=hosts,
-            keep_staging=keep_staging,
-            reader=reader.value,
-            progress=progress,
-        )
-    if quiet:
-        return
+    # From before the imports, which may lose Ctrl-C, until the last word about a stored run.
+    with noted_interrupts():
+        from msgflow.cli.progress import ingest_progress
+        from msgflow.database import Database
+
+        with Database(database) as opened, ingest_progress(quiet) as progress:
+            report = opened.ingest(
+                traces,
+                name=name,
+                replace=replace,
+                hosts=hosts,
+                keep_staging=keep_staging,
+                reader=reader.value,
+                progress=progress,
+            )
+        if not quiet:
+            _print_report(report, database)
+
+
+def _print_report(report: IngestReport, database: Path) -> None:
+    from msgflow.cli.output import count, print_note, print_status
+
     rate = report.event_count / report.seconds if report.seconds else 0.0
     print_status(
         f"{count(report.event_count, 'event')} read into {database} as run"

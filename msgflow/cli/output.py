@@ -45,7 +45,7 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
         path: file to write, replaced when it exists; stdout when None.
 
     Raises:
-        UsageError: Parquet on a terminal, or a file that cannot be written.
+        UsageError: Parquet on a terminal, a closed stdout, or a file that cannot be written.
     """
     from msgflow.atomic import replacing
 
@@ -59,9 +59,10 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
             write_result(result, form, stream)
         print_status(f"{count(len(result), 'row')} written to {path}")
     else:
-        if form is Format.PARQUET and sys.stdout.isatty():
+        stdout = _stdout()
+        if form is Format.PARQUET and stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        write_result(result, form, _stdout())
+        write_result(result, form, stdout)
     if path is None and not len(result):
         print_note("no rows")
     for note in result.notes:
@@ -69,7 +70,11 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Write lines of text to stdout."""
+    """Write lines of text to stdout.
+
+    Raises:
+        UsageError: stdout is closed.
+    """
     stream = _stdout()
     for line in lines:
         stream.write(f"{line}\n".encode())
@@ -80,7 +85,16 @@ def count(number: int, thing: str) -> str:
     return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
 
 
+def discard_stdout() -> None:
+    """Let stdout lead nowhere, also what is still to be written to it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _stdout() -> IO[bytes]:
+    if sys.stdout is None:  # closed by whoever started this process
+        raise UsageError(
+            "cannot write to stdout: it is closed", "write to a file, for instance with -o FILE"
+        )
     sys.stdout.flush()
     return sys.stdout.buffer
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 @contextmanager
 def ingest_progress(quiet: bool) -> Iterator[Callable[[IngestProgress], None] | None]:
     """Yield the function that shows the progress of an ingest, or None where nobody looks."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console

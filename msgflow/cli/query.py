@@ -7,8 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from msgflow.cli.query_command import build_command
-from msgflow.errors import UsageError
+from msgflow.cli.query_command import build_command, refuse_list
 from msgflow.query.catalogue import load_queries, load_query, query_names
 
 
@@ -41,10 +40,7 @@ def group(
     """List the queries, unless one is named."""
     if context.invoked_subcommand is not None:
         if list_queries:
-            raise UsageError(
-                "--list takes no name of a query",
-                f"msgflow query --list, or msgflow query {context.invoked_subcommand} --help",
-            )
+            refuse_list(context.invoked_subcommand)
         return
     from msgflow.cli.output import print_lines
     from msgflow.export.table import lay_out

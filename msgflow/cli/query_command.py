@@ -20,6 +20,7 @@ from msgflow.cli.options import (
     SkipFirstOption,
     StartOption,
 )
+from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
     from msgflow.query.header import Header, Param
@@ -45,6 +46,28 @@ _OWN = "own_"
 _ShowOption = Annotated[
     bool,
     typer.Option("--show", help="Print the SQL and run nothing", rich_help_panel=OUTPUT),
+]
+
+
+def refuse_list(name: str | None) -> None:
+    """Refuse `--list` beside the name of a query.
+
+    Raises:
+        UsageError: always.
+    """
+    raise UsageError(
+        "--list takes no name of a query",
+        f"msgflow query --list, or msgflow query {name} --help",
+    )
+
+
+def _refuse_list(context: typer.Context, wanted: bool) -> None:
+    if wanted:
+        refuse_list(context.info_name)
+
+
+_ListOption = Annotated[
+    bool, typer.Option("--list", hidden=True, is_eager=True, callback=_refuse_list)
 ]
 
 
@@ -74,6 +97,7 @@ def build_command(header: Header) -> Any:
         ("form", FormatOption, None),
         ("output", OutputOption, None),
         ("show", _ShowOption, False),
+        ("list_queries", _ListOption, False),
         ("database", DatabaseOption, DEFAULT_DATABASE),
     ):
         parameters.append(
@@ -131,6 +155,8 @@ def _describe(param: Param) -> str:
     text = param.description
     if param.choices:
         text += f" ({', '.join(param.choices)})"
+    if param.minimum is not None:
+        text += f" (at least {param.minimum})"
     if param.has_default and param.default is not None:
         default = param.default
         text += f" [default: {str(default).lower() if isinstance(default, bool) else default}]"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
@@ -10,10 +11,11 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from msgflow.cli.output import print_error
+from msgflow.cli.output import discard_stdout, print_error
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
+_CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 COMMANDS = ("ingest", "query", "sql", "info", "export", "db", "simulate")
 
 
@@ -37,6 +39,8 @@ class RootGroup(TyperGroup):
             code = error.exit_code
         except (typer.Abort, KeyboardInterrupt):
             code = ExitCode.INTERRUPTED
+        except OSError as error:
+            code = _unwritable(error) if _is_of_stdout(error) else _unexpected(error)
         except Exception as error:
             code = ExitCode.INTERRUPTED if _is_interrupt(error) else _unexpected(error)
         if code == ExitCode.INTERRUPTED:
@@ -47,10 +51,11 @@ class RootGroup(TyperGroup):
         """Run the command; a reader that went away (`… | head`) ends it quietly."""
         try:
             value = super().invoke(ctx)
-            sys.stdout.flush()
+            if sys.stdout is not None:
+                sys.stdout.flush()
         except BrokenPipeError:
             # Python flushes stdout once more when it exits, which must not complain either.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            discard_stdout()
             raise typer.Exit(ExitCode.OK) from None
         return value
 
@@ -58,6 +63,21 @@ class RootGroup(TyperGroup):
 def _is_interrupt(error: Exception) -> bool:
     # DuckDB turns the interrupt of a running query into an exception of its own.
     return isinstance(error, RuntimeError) and str(error) == "Query interrupted"
+
+
+def _is_of_stdout(error: OSError) -> bool:
+    # Files are named by the errors of opening them, and those of writing are caught where we write.
+    return error.filename is None and error.errno in _CANNOT_WRITE
+
+
+def _unwritable(error: OSError) -> ExitCode:
+    # Python would complain once more about what is left, when it exits.
+    discard_stdout()
+    reason = (error.strerror or str(error)).lower()
+    print_error(
+        f"cannot write to stdout: {reason}", "write to another place, for instance with -o FILE"
+    )
+    return ExitCode.USAGE
 
 
 def _usage(error: typer.TyperException) -> tuple[str, str | None]:

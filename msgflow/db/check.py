@@ -1,6 +1,6 @@
 """Audits: what must be true of every database, and which rows break it.
 
-`schema/check` holds one audit per file, a query that returns the offending rows. Relations between
+`schema/check` holds one audit per file, a query that returns the offending rows with their run. Relations between
 tables are audited from what `tables.py` declares, since there are no foreign keys.
 """
 
@@ -40,17 +40,18 @@ def run_checks(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> lis
 
     Args:
         con: connection to a current database.
-        run_id: look at the relations of this run only; at those of all runs when None.
+        run_id: look at this run only; at all runs when None.
     """
-    return [*_audits(con), *_relations(con, run_id)]
+    return [*_audits(con, run_id), *_relations(con, run_id)]
 
 
-def _audits(con: duckdb.DuckDBPyConnection) -> Iterator[CheckResult]:
+def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
+    of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
     for header in objects.load("check"):
         yield CheckResult(
             header.name,
             header.severity or "error",
-            _count(con, f"SELECT count(*) FROM ({header.body})"),
+            _count(con, f"SELECT count(*) FROM ({header.body}){of_run}"),
             header.description,
         )
 

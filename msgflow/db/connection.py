@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -109,18 +110,16 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         DatabaseError: it is foreign, newer, or has to be upgraded.
     """
     revision = require_known(con, path)
+    hint = f"msgflow db upgrade --db {shlex.quote(str(path))}"
     if revision != head_revision():
         raise DatabaseError(
             f"database has schema revision {revision}, this msgflow needs {head_revision()} "
             f"— {path}",
-            f"msgflow db upgrade --db {path}",
+            hint,
         )
     row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
     if row is None or row[0] != definition_hash():
-        raise DatabaseError(
-            f"database has the views of another msgflow version — {path}",
-            f"msgflow db upgrade --db {path}",
-        )
+        raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
 
 
 def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import duckdb
+
 from msgflow import trace as trace_package
 from msgflow.db import migrate, objects
 from msgflow.db.check import run_checks
@@ -19,14 +21,14 @@ from msgflow.db.store import delete, store
 from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
 from msgflow.ingest.workspace import workspace
-from msgflow.query.interrupt import interruptible
+from msgflow.query.interrupt import interruptible, noted_interrupts
+from msgflow.query.window import is_run_name
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    import duckdb
-
+    from msgflow.query.interrupt import Interrupts
     from msgflow.trace import Progress, TraceInfo
 
 # Enough for a run of any size: what does not fit goes to the workspace on disk.
@@ -99,11 +101,13 @@ def ingest(
 ) -> IngestReport:
     """Read all traces below `paths` into `database` as one run.
 
-    Everything happens in one transaction; a new database appears only when it is complete.
+    Everything happens in one transaction; a new database appears only when it is complete. Ctrl-C
+    ends the ingest until the run is stored, and is ignored while it is being finished after that.
 
     Args:
         paths: CTF traces, session directories, or directories above such.
-        database: the database file; created where it does not exist.
+        database: the database file; created where it does not exist, or where a symbolic link of
+            that name points to.
         name: name of the run; that of the first path when None.
         replace: delete the runs that hold some of these packets already, or have this name.
         hosts: name of a host -> path; the traces below the path belong to that host.
@@ -116,19 +120,29 @@ def ingest(
     Raises:
         TraceError: a path holds no trace, or none that can be read and used.
         DatabaseError: the database is locked, foreign, or of another schema revision.
-        UsageError: the packets are in the database already, or the name of the run is taken.
+        UsageError: the packets are in the database already, the name of the run is taken or means
+            something else, or a path is empty.
+        KeyboardInterrupt: Ctrl-C came before the run was stored.
     """
-    watch = _Watch(progress)
-    watch.enter("opening the traces")
-    with trace_package.open(paths, reader=reader) as traces:
-        judge.require_ros_traces(traces.traces)
-        hostnames = _hostnames(traces.traces, hosts or {})
-        migrate.require_ingestable(database)
-        with workspace(database) as directory, _target(database, directory) as target:
-            con = connect(
-                target, read_only=False, memory_limit=memory_limit or DEFAULT_MEMORY_LIMIT
-            )
-            try:
+    _require_usable(paths, name)
+    if database.is_symlink():
+        database = Path(os.path.realpath(database))
+    with noted_interrupts() as interrupts:
+        watch = _Watch(progress, interrupts)
+        watch.enter("opening the traces")
+        with trace_package.open(paths, reader=reader) as traces:
+            judge.require_ros_traces(traces.traces)
+            hostnames = _hostnames(traces.traces, hosts or {})
+            migrate.require_ingestable(database)
+            with (
+                workspace(database) as directory,
+                _target(database, directory) as target,
+                contextlib.closing(
+                    connect(
+                        target, read_only=False, memory_limit=memory_limit or DEFAULT_MEMORY_LIMIT
+                    )
+                ) as con,
+            ):
                 con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET preserve_insertion_order = false")
                 if name is not None and not replace:
@@ -141,26 +155,25 @@ def ingest(
                     hostnames=hostnames,
                     ignore=ignore,
                     replace=replace,
+                    interrupts=interrupts,
                     progress=watch.reading,
                 )
                 judge.require_ros_events(traces.traces, loaded.event_counts)
-                fallback = Path(paths[0]).resolve().name or "run"
+                names = (name, _fallback_name(paths))
                 run = interruptible(
-                    con, lambda: _write(con, name, fallback, loaded, keep_staging, watch)
+                    con, lambda: _write(con, names, loaded, keep_staging, watch, interrupts)
                 )
                 watch.enter("closing the database")
-            finally:
-                con.close()
-    return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
+        return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
 
 
 def _write(
     con: duckdb.DuckDBPyConnection,
-    name: str | None,
-    fallback: str,
+    names: tuple[str | None, str],
     loaded: staging.Loaded,
     keep_staging: Path | None,
     watch: _Watch,
+    interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
     watch.enter("building the model")
     model.build(con, keep=keep_staging is not None)
@@ -170,16 +183,19 @@ def _write(
     con.begin()
     try:
         watch.enter("storing the run")
-        run_id, run_name = _store(con, name, fallback, loaded)
+        run_id, run_name = _store(con, *names, loaded)
         watch.enter("linking messages")
         derive(con, run_id)
         watch.enter("checking the database")
         _check(con, run_id)
+        diagnostics = _diagnostics(con, run_id)
+        interrupts.make_final()
         con.commit()
     except BaseException:
-        con.rollback()
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
         raise
-    return run_id, run_name, _diagnostics(con, run_id)
+    return run_id, run_name, diagnostics
 
 
 def _store(
@@ -236,6 +252,23 @@ def _diagnostics(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Diagnosti
     return tuple(Diagnostic(*row) for row in rows)
 
 
+def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
+    if "" in paths:
+        raise UsageError(
+            "the path of a trace is empty", "msgflow ingest TRACE, or . for the current directory"
+        )
+    if name is not None and not is_run_name(name):
+        raise UsageError(
+            f"a run cannot have a name that --run takes for something else — {name!r}",
+            "give a --name that is neither empty, nor 'all', nor a number",
+        )
+
+
+def _fallback_name(paths: Sequence[str | Path]) -> str:
+    name = Path(paths[0]).resolve().name
+    return name if is_run_name(name) else f"run-{name}".rstrip("-")
+
+
 def _require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
     if name in _names(con):
         raise UsageError(
@@ -288,10 +321,13 @@ def _target(database: Path, directory: Path) -> Iterator[Path]:
 
 
 class _Watch:
-    """Times the stages and reports them."""
+    """Times the stages and reports them, and ends the ingest between two of them on Ctrl-C."""
 
-    def __init__(self, report: Callable[[IngestProgress], None] | None) -> None:
+    def __init__(
+        self, report: Callable[[IngestProgress], None] | None, interrupts: Interrupts
+    ) -> None:
         self._report = report
+        self._interrupts = interrupts
         self._seconds: dict[str, float] = {}
         self._stage: str | None = None
         self._since = 0.0
@@ -299,7 +335,8 @@ class _Watch:
         self._rate = 0.0
 
     def enter(self, stage: str) -> None:
-        """Begin a stage; the one before it has ended."""
+        """Begin a stage, unless Ctrl-C came during the one before."""
+        self._interrupts.check()
         self._close()
         self._stage, self._since = stage, time.monotonic()
         self._tell(None)

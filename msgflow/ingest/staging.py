@@ -8,10 +8,13 @@ and the objects of `schema/model`.
 
 from __future__ import annotations
 
+import contextlib
 import fnmatch
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.errors import UsageError
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Tracepoint, load
@@ -21,8 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    import duckdb
     import pyarrow as pa
+
+    from msgflow.query.interrupt import Interrupts
 
 _PACKET_TABLE = """
 CREATE TABLE raw.packet (
@@ -102,6 +106,7 @@ def load_traces(
     hostnames: Mapping[int, str],
     ignore: Sequence[str],
     replace: bool,
+    interrupts: Interrupts,
     progress: Callable[[Progress, float], None] | None,
 ) -> Loaded:
     """Load all wanted events and all packets of `traces`.
@@ -112,11 +117,13 @@ def load_traces(
         hostnames: trace index -> name of the host, where the user gave one.
         ignore: patterns of event names to leave out, such as 'dds:*'.
         replace: packets that the database holds already are no error.
+        interrupts: asked at every batch.
         progress: called with the reader's progress and the seconds since the begin.
 
     Raises:
         TraceError: a trace is damaged.
         UsageError: the database holds these packets already, and `replace` is false.
+        KeyboardInterrupt: Ctrl-C came.
     """
     tracepoints = load().tracepoints
     wanted = {
@@ -129,12 +136,14 @@ def load_traces(
     started = time.monotonic()
 
     def report(state: Progress) -> None:
+        interrupts.check()
         if progress is not None:
             progress(state, time.monotonic() - started)
 
     con.begin()
     try:
         for item in traces.batches(wanted, progress=report):
+            interrupts.check()
             if item.name == PACKET:
                 replaced |= _same_packets(con, item.batch, replace)
                 _insert(con, "raw.packet", item.batch)
@@ -142,7 +151,8 @@ def load_traces(
                 _insert(con, f"raw.{tracepoints[item.name].table}", item.batch)
         con.commit()
     except BaseException:
-        con.rollback()
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
         raise
     for (trace_index, name), count in traces.event_counts.items():
         con.execute(

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import shutil
 import uuid
 from typing import TYPE_CHECKING
 
 from msgflow.errors import DatabaseError
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks
+    fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,19 +27,21 @@ _LOCK = ".lock"
 def workspace(beside: Path) -> Iterator[Path]:
     """Yield an empty directory in the directory of `beside`; it is gone afterwards.
 
-    What a killed ingest left behind is removed first: a lock file that nobody holds tells.
+    What a killed ingest left behind is removed first: a lock file that nobody holds tells. Where
+    the system has no such locks, what was left stays.
 
     Raises:
         DatabaseError: the directory of the database cannot be written.
     """
     parent = beside.absolute().parent
-    for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}"):
+    for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}") if fcntl else ():
         with contextlib.suppress(OSError), _locked(abandoned, wait=False):
             shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
     directory = parent / f"{_PREFIX}{uuid.uuid4().hex}"
     with contextlib.ExitStack() as stack:
         try:
-            stack.enter_context(_locked(directory.with_suffix(_LOCK), wait=True))
+            if fcntl:
+                stack.enter_context(_locked(directory.with_suffix(_LOCK), wait=True))
             directory.mkdir()
         except OSError as error:
             raise DatabaseError(

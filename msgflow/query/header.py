@@ -7,10 +7,13 @@
     -- grain: one row per path
     -- param: from VARCHAR = NULL     Topic where flows start; every source when NULL
     -- param: case VARCHAR {first|last} = 'first'     Which rows count
+    -- param: depth BIGINT {1..} = 32     How deep; at least 1
     -- column: median_ns BIGINT [ns]  Half of the flows took no longer
+    -- note: clocks
     -- needs: flow_path, stat_end_to_end
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
+`note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.query.value import Value, parse_literal
+from msgflow.query.value import Value, is_integer, parse_literal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,9 +36,11 @@ _CHOICES = r"(?: +\{(?P<choices>[^{}]+)\})?"
 _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
+_MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
-_SINGLE = ("name", "title", "description", "grain", "kind", "severity", "needs")
+_SINGLE = ("name", "title", "description", "grain", "kind", "severity", "note", "needs")
 _KINDS = ("view", "macro")
+_NOTES = ("clocks",)
 
 
 class HeaderError(ValueError):
@@ -53,6 +58,7 @@ class Param:
         has_default: false where the caller has to give a value.
         description: one sentence.
         choices: the only values allowed, or empty for any.
+        minimum: the least integer allowed, or None for any.
     """
 
     name: str
@@ -61,6 +67,7 @@ class Param:
     has_default: bool
     description: str
     choices: tuple[str, ...] = ()
+    minimum: int | None = None
 
 
 @dataclass(frozen=True)
@@ -94,6 +101,7 @@ class Header:
         columns: output columns in the order of the file.
         needs: names of the objects that the body reads.
         severity: of a check, else None.
+        note: 'clocks' where rows compare times of several hosts, else None.
         body: the SQL below the header.
         path: the file.
     """
@@ -107,6 +115,7 @@ class Header:
     columns: tuple[Column, ...]
     needs: tuple[str, ...]
     severity: str | None
+    note: str | None
     body: str
     path: Path
 
@@ -147,6 +156,9 @@ def parse(text: str, path: Path) -> Header:
     kind = single.get("kind", "view")
     if kind not in _KINDS:
         raise _error(path, 1, f"kind {kind!r} is not one of {', '.join(_KINDS)}")
+    note = single.get("note")
+    if note is not None and note not in _NOTES:
+        raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
     params = tuple(_param(field, path) for field in fields if field.key == "param")
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
@@ -161,6 +173,7 @@ def parse(text: str, path: Path) -> Header:
         columns=columns,
         needs=tuple(part.strip() for part in single.get("needs", "").split(",") if part.strip()),
         severity=single.get("severity"),
+        note=note,
         body=body,
         path=path,
     )
@@ -211,10 +224,18 @@ def _param(field: _Field, path: Path) -> Param:
         raise _error(
             path,
             field.line,
-            "expected '-- param: name TYPE {choice|choice} = default  description' (choices and"
-            f" default may be left out, two spaces end the default), not {field.value!r}",
+            "expected '-- param: name TYPE {choice|choice} = default  description' (choices, or"
+            " {minimum..} of an integer, and default may be left out, two spaces end the default),"
+            f" not {field.value!r}",
         )
     choices = tuple(part.strip() for part in (match["choices"] or "").split("|") if part.strip())
+    minimum: int | None = None
+    if (
+        is_integer(match["type"])
+        and len(choices) == 1
+        and (least := _MINIMUM.fullmatch(choices[0]))
+    ):
+        minimum, choices = int(least[1]), ()
     default: Value = None
     if match["default"] is not None:
         try:
@@ -223,6 +244,8 @@ def _param(field: _Field, path: Path) -> Param:
             raise _error(path, field.line, str(error)) from None
         if choices and default is not None and default not in choices:
             raise _error(path, field.line, f"the default {default!r} is not among the choices")
+        if minimum is not None and isinstance(default, int) and default < minimum:
+            raise _error(path, field.line, f"the default {default!r} is less than {minimum}")
     return Param(
         name=match["name"],
         type=match["type"],
@@ -230,6 +253,7 @@ def _param(field: _Field, path: Path) -> Param:
         has_default=match["default"] is not None,
         description=" ".join(match["description"].split()),
         choices=choices,
+        minimum=minimum,
     )
 
 

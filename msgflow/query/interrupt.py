@@ -1,18 +1,90 @@
-"""Ctrl-C that always works while DuckDB runs a statement."""
+"""Ctrl-C that is never lost, and heeded only where it leaves nothing half done.
+
+Python raises KeyboardInterrupt wherever the main thread happens to be: inside of a callback of the
+garbage collector it is printed and forgotten, inside of DuckDB it becomes another exception. Hence
+the signal is only noted here, and raised by those who ask for it.
+"""
 
 from __future__ import annotations
 
+import signal
 import threading
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from types import FrameType
 
     import duckdb
 
 _T = TypeVar("_T")
 _SECONDS_BETWEEN_ATTEMPTS = 0.05
+
+
+class Interrupts:
+    """What is known of Ctrl-C: whether it came, and whether it still counts."""
+
+    def __init__(self) -> None:
+        self._is_noted = False
+        self._is_final = False
+        self._lock = threading.Lock()
+
+    def on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Note Ctrl-C; the second one is raised at once, for work that does not ask for long."""
+        if self._is_noted and not self._is_final:
+            raise KeyboardInterrupt
+        self._is_noted = True
+
+    def note(self) -> None:
+        """Take Ctrl-C for noted that was raised by somebody else."""
+        self._is_noted = True
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt if Ctrl-C came in time."""
+        if self._is_noted and not self._is_final:
+            raise KeyboardInterrupt
+
+    def make_final(self) -> None:
+        """Raise KeyboardInterrupt if Ctrl-C came before; from now on it comes too late.
+
+        Called before the one step that cannot be taken back, by any thread.
+        """
+        with self._lock:
+            self.check()
+            self._is_final = True
+
+    def forward(self, connection: duckdb.DuckDBPyConnection) -> None:
+        """Interrupt what `connection` runs if Ctrl-C came in time."""
+        with self._lock:
+            if self._is_noted and not self._is_final:
+                connection.interrupt()
+
+
+@contextmanager
+def noted_interrupts() -> Iterator[Interrupts]:
+    """Note Ctrl-C instead of raising it; inside of another such block, share what that noted.
+
+    Only the main thread receives signals. Where the program that uses msgflow handles Ctrl-C
+    itself, or ignores it, that stays so.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield Interrupts()
+        return
+    previous = signal.getsignal(signal.SIGINT)
+    outer = getattr(previous, "__self__", None)
+    if isinstance(outer, Interrupts):
+        yield outer
+        return
+    interrupts = Interrupts()
+    if previous is not signal.default_int_handler:
+        yield interrupts
+        return
+    signal.signal(signal.SIGINT, interrupts.on_signal)
+    try:
+        yield interrupts
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:
@@ -26,13 +98,16 @@ def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T])
     """
     if threading.current_thread() is not threading.main_thread():
         return work()
-    with ThreadPoolExecutor(max_workers=1) as pool:
+    from concurrent.futures import ThreadPoolExecutor, wait
+
+    with noted_interrupts() as interrupts, ThreadPoolExecutor(max_workers=1) as pool:
         future = pool.submit(work)
-        try:
-            return future.result()
-        except KeyboardInterrupt:
-            # The work may be between two statements, where there is nothing to interrupt yet.
-            while not future.done():
-                connection.interrupt()
-                threading.Event().wait(_SECONDS_BETWEEN_ATTEMPTS)
-            raise
+        # Again and again: between two statements of the work there is nothing to interrupt.
+        while not future.done():
+            try:
+                wait((future,), timeout=_SECONDS_BETWEEN_ATTEMPTS)
+                interrupts.forward(connection)
+            except KeyboardInterrupt:
+                interrupts.note()
+        interrupts.check()
+        return future.result()

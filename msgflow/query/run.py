@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
+from msgflow.query.clocks import clock_notes
 from msgflow.query.result import QueryResult
+from msgflow.query.topics import require_topics
 from msgflow.query.value import parse_text
 from msgflow.query.window import Run, choose_runs, time_window
 
@@ -56,7 +58,7 @@ def run_query(
         internal: show the rows of ROS's own topics and services too.
 
     Raises:
-        UsageError: a parameter, run or time that does not exist or cannot be read.
+        UsageError: a parameter, run, topic or time that does not exist or cannot be read.
         QueryError: the database could not run it.
     """
     used = connection.extract_statements(header.body)[0].named_parameters
@@ -74,7 +76,9 @@ def run_query(
         "end_ns": end_ns,
     }
     bindings = {name: value for name, value in reserved.items() if name in used}
-    bindings |= bind(header, parameters)
+    own = bind(header, parameters)
+    require_topics(connection, runs, own)
+    bindings |= own
     try:
         table = connection.sql(header.body, params=bindings).to_arrow_table()
     except duckdb.Error as error:
@@ -86,6 +90,8 @@ def run_query(
             rows = "1 internal row is" if hidden == 1 else f"{hidden} internal rows are"
             notes.append(f"{rows} hidden; --internal shows them")
     notes += _cut(table)
+    if header.note == "clocks" and table.num_rows:
+        notes += clock_notes(connection, runs)
     return QueryResult(table, header, runs, notes)
 
 
@@ -137,6 +143,8 @@ def _fit(param: Param, value: Value) -> Value:
         raise UsageError(
             f"{param.name} has no such value — {value}", f"choose {' or '.join(param.choices)}"
         )
+    if param.minimum is not None and isinstance(value, int) and value < param.minimum:
+        raise UsageError(f"{param.name} is at least {param.minimum} — {value}")
     return value
 
 

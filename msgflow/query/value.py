@@ -19,6 +19,11 @@ _YES = frozenset(("true", "yes", "on", "1"))
 _NO = frozenset(("false", "no", "off", "0"))
 
 
+def is_integer(type_name: str) -> bool:
+    """Tell whether the DuckDB type `type_name` is one of integers."""
+    return type_name.upper() in _INTEGER_TYPES
+
+
 def parse_literal(text: str) -> Value:
     """Return the value of a literal as SQL writes it: NULL, a truth value, number, string or list.
 
@@ -48,9 +53,9 @@ def parse_text(text: str, type_name: str) -> Value:
     """
     if type_name.endswith("[]"):
         return [parse_text(part.strip(), type_name[:-2]) for part in text.split(",") if part]
-    name = type_name.upper()
-    if name in _INTEGER_TYPES:
+    if is_integer(type_name):
         return int(text, 0) if text.lower().startswith("0x") else int(text)
+    name = type_name.upper()
     if name in _REAL_TYPES or name.startswith("DECIMAL"):
         return float(text)
     if name == "BOOLEAN":

@@ -74,6 +74,11 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
     return tuple(found)
 
 
+def is_run_name(text: str) -> bool:
+    """Tell whether a run may have this name: whether `choose_runs` can mean nothing else by it."""
+    return text not in ("", "all") and not _INTEGER.fullmatch(text)
+
+
 def time_window(
     runs: Sequence[Run],
     start: str | int | None = None,
@@ -89,12 +94,16 @@ def time_window(
         skip_first: seconds to leave out at the begin of the run, in place of `start`.
 
     Raises:
-        UsageError: a time that cannot be read, or an empty window.
+        UsageError: a time that cannot be read or is out of range, or an empty window.
     """
     if start is not None and skip_first is not None:
         raise UsageError("--start and --skip-first exclude each other", "give one of them")
     if skip_first is not None:
-        start_ns = _run_start(runs, "--skip-first") + round(skip_first * 1_000_000_000)
+        start_ns = _in_range(
+            _run_start(runs, "--skip-first") + _seconds_to_ns(skip_first),
+            skip_first,
+            "--skip-first",
+        )
     else:
         start_ns = MINIMUM_NS if start is None else _point(start, runs, "--start")
     end_ns = MAXIMUM_NS if end is None else _point(end, runs, "--end")
@@ -104,6 +113,27 @@ def time_window(
 
 
 def _point(text: str | int, runs: Sequence[Run], option: str) -> int:
+    return _in_range(_read(text, runs, option), text, option)
+
+
+def _in_range(time_ns: int, given: str | float, option: str) -> int:
+    if not MINIMUM_NS <= time_ns <= MAXIMUM_NS:
+        raise UsageError(
+            f"the time of {option} is out of range — {given}", "times reach from 1677 to 2262"
+        )
+    return time_ns
+
+
+def _seconds_to_ns(seconds: float) -> int:
+    # Not all that float can hold is a number that int can.
+    if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:
+        raise UsageError(
+            f"--skip-first takes the seconds to leave out — {seconds}", "--skip-first 2.5"
+        )
+    return round(seconds * 1_000_000_000)
+
+
+def _read(text: str | int, runs: Sequence[Run], option: str) -> int:
     if isinstance(text, int):
         return text
     text = text.strip()

@@ -94,7 +94,9 @@ def _load_from_distribution() -> Any:
                 f"Babeltrace 2's Python bindings are installed for Python {built_for}, msgflow "
                 f"runs in Python {_VERSION[0]}.{_VERSION[1]} — {native}",
                 hint=f"install msgflow for that Python: uv tool install --python "
-                f"/usr/bin/python{built_for} msgflow",
+                f"/usr/bin/python{built_for} msgflow"
+                if _runs_msgflow(built_for)
+                else "msgflow needs Python 3.11 or newer: install bindings that are built for one",
             )
     raise TraceError("Babeltrace 2's Python bindings (bt2) are not installed", hint=_INSTALL_HINT)
 
@@ -130,6 +132,10 @@ def _import_package(directory: Path) -> Any:
 def _python_of(native: Path) -> str:
     found = re.search(r"cpython-3(\d+)", native.name)
     return f"3.{found.group(1)}" if found else "3"
+
+
+def _runs_msgflow(version: str) -> bool:
+    return tuple(map(int, version.split("."))) >= (3, 11)
 
 
 def _broken_error(error: ImportError) -> TraceError:

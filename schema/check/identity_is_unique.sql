@@ -3,14 +3,17 @@
 -- grain: one row per identity used twice
 -- severity: error
 -- needs: store.publication, store.take, store.callback_instance
-SELECT 'publication' AS kind, publication_id AS id
+SELECT run_id, 'publication' AS kind, publication_id AS id
 FROM store.publication
-GROUP BY publication_id
+GROUP BY run_id, publication_id
 HAVING count(*) > 1
 UNION ALL
-SELECT 'take', take_id FROM store.take GROUP BY take_id HAVING count(*) > 1
+SELECT run_id, 'take', take_id
+FROM store.take
+GROUP BY run_id, take_id
+HAVING count(*) > 1
 UNION ALL
-SELECT 'callback_instance', callback_instance_id
+SELECT run_id, 'callback_instance', callback_instance_id
 FROM store.callback_instance
-GROUP BY callback_instance_id
+GROUP BY run_id, callback_instance_id
 HAVING count(*) > 1

@@ -3,8 +3,14 @@
 -- grain: one row per publication, callback run or executor state that does
 -- severity: error
 -- needs: store.publication, store.callback_instance, store.executor_state
-SELECT 'publication' AS kind, start_event_id FROM store.publication WHERE end_ns < start_ns
+SELECT run_id, 'publication' AS kind, start_event_id
+FROM store.publication
+WHERE end_ns < start_ns
 UNION ALL
-SELECT 'callback_instance', start_event_id FROM store.callback_instance WHERE end_ns < start_ns
+SELECT run_id, 'callback_instance', start_event_id
+FROM store.callback_instance
+WHERE end_ns < start_ns
 UNION ALL
-SELECT 'executor_state', start_event_id FROM store.executor_state WHERE end_ns < start_ns
+SELECT run_id, 'executor_state', start_event_id
+FROM store.executor_state
+WHERE end_ns < start_ns

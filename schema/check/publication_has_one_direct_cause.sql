@@ -3,8 +3,8 @@
 -- grain: one row per publication with several
 -- severity: error
 -- needs: store.link_causal
-SELECT publication_id, count(*) AS link_count
+SELECT run_id, publication_id, count(*) AS link_count
 FROM store.link_causal
 WHERE kind = 'direct'
-GROUP BY publication_id
+GROUP BY run_id, publication_id
 HAVING count(*) > 1

@@ -3,8 +3,8 @@
 -- grain: one row per take with several
 -- severity: error
 -- needs: store.callback_instance
-SELECT take_id, count(*) AS run_count
+SELECT run_id, take_id, count(*) AS run_count
 FROM store.callback_instance
 WHERE take_id IS NOT NULL
-GROUP BY take_id
+GROUP BY run_id, take_id
 HAVING count(*) > 1

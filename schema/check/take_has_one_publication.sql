@@ -3,7 +3,7 @@
 -- grain: one row per take with several
 -- severity: error
 -- needs: store.link_transport
-SELECT take_id, count(*) AS link_count
+SELECT run_id, take_id, count(*) AS link_count
 FROM store.link_transport
-GROUP BY take_id
+GROUP BY run_id, take_id
 HAVING count(*) > 1

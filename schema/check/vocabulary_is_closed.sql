@@ -4,42 +4,42 @@
 -- severity: error
 -- needs: store.loss_interval, store.clock, store.callback, store.annotation, store.take,
 --     store.executor_state, store.link_transport, store.link_causal, store.diagnostic
-SELECT DISTINCT 'loss_interval.kind' AS place, kind AS word
+SELECT DISTINCT run_id, 'loss_interval.kind' AS place, kind AS word
 FROM store.loss_interval
 WHERE kind NOT IN ('loss', 'packets', 'pause')
 UNION ALL
-SELECT DISTINCT 'clock.method', method
+SELECT DISTINCT run_id, 'clock.method', method
 FROM store.clock
 WHERE method NOT IN ('none', 'messages', 'packets', 'file')
 UNION ALL
-SELECT DISTINCT 'callback.kind', kind
+SELECT DISTINCT run_id, 'callback.kind', kind
 FROM store.callback
 WHERE kind NOT IN ('subscription', 'timer', 'service', 'unknown')
 UNION ALL
-SELECT DISTINCT 'annotation.kind', kind
+SELECT DISTINCT run_id, 'annotation.kind', kind
 FROM store.annotation
 WHERE kind NOT IN ('periodic_async', 'partial_sync')
 UNION ALL
-SELECT DISTINCT 'annotation.source', source
+SELECT DISTINCT run_id, 'annotation.source', source
 FROM store.annotation
 WHERE source NOT IN ('trace', 'file')
 UNION ALL
-SELECT DISTINCT 'take.method', method
+SELECT DISTINCT run_id, 'take.method', method
 FROM store.take
 WHERE method NOT IN ('rmw', 'ring_buffer', 'caret', 'callback_only')
 UNION ALL
-SELECT DISTINCT 'executor_state.state', state
+SELECT DISTINCT run_id, 'executor_state.state', state
 FROM store.executor_state
 WHERE state NOT IN ('wait', 'process', 'execute')
 UNION ALL
-SELECT DISTINCT 'link_transport.method', method
+SELECT DISTINCT run_id, 'link_transport.method', method
 FROM store.link_transport
 WHERE method NOT IN ('exact', 'exact_stamp', 'nearest', 'ring_buffer')
 UNION ALL
-SELECT DISTINCT 'link_causal.kind', kind
+SELECT DISTINCT run_id, 'link_causal.kind', kind
 FROM store.link_causal
 WHERE kind NOT IN ('direct', 'periodic_async', 'partial_sync', 'take_adjacent')
 UNION ALL
-SELECT DISTINCT 'diagnostic.severity', severity
+SELECT DISTINCT run_id, 'diagnostic.severity', severity
 FROM store.diagnostic
 WHERE severity NOT IN ('info', 'warning', 'data_loss', 'error')

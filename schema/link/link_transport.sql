@@ -24,7 +24,7 @@ SELECT
     false AS is_loss_affected
 FROM derive.link_transport_exact AS l
 JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
-JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
+LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
 JOIN store.take AS t ON l.take_id = t.take_id AND l.run_id = t.run_id
 LEFT JOIN store.subscription AS s
     ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id

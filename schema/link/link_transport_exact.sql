@@ -2,15 +2,16 @@
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
 --     known. A topic unknown on a side counts only where the stamp alone has a single candidate in
 --     the run, and does not put one publication on two topics. Of several publications with equal
---     topic and stamp the k-th belongs to the k-th such take of a subscription. Equal values need
---     no clocks: a take may seem to precede.
+--     topic and stamp the k-th belongs to the k-th such take of a subscription, so that none is
+--     received twice. Equal values need no clocks: a take may seem to precede.
 -- grain: one row per take whose publication is known by its stamp
 -- needs: store.publication, store.publisher, store.take, store.subscription
 WITH published AS (
     SELECT
         b.run_id, b.publication_id, b.source_timestamp_ns, b.start_event_id, p.topic_name
     FROM store.publication AS b
-    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
+    LEFT JOIN store.publisher AS p
+        ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
     WHERE b.source_timestamp_ns <> 0
 ),
 received AS (
@@ -22,6 +23,18 @@ received AS (
         ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
     WHERE t.source_timestamp_ns <> 0
 ),
+repeated_publication AS (
+    SELECT run_id, source_timestamp_ns
+    FROM published
+    GROUP BY run_id, source_timestamp_ns
+    HAVING count(*) > 1
+),
+repeated_take AS (
+    SELECT run_id, subscription_id, source_timestamp_ns
+    FROM received
+    GROUP BY run_id, subscription_id, source_timestamp_ns
+    HAVING count(*) > 1
+),
 candidate AS (
     SELECT
         r.run_id,
@@ -32,13 +45,21 @@ candidate AS (
         p.publication_id,
         p.start_event_id AS publication_event_id,
         r.topic_name AS take_topic,
-        coalesce(r.topic_name = p.topic_name, false) AS is_topic_known
+        coalesce(r.topic_name = p.topic_name, false) AS is_topic_known,
+        q.run_id IS NOT NULL OR u.run_id IS NOT NULL AS is_repeated
     FROM received AS r
     JOIN published AS p
         ON r.run_id = p.run_id
         AND r.source_timestamp_ns = p.source_timestamp_ns
         AND coalesce(r.topic_name = p.topic_name, true)
+    LEFT JOIN repeated_publication AS q
+        ON r.run_id = q.run_id AND r.source_timestamp_ns = q.source_timestamp_ns
+    LEFT JOIN repeated_take AS u
+        ON r.run_id = u.run_id
+        AND r.subscription_id IS NOT DISTINCT FROM u.subscription_id
+        AND r.source_timestamp_ns = u.source_timestamp_ns
 ),
+-- Nearly all messages are plain: only the others are worth counting and ordering.
 counted AS (
     SELECT
         run_id, take_id, subscription_id, source_timestamp_ns, take_event_id, publication_id,
@@ -48,17 +69,15 @@ counted AS (
         min(take_topic) OVER same_publication IS DISTINCT FROM max(take_topic)
             OVER same_publication AS has_several_topics
     FROM candidate
+    WHERE is_repeated OR NOT is_topic_known
     WINDOW
         same_take AS (PARTITION BY run_id, take_id),
         same_publication AS (PARTITION BY run_id, publication_id)
 ),
-unique_match AS (
-    SELECT
-        run_id, publication_id, take_id, 1::BIGINT AS candidate_count,
-        CASE WHEN is_topic_known THEN 'exact' ELSE 'exact_stamp' END AS method
+unknown_topic AS (
+    SELECT run_id, publication_id, take_id
     FROM counted
-    WHERE CASE WHEN known_count > 0 THEN is_topic_known AND known_count = 1
-        ELSE candidate_count = 1 AND NOT has_several_topics END
+    WHERE known_count = 0 AND candidate_count = 1 AND NOT has_several_topics
 ),
 ordered AS (
     SELECT
@@ -70,11 +89,15 @@ ordered AS (
             PARTITION BY run_id, subscription_id, source_timestamp_ns ORDER BY take_event_id
         ) AS take_position
     FROM counted
-    WHERE is_topic_known AND known_count > 1
+    WHERE is_topic_known
 )
-SELECT run_id, publication_id, take_id, method, candidate_count
-FROM unique_match
+SELECT run_id, publication_id, take_id, 'exact' AS method, 1::BIGINT AS candidate_count
+FROM candidate
+WHERE is_topic_known AND NOT is_repeated
 UNION ALL
 SELECT run_id, publication_id, take_id, 'exact', known_count
 FROM ordered
 WHERE publication_position = take_position
+UNION ALL
+SELECT run_id, publication_id, take_id, 'exact_stamp', 1
+FROM unknown_topic

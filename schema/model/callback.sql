@@ -7,11 +7,12 @@ WITH learned AS (
     SELECT
         b.process_id,
         b.callback_handle,
+        b.callback_event_id,
         mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
     FROM staging.callback_binding AS b
     JOIN staging.take AS t ON b.start_event_id = t.callback_start_event_id
-    WHERE b.kind IS NULL OR b.kind = 'unknown'
-    GROUP BY b.process_id, b.callback_handle
+    WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
+    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),
 never_added AS (
     SELECT min(start_event_id) AS event_id, process_id, callback_handle
@@ -21,13 +22,13 @@ never_added AS (
 ),
 every_callback AS (
     SELECT
-        k.event_id, k.process_id, k.kind, k.timer_id, k.service_id, k.node_id,
-        k.callback_handle, k.symbol, k.created_ns, s.subscription_id
+        k.event_id, k.event_id AS callback_event_id, k.process_id, k.kind, k.timer_id,
+        k.service_id, k.node_id, k.callback_handle, k.symbol, k.created_ns, s.subscription_id
     FROM staging.callback_known AS k
     LEFT JOIN staging.subscription AS s ON k.subscription_event_id = s.event_id
     UNION ALL
     SELECT
-        event_id, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL, NULL, NULL
+        event_id, NULL, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL, NULL, NULL
     FROM never_added
 ),
 complete AS (
@@ -40,9 +41,11 @@ complete AS (
         c.node_id
     FROM every_callback AS c
     LEFT JOIN learned AS l
-        ON c.kind = 'unknown'
+        ON c.subscription_id IS NULL
+        AND c.kind IN ('unknown', 'subscription')
         AND c.process_id = l.process_id
         AND c.callback_handle = l.callback_handle
+        AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
 )
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS callback_id,

@@ -4,41 +4,24 @@
 --     is not for an intra-process run, nor a dequeue for another; the subscriptions agree where
 --     both are known.
 -- grain: one row per callback_start
--- needs: staging.callback_run, staging.callback_known, staging.take_chain,
---     staging.subscription_known, staging.buffer_subscription
+-- needs: staging.callback_run, staging.callback_dispatch, staging.callback_known,
+--     staging.take_chain, staging.take_subscription
 WITH run AS (
     SELECT
         r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process,
-        r.previous_event_id, k.event_id AS callback_event_id, k.kind, k.subscription_event_id
+        r.previous_event_id, d.executor_event_id, k.event_id AS callback_event_id, k.kind,
+        k.subscription_event_id
     FROM staging.callback_run AS r
+    LEFT JOIN staging.callback_dispatch AS d ON r.start_event_id = d.start_event_id
     ASOF LEFT JOIN staging.callback_known AS k
         ON r.process_id = k.process_id
         AND r.callback_handle = k.callback_handle
         AND r.start_event_id >= k.event_id
 ),
-by_rmw AS (
-    SELECT c.start_event_id, s.event_id AS subscription_event_id
-    FROM staging.take_chain AS c
-    ASOF JOIN staging.subscription_known AS s
-        ON c.process_id = s.process_id
-        AND c.rmw_handle = s.rmw_handle
-        AND c.start_event_id >= s.event_id
-),
-by_buffer AS (
-    SELECT c.start_event_id, b.subscription_event_id
-    FROM staging.take_chain AS c
-    ASOF JOIN staging.buffer_subscription AS b
-        ON c.process_id = b.process_id
-        AND c.buffer_handle = b.buffer_handle
-        AND c.start_event_id >= b.event_id
-),
 taken AS (
-    SELECT
-        c.start_event_id, c.end_event_id, c.method,
-        coalesce(r.subscription_event_id, b.subscription_event_id) AS subscription_event_id
+    SELECT c.start_event_id, c.end_event_id, c.method, s.subscription_event_id
     FROM staging.take_chain AS c
-    LEFT JOIN by_rmw AS r ON c.start_event_id = r.start_event_id
-    LEFT JOIN by_buffer AS b ON c.start_event_id = b.start_event_id
+    LEFT JOIN staging.take_subscription AS s ON c.start_event_id = s.start_event_id
 ),
 bound AS (
     SELECT
@@ -47,7 +30,8 @@ bound AS (
         t.subscription_event_id
     FROM run AS r
     JOIN taken AS t ON r.previous_event_id = t.end_event_id
-    WHERE r.is_intra_process = (t.method = 'ring_buffer')
+    WHERE coalesce(r.executor_event_id < t.end_event_id, true)
+        AND r.is_intra_process = (t.method = 'ring_buffer')
         AND r.kind IS DISTINCT FROM 'timer'
         AND r.kind IS DISTINCT FROM 'service'
         AND coalesce(r.subscription_event_id = t.subscription_event_id, true)

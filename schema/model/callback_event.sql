@@ -11,6 +11,7 @@ SELECT
     e.event_id,
     e.ts_ns,
     e.trace_index,
+    e.cpu_id,
     e.thread_id,
     e.handle AS callback_handle,
     e.kind = 'callback_start' AS is_start,

@@ -3,8 +3,8 @@
 --     what is inside it, until the first event of its thread that cannot be inside: the next
 --     callback_start, executor event, or event behind a gap.
 -- grain: one row per callback_start
--- needs: staging.callback_event, staging.callback_pair, staging.thread_event, staging.thread_gap,
---     staging.thread
+-- needs: staging.callback_event, staging.callback_pair, staging.executor_event,
+--     staging.thread_gap, staging.thread
 WITH run AS (
     SELECT
         p.start_event_id, p.end_event_id, p.end_ns, e.ts_ns AS start_ns, e.trace_index,
@@ -16,14 +16,15 @@ open_run AS (
     SELECT start_event_id, thread_id FROM run WHERE end_event_id IS NULL
 ),
 outside AS (
-    SELECT e.thread_id, e.event_id
-    FROM staging.thread_event AS e
-    LEFT JOIN staging.thread_gap AS g ON e.event_id = g.event_id
-    WHERE e.thread_id IN (SELECT thread_id FROM open_run)
-        AND (
-            e.kind IN ('callback_start', 'process', 'wait', 'execute')
-            OR g.event_id IS NOT NULL
-        )
+    SELECT thread_id, event_id
+    FROM staging.callback_event
+    WHERE is_start AND thread_id IN (SELECT thread_id FROM open_run)
+    UNION ALL
+    SELECT thread_id, event_id
+    FROM staging.executor_event
+    WHERE thread_id IN (SELECT thread_id FROM open_run)
+    UNION ALL
+    SELECT thread_id, event_id FROM staging.thread_gap
 ),
 closed_by AS (
     SELECT o.start_event_id, x.event_id

@@ -1,7 +1,7 @@
 -- name: staging.process_life
 -- description: Lives of each pid. A new life starts at an rcl_init from another main thread or
---     process name, or of a context handle initialised before, unless another thread of the pid
---     was there before and after: then it is a second initialisation within one life.
+--     process name, or of a context handle initialised before, unless the old life goes on: another
+--     thread of the pid was there before and after, or an object made before is used after.
 -- grain: one row per host, PID namespace, pid and life
 -- needs: staging.thread_presence, staging.trace, raw
 WITH initialisation AS (
@@ -24,11 +24,46 @@ WITH initialisation AS (
             PARTITION BY t.host_id, i.pid_ns, i.vpid, i.context_handle ORDER BY i.event_id
         )
 ),
+candidate AS (
+    SELECT host_id, pid_ns, vpid, vtid, event_id
+    FROM initialisation
+    WHERE is_repeated AND (is_other_main OR is_same_context)
+),
+made AS (
+    SELECT trace_index, pid_ns, vpid, event_id, publisher_handle AS handle
+    FROM raw.ros2_rcl_publisher_init
+    UNION ALL
+    SELECT trace_index, pid_ns, vpid, event_id, callback
+    FROM raw.ros2_rclcpp_callback_register
+),
+used AS (
+    SELECT trace_index, pid_ns, vpid, event_id, publisher_handle AS handle
+    FROM raw.ros2_rcl_publish
+    UNION ALL
+    SELECT trace_index, pid_ns, vpid, event_id, callback
+    FROM raw.ros2_callback_start
+),
+-- An object made before and used afterwards, without being made again: the life goes on.
+surviving AS (
+    SELECT DISTINCT c.event_id
+    FROM candidate AS c
+    JOIN staging.trace AS t ON c.host_id = t.host_id
+    JOIN used AS u
+        ON t.trace_id - 1 = u.trace_index
+        AND c.pid_ns IS NOT DISTINCT FROM u.pid_ns
+        AND c.vpid = u.vpid
+        AND u.event_id > c.event_id
+    ASOF JOIN made AS m
+        ON u.trace_index = m.trace_index
+        AND u.vpid = m.vpid
+        AND u.handle = m.handle
+        AND u.event_id >= m.event_id
+    WHERE m.event_id < c.event_id
+),
 split AS (
     SELECT i.host_id, i.pid_ns, i.vpid, i.event_id
-    FROM initialisation AS i
-    WHERE i.is_repeated
-        AND (i.is_other_main OR i.is_same_context)
+    FROM candidate AS i
+    WHERE i.event_id NOT IN (SELECT event_id FROM surviving)
         AND NOT EXISTS (
             SELECT 1
             FROM staging.thread_presence AS p

@@ -1,7 +1,8 @@
 -- name: staging.take_chain
--- description: Layers of one take stitched together, as for publications. An rmw take that failed
---     is none; one without rcl take is the middleware's own, where its reader belongs to no rcl
---     subscription although rcl takes are traced.
+-- description: Layers of one take stitched together, as for publications. A chain whose rmw take
+--     failed is none, although upper layers may report it. One without rcl take is the
+--     middleware's own, where its reader belongs to no rcl subscription although rcl takes are
+--     traced.
 -- grain: one row per successful take or dequeue
 -- needs: staging.thread_event, staging.thread_gap, staging.thread, staging.subscription_known
 WITH layer AS (
@@ -12,9 +13,11 @@ WITH layer AS (
             WHEN e.kind IN ('rmw_take', 'rmw_take_failed') THEN
                 e.previous.kind = 'dds_read' AND e.previous.message = e.message
             WHEN e.kind = 'rcl_take' THEN
-                e.previous.kind = 'rmw_take' AND e.previous.message = e.message
+                e.previous.kind IN ('rmw_take', 'rmw_take_failed')
+                AND e.previous.message = e.message
             WHEN e.kind = 'rclcpp_take' THEN
-                e.previous.kind IN ('rmw_take', 'rcl_take') AND e.previous.message = e.message
+                e.previous.kind IN ('rmw_take', 'rmw_take_failed', 'rcl_take')
+                AND e.previous.message = e.message
             WHEN e.kind = 'caret_take' THEN
                 e.previous.kind IN ('rmw_take', 'rcl_take', 'rclcpp_take')
                 AND e.previous.message = e.message
@@ -52,6 +55,7 @@ chain AS (
             AS source_timestamp_ns
     FROM chained
     GROUP BY chain_id
+    HAVING bool_and(kind <> 'rmw_take_failed')
 ),
 known_reader AS (
     SELECT DISTINCT process_id, rmw_handle FROM staging.subscription_known

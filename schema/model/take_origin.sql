@@ -3,24 +3,8 @@
 --     that it led to. A subscription callback that ran without any take traced was handed its
 --     message all the same.
 -- grain: one row per message handed over to a subscription
--- needs: staging.take_chain, staging.callback_binding, staging.callback_run,
---     staging.subscription_known, staging.buffer_subscription
-WITH by_rmw AS (
-    SELECT c.start_event_id, s.event_id AS subscription_event_id
-    FROM staging.take_chain AS c
-    ASOF JOIN staging.subscription_known AS s
-        ON c.process_id = s.process_id
-        AND c.rmw_handle = s.rmw_handle
-        AND c.start_event_id >= s.event_id
-),
-by_buffer AS (
-    SELECT c.start_event_id, b.subscription_event_id
-    FROM staging.take_chain AS c
-    ASOF JOIN staging.buffer_subscription AS b
-        ON c.process_id = b.process_id
-        AND c.buffer_handle = b.buffer_handle
-        AND c.start_event_id >= b.event_id
-)
+-- needs: staging.take_chain, staging.take_subscription, staging.callback_binding,
+--     staging.callback_run
 SELECT
     c.start_event_id,
     c.end_event_id,
@@ -31,12 +15,10 @@ SELECT
     c.method,
     c.rmw_handle,
     c.source_timestamp_ns,
-    coalesce(r.subscription_event_id, f.subscription_event_id, b.subscription_event_id)
-        AS subscription_event_id,
+    coalesce(s.subscription_event_id, b.subscription_event_id) AS subscription_event_id,
     b.start_event_id AS callback_start_event_id
 FROM staging.take_chain AS c
-LEFT JOIN by_rmw AS r ON c.start_event_id = r.start_event_id
-LEFT JOIN by_buffer AS f ON c.start_event_id = f.start_event_id
+LEFT JOIN staging.take_subscription AS s ON c.start_event_id = s.start_event_id
 LEFT JOIN staging.callback_binding AS b ON c.start_event_id = b.take_event_id
 UNION ALL
 SELECT

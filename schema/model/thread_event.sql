@@ -1,8 +1,9 @@
 -- name: staging.thread_event
--- description: What threads do at run time, each event with `previous`, the one directly before it
---     on its thread. `handle` is the object, `message` the message that a layer was called with,
---     `value` the source stamp (of callback_start: is_intra_process). Initialisation is left out,
---     and so is every provider that may stand between two layers of one call by accident.
+-- description: What threads do at run time, executors apart: each event with `previous`, the one
+--     directly before it on its thread. `handle` is the object, `message` the message that a layer
+--     was called with, `value` the source stamp (of callback_start: is_intra_process).
+--     Initialisation is left out, and so is every provider that may stand between two layers of
+--     one call by accident.
 -- grain: one row per run-time event of a thread
 -- needs: staging.context, raw
 WITH runtime AS (
@@ -116,24 +117,6 @@ WITH runtime AS (
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'process' AS kind,
-        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
-    FROM raw.ros2_rclcpp_executor_get_next_ready
-    UNION ALL
-    SELECT
-        event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'wait' AS kind,
-        NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
-    FROM raw.ros2_rclcpp_executor_wait_for_work
-    UNION ALL
-    SELECT
-        event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
-        'execute' AS kind,
-        handle AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
-    FROM raw.ros2_rclcpp_executor_execute
-    UNION ALL
-    SELECT
-        event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid,
         'service' AS kind,
         NULL::UBIGINT AS handle, NULL::UBIGINT AS message, NULL::BIGINT AS value
     FROM raw.ros2_rmw_send_request
@@ -166,8 +149,7 @@ located AS (
         r.kind::ENUM(
             'intra', 'enqueue', 'rclcpp', 'rcl', 'rmw', 'dds_data', 'dds', 'caret_write',
             'caret_copy', 'caret_stamp', 'dds_read', 'rmw_take', 'rmw_take_failed', 'rcl_take',
-            'rclcpp_take', 'caret_take', 'dequeue', 'callback_start', 'callback_end', 'process',
-            'wait', 'execute', 'service'
+            'rclcpp_take', 'caret_take', 'dequeue', 'callback_start', 'callback_end', 'service'
         ) AS kind,
         r.handle,
         r.message,

@@ -1,43 +1,7 @@
 -- name: staging.thread_gap
--- description: Events that have a gap between themselves and the one before on their thread: a
---     loss on the CPU of either, or a pause of the trace. Nothing is paired across them.
+-- description: Run-time events with a gap between themselves and the one before on their thread.
+--     Nothing is paired across them.
 -- grain: one row per run-time event behind a gap
--- needs: staging.thread_event, staging.loss_interval
-WITH gap AS (
-    SELECT trace_id - 1 AS trace_index, cpu, start_ns FROM staging.loss_interval
-),
-exposed AS (
-    SELECT
-        event_id, thread_id, trace_index, ts_ns, cpu_id,
-        lag(ts_ns) OVER on_thread AS previous_ns,
-        lag(cpu_id) OVER on_thread AS previous_cpu_id
-    FROM staging.thread_event
-    WHERE trace_index IN (SELECT trace_index FROM gap)
-    WINDOW on_thread AS (PARTITION BY thread_id ORDER BY event_id)
-),
-own_cpu AS (
-    SELECT e.event_id, e.thread_id
-    FROM exposed AS e
-    ASOF JOIN gap AS g
-        ON e.trace_index = g.trace_index AND e.cpu_id = g.cpu AND e.ts_ns > g.start_ns
-    WHERE g.start_ns >= e.previous_ns
-),
-previous_cpu AS (
-    SELECT e.event_id, e.thread_id
-    FROM exposed AS e
-    ASOF JOIN gap AS g
-        ON e.trace_index = g.trace_index AND e.previous_cpu_id = g.cpu AND e.ts_ns > g.start_ns
-    WHERE g.start_ns >= e.previous_ns
-),
-every_cpu AS (
-    SELECT e.event_id, e.thread_id
-    FROM exposed AS e
-    ASOF JOIN (SELECT trace_index, start_ns FROM gap WHERE cpu IS NULL) AS g
-        ON e.trace_index = g.trace_index AND e.ts_ns > g.start_ns
-    WHERE g.start_ns >= e.previous_ns
-)
-SELECT event_id, thread_id FROM own_cpu
-UNION
-SELECT event_id, thread_id FROM previous_cpu
-UNION
-SELECT event_id, thread_id FROM every_cpu
+-- needs: staging.behind_gap, staging.thread_event
+SELECT event_id, thread_id
+FROM staging.behind_gap('staging.thread_event')

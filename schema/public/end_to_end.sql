@@ -14,13 +14,15 @@
 -- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
 -- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
 -- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 10000  Most chains followed per run and length
+-- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance' or 'publication'
 -- column: root_id BIGINT  Identity of the root
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
+-- column: sink_event VARCHAR  Event that ended the flow: to_event, or 'take' where the sink never
+--     shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: status VARCHAR  'reached', 'superseded', 'lost' or 'edge'
@@ -33,15 +35,29 @@
 --     main.publication, main.callback_instance, main.take, store.publisher
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
-    max_depth := 32, max_paths := 10000
+    max_depth := 32, max_paths := 1000
 ) AS TABLE
-WITH RECURSIVE path AS MATERIALIZED (
+WITH RECURSIVE chain AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
         publishers[1] AS first_publisher_id, is_cached, is_path
     FROM main.flow_path(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
+),
+lineage (path_id, prefix_id, depth, parent_path_id) AS (
+    SELECT path_id, path_id, depth, parent_path_id FROM chain WHERE is_path
+    UNION ALL
+    SELECT l.path_id, c.path_id, c.depth, c.parent_path_id
+    FROM lineage AS l
+    JOIN chain AS c ON l.parent_path_id = c.path_id
+),
+path AS MATERIALIZED (
+    SELECT
+        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
+        first_publisher_id, is_cached, is_path
+    FROM chain
+    WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
 -- root_key: positive for a callback run, negative for a publication.
 root AS MATERIALIZED (
@@ -97,23 +113,38 @@ reached (path_id, root_key, take_id) AS (
         AND p.publisher_id = s.publisher_id
         AND p.subscription_id = s.subscription_id
 ),
-arrival AS (
+arrival AS MATERIALIZED (
     SELECT
-        r.path_id,
-        r.root_key,
-        r.take_id,
-        CASE to_event
-            WHEN 'take' THEN t.taken_ns
-            WHEN 'callback_start' THEN i.start_ns
-            ELSE i.end_ns
-        END AS sink_ns
+        r.path_id, r.root_key, r.take_id, t.taken_ns, i.start_ns, i.end_ns,
+        i.callback_instance_id
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.path_id AND p.is_path
     JOIN main.take AS t ON r.take_id = t.take_id
     LEFT JOIN main.callback_instance AS i ON r.take_id = i.take_id
 ),
+-- Sinks that never show a callback (rclpy, manual takes): their flows end at the take.
+sink AS (
+    SELECT
+        path_id,
+        CASE WHEN count(callback_instance_id) = 0 THEN 'take' ELSE to_event END AS sink_event
+    FROM arrival
+    GROUP BY path_id
+),
 pair AS MATERIALIZED (
-    SELECT path_id, root_key, take_id, sink_ns FROM arrival WHERE sink_ns IS NOT NULL
+    SELECT
+        a.path_id, a.root_key, a.take_id, k.sink_event,
+        CASE k.sink_event
+            WHEN 'take' THEN a.taken_ns
+            WHEN 'callback_start' THEN a.start_ns
+            ELSE a.end_ns
+        END AS sink_ns
+    FROM arrival AS a
+    JOIN sink AS k ON a.path_id = k.path_id
+    WHERE CASE k.sink_event
+        WHEN 'take' THEN a.taken_ns
+        WHEN 'callback_start' THEN a.start_ns
+        ELSE a.end_ns
+    END IS NOT NULL
 ),
 expected AS MATERIALIZED (
     SELECT
@@ -128,13 +159,6 @@ missing AS MATERIALIZED (
     SELECT e.run_id, e.path_id, e.root_key, e.root_ns, e.publication_id
     FROM expected AS e
     ANTI JOIN pair AS a ON e.path_id = a.path_id AND e.root_key = a.root_key
-),
-lineage (path_id, prefix_id, depth, parent_path_id) AS (
-    SELECT path_id, path_id, depth, parent_path_id FROM path WHERE is_path
-    UNION ALL
-    SELECT l.path_id, p.path_id, p.depth, p.parent_path_id
-    FROM lineage AS l
-    JOIN path AS p ON l.parent_path_id = p.path_id
 ),
 -- How far each root that did not arrive came: its last take on the way, by depth, then time.
 progress AS (
@@ -215,7 +239,7 @@ explained AS (
                     b.start_ns < d.first_ns OR b.start_ns > d.last_ns
                 ELSE s.taken_ns < c.first_ns OR s.taken_ns > c.last_ns
             END,
-            true
+            false
         ) AS is_edge
     FROM stuck AS s
     LEFT JOIN main.publication AS b ON s.publication_id = b.publication_id
@@ -233,6 +257,7 @@ SELECT
     abs(e.root_key) AS root_id,
     e.root_ns,
     a.take_id,
+    a.sink_event,
     a.sink_ns,
     a.sink_ns - e.root_ns AS latency_ns,
     'reached' AS status,
@@ -255,6 +280,7 @@ SELECT
     CASE WHEN m.root_key > 0 THEN 'callback_instance' ELSE 'publication' END,
     abs(m.root_key),
     m.root_ns,
+    NULL,
     NULL,
     NULL,
     NULL,

@@ -8,7 +8,7 @@
 -- column: thread_id BIGINT  Thread it happened on
 -- column: activity VARCHAR  'wait', 'select', 'take', 'callback', 'service' or 'blocked'
 -- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End; NULL: the last of the thread
+-- column: end_ns BIGINT [epoch ns]  End; NULL: not known (the last, or a gap follows)
 -- column: callback_instance_id BIGINT  Callback that ran
 -- needs: store.executor_state, store.callback_instance, store.callback, store.executor_thread,
 --     store.executor, store.thread, derive.corrected_ns, derive.process_clock
@@ -30,6 +30,8 @@ ordered AS (
     SELECT
         run_id,
         thread_id,
+        event_id AS change_event_id,
+        step,
         at_ns AS start_ns,
         lead(at_ns) OVER on_thread AS end_ns,
         max(CASE WHEN state IS NOT NULL THEN event_id END) OVER so_far AS state_event_id,
@@ -42,13 +44,22 @@ ordered AS (
             PARTITION BY run_id, thread_id ORDER BY event_id ROWS UNBOUNDED PRECEDING
         )
 ),
+-- Where a gap follows a state, nobody knows how its last part went on.
+followed AS (
+    SELECT
+        run_id, thread_id, start_ns, end_ns, state_event_id, callback_event_id, ended_event_id,
+        lead(state_event_id) OVER (
+            PARTITION BY run_id, thread_id ORDER BY change_event_id, step
+        ) IS DISTINCT FROM state_event_id AS is_last_of_state
+    FROM ordered
+),
 classified AS (
     SELECT
         o.run_id,
         o.thread_id,
         x.executor_id,
         o.start_ns,
-        o.end_ns,
+        CASE WHEN s.end_ns IS NULL AND o.is_last_of_state THEN NULL ELSE o.end_ns END AS end_ns,
         i.callback_instance_id,
         CASE
             WHEN i.callback_instance_id IS NOT NULL THEN
@@ -59,7 +70,7 @@ classified AS (
             WHEN s.state = 'execute' AND e.kind = 'multi_threaded' THEN 'blocked'
             ELSE 'select'
         END AS activity
-    FROM ordered AS o
+    FROM followed AS o
     JOIN store.executor_thread AS x ON o.thread_id = x.thread_id
     JOIN store.executor AS e ON x.executor_id = e.executor_id
     LEFT JOIN store.executor_state AS s

@@ -6,7 +6,8 @@
 -- column: thread_id BIGINT  Thread it happened on
 -- column: state VARCHAR  'wait', 'process' or 'execute'
 -- column: start_ns BIGINT [epoch ns]  Executor event that began it
--- column: end_ns BIGINT [epoch ns]  Next executor event of the thread; NULL: the last
+-- column: end_ns BIGINT [epoch ns]  Next executor event of the thread; NULL: not known
+--     (the last, or a gap follows)
 -- column: callback_instance_id BIGINT  First callback run in it
 -- needs: store.executor_state, store.thread, derive.corrected_ns, derive.process_clock
 SELECT

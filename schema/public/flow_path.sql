@@ -3,14 +3,14 @@
 -- description: Chains of publishers and subscriptions that flows can take, with all their
 --     beginnings (prefixes). No subscription comes twice in a chain. A chain is a path where it
 --     ends at the topic asked for, or where it is not continued. Chains longer than max_depth and
---     beyond max_paths per length are cut; is_cut says so of each chain that has more to it, or,
---     where a topic to end at was given, of all chains of the run.
+--     beyond max_paths are cut; is_cut says so of each chain that has more to it, or of all chains
+--     of the run where it cannot be told which.
 -- grain: one row per run and chain
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR  Topic where flows start; every source when NULL
 -- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
 -- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 10000  Most chains followed per run and length
+-- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Number of the chain in this result
 -- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
@@ -27,7 +27,7 @@
 -- needs: derive.flow_hop, derive.node_label, store.publisher, store.subscription, store.node,
 --     store.process
 CREATE OR REPLACE MACRO main.flow_path(
-    runs, from_topic, to_topic, max_depth := 32, max_paths := 10000
+    runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
 ) AS TABLE
 WITH RECURSIVE hop AS MATERIALIZED (
     SELECT
@@ -133,6 +133,18 @@ limited AS (
         ) AS is_cut
     FROM numbered AS n
     LEFT JOIN parented AS p ON n.path_id = p.path_id
+),
+ranked AS (
+    SELECT
+        run_id, path_id, parent_path_id, publishers, subscriptions, topics, path, is_cached,
+        is_cut,
+        CASE WHEN to_topic IS NULL THEN is_end ELSE topics[-1] = to_topic END AS is_candidate,
+        row_number() OVER (
+            PARTITION BY
+                run_id, CASE WHEN to_topic IS NULL THEN is_end ELSE topics[-1] = to_topic END
+            ORDER BY len(subscriptions), path_id
+        ) AS path_number
+    FROM limited
 )
 SELECT
     run_id,
@@ -146,7 +158,11 @@ SELECT
     publishers[-1] AS publisher_id,
     subscriptions[-1] AS subscription_id,
     is_cached,
-    CASE WHEN to_topic IS NULL THEN is_end ELSE topics[-1] = to_topic END AS is_path,
-    CASE WHEN to_topic IS NULL THEN is_cut ELSE bool_or(is_cut) OVER (PARTITION BY run_id) END
-        AS is_cut
-FROM limited
+    is_candidate AND path_number <= max_paths AS is_path,
+    CASE
+        WHEN bool_or(is_candidate AND path_number > max_paths) OVER run THEN true
+        WHEN to_topic IS NULL THEN is_cut
+        ELSE bool_or(is_cut) OVER run
+    END AS is_cut
+FROM ranked
+WINDOW run AS (PARTITION BY run_id)

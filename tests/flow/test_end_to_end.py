@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,13 +14,15 @@ from staged_events import Analysis, Thread
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
 
-TALKER, RELAY, SINK = Thread(100), Thread(200), Thread(300)
+TALKER, RELAY, SINK, LOGGER = (Thread(pid) for pid in (100, 200, 300, 400))
 EVERYTHING = "-9223372036854775808, 9223372036854775807"
 
 
 @dataclass
 class Chain:
     """/talker publishes on /a, /relay takes that and publishes on /b, /sink takes that.
+
+    /logger hears what /talker logs, which is no part of any path.
 
     Attributes:
         times: when each thing happened, by its name; stamps name the messages.
@@ -37,6 +41,8 @@ class Chain:
         self.system.publisher(RELAY, 0x10, "/b")
         self.system.node(SINK, 0x1, "sink")
         self.system.subscription(SINK, 0x30, "/b", callback=0xC2)
+        self.system.node(LOGGER, 0x1, "logger")
+        self.system.subscription(LOGGER, 0x30, "/rosout", callback=0xC3)
 
     def tick(self, root: str, *stamps: int) -> None:
         """The timer's callback publishes messages, and logs."""
@@ -45,6 +51,7 @@ class Chain:
             self.times[f"{stamp} published"] = self.system.publish(TALKER, 0x10, stamp)
         self.system.publish(TALKER, 0x11, 9_000_000 + stamps[0])
         self.system.end(TALKER, 0xC0)
+        self.hear(LOGGER, 9_000_000 + stamps[0], callback=0xC3)
 
     def hear(
         self,
@@ -101,9 +108,13 @@ def chain() -> Chain:
     return made
 
 
-@pytest.fixture
-def built(analysis: Analysis, chain: Chain) -> Analysis:
-    return analysis.build(chain.system)
+@pytest.fixture(scope="module")
+def built(
+    chain: Chain, empty_database: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Analysis]:
+    analysis = Analysis(empty_database, tmp_path_factory.mktemp("chain"))
+    yield analysis.build(chain.system)
+    analysis.close()
 
 
 def flows(

@@ -113,9 +113,9 @@ def test_a_callback_never_initialised_learns_its_subscription(
     system: RosSystem, analyse: Analyse
 ) -> None:
     """From the takes that it ran with, the majority."""
-    system.subscription(MAIN, 0x10, "/chatter")
-    system.subscription(MAIN, 0x11, "/other")
-    for handle in (0x10, 0x11, 0x10):
+    for handle in (0x10, 0x11, 0x12):
+        system.subscription(MAIN, handle, f"/{handle}")
+    for handle in (0x10, 0x11, 0x12, 0x11):
         system.take(MAIN, handle, 777)
         system.start(MAIN, 0xCB)
         system.end(MAIN, 0xCB)
@@ -123,10 +123,10 @@ def test_a_callback_never_initialised_learns_its_subscription(
     system.end(MAIN, 0xDD)
     model = analyse(system)
     assert model.rows("SELECT callback_handle, kind, subscription_id FROM callback ORDER BY 1") == [
-        (0xCB, "subscription", 1),
+        (0xCB, "subscription", 2),
         (0xDD, "unknown", None),
     ]
-    assert model.value("SELECT count(*) FROM callback_instance WHERE take_id IS NOT NULL") == 3
+    assert model.value("SELECT count(*) FROM callback_instance WHERE take_id IS NOT NULL") == 4
 
 
 def test_everything_is_unknown_in_a_trace_that_starts_late(

@@ -109,16 +109,17 @@ def test_a_gap_between_start_and_end(system: RosSystem, analyse: Analyse) -> Non
 
 def test_a_gap_on_another_cpu(system: RosSystem, analyse: Analyse) -> None:
     """Counts for a thread that was on that CPU before or after it."""
-    migrating, staying = Thread(100), Thread(200)
-    first = system.start(migrating, 0xC1)
-    second = system.start(staying, 0xC2)
+    comes, goes, stays = Thread(100), Thread(200, cpu=1), Thread(300)
+    first, second, third = (system.start(thread, 0xC1) for thread in (comes, goes, stays))
     system.lose(cpu=1)
     system.end(Thread(100, cpu=1), 0xC1)
-    end = system.end(staying, 0xC2)
-    system.add_packet(1_000, 2_000, count=3)
+    system.end(Thread(200, cpu=0), 0xC1)
+    end = system.end(stays, 0xC1)
+    system.add_packet(1_000, 2_000, count=4)
     assert analyse(system).rows("SELECT start_ns, end_ns FROM callback_instance ORDER BY 1") == [
         (first, None),
-        (second, end),
+        (second, None),
+        (third, end),
     ]
 
 

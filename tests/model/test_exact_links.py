@@ -66,6 +66,14 @@ def test_one_process_may_stamp_two_topics_alike(pair: RosSystem, analyse: Analys
     assert analyse(pair).rows(LINKS) == [(2, 1, "exact", 1), (1, 2, "exact", 1)]
 
 
+def test_topics_that_differ_are_no_link(pair: RosSystem, analyse: Analyse) -> None:
+    """However alone the stamp is."""
+    pair.publisher(TALKER, 0x11, "/b")
+    pair.publish(TALKER, 0x11, 1)
+    pair.take(LISTENER, 0x20, 1)
+    assert analyse(pair).rows(LINKS) == []
+
+
 def test_every_subscription_has_its_own_take(pair: RosSystem, analyse: Analyse) -> None:
     pair.subscription(LISTENER, 0x21, "/a")
     pair.subscription(Thread(300), 0x20, "/a")
@@ -186,3 +194,8 @@ def test_a_node_that_hears_itself_on_tf_is_a_self_loop(system: RosSystem, analys
     assert model.value("SELECT count(*) FROM flow_edge WHERE link_kind = 'transport'") == (
         len(expected) - loops
     )
+    assert model.rows(
+        "SELECT p.topic_name, (SELECT count(*) FROM flow_forward('publication', b.publication_id) "
+        "WHERE kind = 'take') FROM publication AS b JOIN publisher AS p USING (publisher_id) "
+        "ORDER BY b.publication_id"
+    ) == [("/tf", 2), ("/tf_static", 2), ("/a", 4)]

@@ -69,7 +69,6 @@ def test_a_pid_used_again(system: RosSystem, analyse: Analyse) -> None:
     system.publisher(MAIN, 0x10, "/old")
     old = system.publish(MAIN, 0x10, 1) + 20
     second = system.context(MAIN)
-    system.publish(MAIN, 0x10, 2)
     system.publisher(MAIN, 0x10, "/new")
     new = system.publish(MAIN, 0x10, 3) + 20
     model = analyse(system)
@@ -77,9 +76,22 @@ def test_a_pid_used_again(system: RosSystem, analyse: Analyse) -> None:
     assert model.column(
         "SELECT topic_name FROM publication JOIN publisher USING (publisher_id) "
         "ORDER BY publication_id"
-    ) == ["/old", None, "/new"]
+    ) == ["/old", "/new"]
     assert model.column("SELECT first_seen_ns FROM thread ORDER BY 1") == [first, second]
     assert model.rows(RESTARTS) == [("info", 1)]
+
+
+def test_initialising_again_is_no_new_life_while_an_old_object_goes_on(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    system.context(MAIN)
+    system.publisher(MAIN, 0x10, "/a")
+    system.publish(MAIN, 0x10, 1)
+    system.context(MAIN)
+    system.publish(MAIN, 0x10, 2)
+    model = analyse(system)
+    assert len(model.rows(LIVES)) == 1
+    assert model.column("SELECT topic_name FROM publisher") == ["/a"]
 
 
 def test_a_pid_used_again_by_another_program(system: RosSystem, analyse: Analyse) -> None:

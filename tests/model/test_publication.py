@@ -109,7 +109,7 @@ def test_an_event_of_the_thread_between_two_layers_splits(
 ) -> None:
     system.publisher(MAIN, 0x10, "/chatter")
     system.publish(MAIN, 0x10, layers="rclcpp")
-    system.ready(MAIN)
+    system.start(MAIN, 0xC9)
     system.publish(MAIN, 0x10, 777, layers="rcl rmw")
     assert analyse(system).column("SELECT source_timestamp_ns FROM publication ORDER BY 1") == [
         777,

@@ -28,7 +28,15 @@ def test_what_a_publisher_is(system: RosSystem, analyse: Analyse) -> None:
         queue_depth=7,
     )
     system.add("ros2:rmw_publisher_init", MAIN, rmw_publisher_handle=0x21, gid=[0] * 16)
-    system.publisher(MAIN, 0x11, "/rosout", rmw=0x21)
+    system.add(
+        "ros2:rcl_publisher_init",
+        MAIN,
+        publisher_handle=0x11,
+        node_handle=0x1,
+        rmw_publisher_handle=0x21,
+        topic_name="/rosout",
+        queue_depth=10,
+    )
     model = analyse(system)
     assert model.rows(
         "SELECT p.topic_name, n.full_name, publisher_handle, rmw_handle, gid, queue_depth, "

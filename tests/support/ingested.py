@@ -11,7 +11,7 @@ import pytest
 
 from msgflow.db.connection import connect
 from msgflow.errors import TraceError
-from msgflow.ingest import IngestReport, ingest
+from msgflow.ingest import ingest
 from msgflow.trace import bt2_library
 
 
@@ -19,7 +19,6 @@ from msgflow.trace import bt2_library
 class Ingested:
     """A database with one run, open for reading."""
 
-    report: IngestReport
     connection: duckdb.DuckDBPyConnection
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
@@ -36,7 +35,8 @@ class Ingested:
 
 def ingest_one(traces: Path, path: Path) -> Ingested:
     """Ingest the traces below a path into a new database."""
-    return Ingested(ingest([traces], path), connect(path, read_only=True))
+    ingest([traces], path)
+    return Ingested(connect(path, read_only=True))
 
 
 def require_reader() -> None:

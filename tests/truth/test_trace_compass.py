@@ -6,11 +6,15 @@ import hashlib
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
-from ingested import Ingested
+from ingested import Ingested, require_reader
+
+from msgflow.db.connection import connect
 
 FLOWS = (
     "end_to_end([1], NULL, NULL, 'callback_start', 'callback_end', 0, 9223372036854775807) AS e "
@@ -19,13 +23,72 @@ FLOWS = (
 MAIN_PATH = "h.topics = ['/topic_a', '/topic_b']"
 
 
+@dataclass(frozen=True)
+class Session:
+    """What the two commands of the documentation did.
+
+    Attributes:
+        database: the database that they made.
+        answer: what the query printed, as JSON.
+        before: content of the trace directory before, by file.
+        after: content of the trace directory afterwards.
+    """
+
+    database: Path
+    answer: list[dict[str, Any]]
+    before: dict[str, tuple[str, int]]
+    after: dict[str, tuple[str, int]]
+
+
+def contents(directory: Path) -> dict[str, tuple[str, int]]:
+    """Return digest and time of change of every file below a directory."""
+    return {
+        str(path.relative_to(directory)): (
+            hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "",
+            path.stat().st_mtime_ns,
+        )
+        for path in sorted(directory.rglob("*"))
+    }
+
+
 @pytest.fixture(scope="module")
-def trace(recordings: Callable[[str], Ingested]) -> Ingested:
-    return recordings("tracecompass-ros2")
+def session(shared_traces: Path, tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """Ingest and query, with no other option than the format."""
+    require_reader()
+    directory = shared_traces / "tracecompass-ros2"
+    here = tmp_path_factory.mktemp("here")
+    before = contents(directory)
+    for command in (["ingest", str(directory)], ["query", "e2e-latency", "--format", "json"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "msgflow", *command],
+            cwd=here,
+            env={"PATH": "/usr/bin:/bin", "HOME": str(here)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+    database = here / "msgflow.duckdb"
+    return Session(database, json.loads(done.stdout), before, contents(directory))
+
+
+@pytest.fixture(scope="module")
+def trace(session: Session) -> Iterator[Ingested]:
+    connection = connect(session.database, read_only=True)
+    yield Ingested(connection)
+    connection.close()
+
+
+def test_the_two_commands(session: Session) -> None:
+    """The answer, and not a byte of the trace changes."""
+    (row,) = [row for row in session.answer if row["roots"] == 2_031]
+    assert (row["reached"], row["edge"], row["lost"], row["superseded"]) == (1_986, 45, 0, 0)
+    assert (row["min_ns"], row["median_ns"], row["max_ns"]) == (131_601, 562_411, 45_601_667)
+    assert session.after == session.before
 
 
 def test_objects(trace: Ingested) -> None:
-    assert trace.report.event_count == 99_338
+    assert trace.rows("SELECT event_count FROM store.run") == [(99_338,)]
     assert trace.rows("SELECT event_count FROM trace") == [(99_338,)]
     assert trace.rows(
         "SELECT full_name, pid FROM node JOIN process USING (process_id) ORDER BY 2"
@@ -191,33 +254,3 @@ def test_executors(trace: Ingested) -> None:
 def test_nothing_is_wrong_with_the_input(trace: Ingested) -> None:
     assert trace.rows("SELECT * FROM loss_interval") == []
     assert trace.rows("SELECT * FROM diagnostic WHERE severity IN ('data_loss', 'error')") == []
-
-
-def contents(directory: Path) -> dict[str, tuple[str, int]]:
-    return {
-        str(path.relative_to(directory)): (
-            hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "",
-            path.stat().st_mtime_ns,
-        )
-        for path in sorted(directory.rglob("*"))
-    }
-
-
-def test_the_two_commands_and_the_trace_as_it_was(shared_traces: Path, tmp_path: Path) -> None:
-    """Ingest and query, nothing else, print the table; not a byte of the trace changes."""
-    directory = shared_traces / "tracecompass-ros2"
-    before = contents(directory)
-    for command in (["ingest", str(directory)], ["query", "e2e-latency", "--format", "json"]):
-        done = subprocess.run(
-            [sys.executable, "-m", "msgflow", *command],
-            cwd=tmp_path,
-            env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-    (row,) = [row for row in json.loads(done.stdout) if row["roots"] == 2_031]
-    assert (row["reached"], row["edge"], row["lost"], row["superseded"]) == (1_986, 45, 0, 0)
-    assert (row["min_ns"], row["median_ns"], row["max_ns"]) == (131_601, 562_411, 45_601_667)
-    assert contents(directory) == before

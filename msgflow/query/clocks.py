@@ -1,0 +1,35 @@
+"""Says when rows compare times of clocks that nobody brought together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import duckdb
+
+    from msgflow.query.window import Run
+
+_CLOCKS = """
+SELECT run_id, count(*)
+FROM main.clock
+WHERE list_contains($runs, run_id) AND method = 'none'
+GROUP BY run_id
+HAVING count(*) > 1
+"""
+
+
+def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
+    """Return one sentence for each run with several clocks that are as recorded.
+
+    One such clock is what the others are corrected to.
+    """
+    numbers = dict(connection.execute(_CLOCKS, {"runs": [run.run_id for run in runs]}).fetchall())
+    return [
+        f"{'the run' if len(runs) == 1 else f'run {run.name} ({run.run_id})'} has"
+        f" {numbers[run.run_id]} clocks that are not synchronised: times between their hosts are"
+        " not comparable"
+        for run in runs
+        if run.run_id in numbers
+    ]
