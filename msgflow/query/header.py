@@ -230,11 +230,9 @@ def _param(field: _Field, path: Path) -> Param:
         )
     choices = tuple(part.strip() for part in (match["choices"] or "").split("|") if part.strip())
     minimum: int | None = None
-    if (
-        is_integer(match["type"])
-        and len(choices) == 1
-        and (least := _MINIMUM.fullmatch(choices[0]))
-    ):
+    if least := _MINIMUM.fullmatch("|".join(choices)):
+        if not is_integer(match["type"]):
+            raise _error(path, field.line, f"only an integer has a minimum, not {match['type']}")
         minimum, choices = int(least[1]), ()
     default: Value = None
     if match["default"] is not None:

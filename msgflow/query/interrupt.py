@@ -100,11 +100,24 @@ def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T])
         return work()
     from concurrent.futures import ThreadPoolExecutor, wait
 
+    is_watched = threading.Event()
+
+    def work_once_watched() -> _T:
+        is_watched.wait()
+        interrupts.check()
+        return work()
+
     with noted_interrupts() as interrupts, ThreadPoolExecutor(max_workers=1) as pool:
-        future = pool.submit(work)
+        try:
+            future = pool.submit(work_once_watched)
+        except KeyboardInterrupt:
+            interrupts.note()
+            is_watched.set()
+            raise
         # Again and again: between two statements of the work there is nothing to interrupt.
         while not future.done():
             try:
+                is_watched.set()
                 wait((future,), timeout=_SECONDS_BETWEEN_ATTEMPTS)
                 interrupts.forward(connection)
             except KeyboardInterrupt:

@@ -51,6 +51,10 @@ def test_version(msgflow: Msgflow) -> None:
     [
         (("qury",), "no such command 'qury'", "did you mean 'query'"),
         (("ingest",), "missing argument 'TRACE...'", "msgflow ingest --help"),
+        (("ingest", ""), "the path of a trace is empty", "msgflow ingest TRACE"),
+        (("ingest", ".", "--name", "all"), "takes for something else — 'all'", "nor a number"),
+        (("ingest", ".", "--name", "12"), "takes for something else — '12'", "nor a number"),
+        (("ingest", ".", "--name", ""), "takes for something else — ''", "nor a number"),
         (("ingest", "x", "--host", "robot"), "--host takes NAME=PATH — robot", "--host robot="),
         (("sql",), "give SQL, or a file with -f", "msgflow sql"),
         (("sql", "SELECT 1", "-f", "x"), "give SQL, or a file with -f", "msgflow sql"),
@@ -162,9 +166,11 @@ def test_db_upgrade_of_a_current_database(msgflow: Msgflow, small_database: Path
 def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None:
     with duckdb.connect(str(small_database)) as connection:
         connection.execute("UPDATE store.definition SET hash = 'old' WHERE name = 'views'")
-    refused = msgflow("info", "--db", small_database)
+    copy = small_database.with_name("my robot.duckdb")
+    copy.write_bytes(small_database.read_bytes())
+    refused = msgflow("info", "--db", copy)
     assert refused.exit_code == 4
-    assert "msgflow db upgrade" in refused.stderr
+    assert refused.stderr.endswith(f"\n\nhint: msgflow db upgrade --db '{copy}'\n")
     assert msgflow("db", "upgrade", "--db", small_database).exit_code == 0
     assert msgflow("info", "--db", small_database).exit_code == 0
 

@@ -41,7 +41,15 @@ def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
     msgflow("ingest", trace, "--quiet")
     arguments = ("query", "e2e-latency", "--format", "json")
     assert json.loads(msgflow(*arguments, "--from", "/topic_a").stdout)
-    assert json.loads(msgflow(*arguments, "--from", "/nothing").stdout) == []
+    unknown = msgflow(*arguments, "--from", "/topic_z")
+    assert (unknown.exit_code, unknown.stdout) == (2, "")
+    assert "there is no such topic in the run — /topic_z" in unknown.stderr
+    assert "/topic_a" in unknown.stderr.partition("hint: ")[2]
+    for option in ("--max-depth", "--max-paths"):
+        for least in ("0", "-1"):
+            refused = msgflow(*arguments, option, least)
+            assert refused.exit_code == 2
+            assert f"is at least 1 — {least}" in refused.stderr
     whole, late = (
         json.loads(msgflow(*arguments, *options).stdout)[0]["roots"]
         for options in ((), ("--skip-first", "0.5"))

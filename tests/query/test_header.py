@@ -67,6 +67,16 @@ def test_everything_is_parsed() -> None:
     assert header.body == "SELECT 1\n-- a comment of the body\n"
 
 
+def test_an_integer_may_have_a_minimum() -> None:
+    (param,) = parse_with("-- param: depth BIGINT {1..} = 32  How deep").params
+    assert param == Param("depth", "BIGINT", 32, True, "How deep", minimum=1)
+
+
+def test_a_note_is_kept() -> None:
+    assert parse_with("-- note: clocks").note == "clocks"
+    assert parse_with("-- grain: one row").note is None
+
+
 def test_the_title_defaults_to_the_name() -> None:
     assert parse("-- name: example\n-- description: x\nSELECT 1\n", PATH).title == "example"
 
@@ -88,6 +98,9 @@ def test_a_macro_keeps_its_whole_statement() -> None:
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
         ("-- param: a VARCHAR {b|c} = 'd'  x", "the default 'd' is not among the choices"),
+        ("-- param: a BIGINT {1..} = 0  x", "the default 0 is less than 1"),
+        ("-- param: a VARCHAR {1..}  x", "only an integer has a minimum"),
+        ("-- note: moon", "note 'moon' is not one of clocks"),
         ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
         ("-- column: a", "example.sql:3: expected '-- column: name TYPE [unit]"),
         ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),

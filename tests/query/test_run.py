@@ -100,6 +100,110 @@ def test_a_query_that_fails_is_named(connection: duckdb.DuckDBPyConnection) -> N
         run_query(connection, failing, {})
 
 
+TOPICS = """\
+-- name: example
+-- description: x
+-- param: from VARCHAR = NULL  Topic
+-- param: to VARCHAR = NULL  Topic
+SELECT $from AS first, $to AS last, $runs AS runs
+"""
+
+
+@pytest.fixture
+def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
+    """Run 1 has /camera, /scan and two more, run 2 has /lidar."""
+    connection.execute("CREATE TABLE publisher (run_id BIGINT, topic_name VARCHAR)")
+    connection.execute("CREATE TABLE subscription (run_id BIGINT, topic_name VARCHAR)")
+    connection.execute(
+        "INSERT INTO publisher VALUES (1, '/camera'), (1, '/a'), (1, '/b'), (2, '/lidar'), "
+        "(1, NULL)"
+    )
+    connection.execute("INSERT INTO subscription VALUES (1, '/scan'), (1, '/camera')")
+    return connection
+
+
+@pytest.mark.parametrize(
+    ("run", "given"),
+    [
+        ("first", {"from": "/camera", "to": "/scan"}),
+        ("first", {"from": None}),
+        ("all", {"from": "/lidar", "to": "/scan"}),
+    ],
+)
+def test_topics_of_the_chosen_runs_will_do(
+    with_topics: duckdb.DuckDBPyConnection, run: str, given: dict[str, Value]
+) -> None:
+    (row,) = run_query(with_topics, header(TOPICS), given, run=run).to_arrow().to_pylist()
+    assert (row["first"], row["last"]) == (given["from"], given.get("to"))
+
+
+@pytest.mark.parametrize(
+    ("run", "given", "message", "hint"),
+    [
+        ("first", {"from": "/camra"}, "in the run — /camra", "did you mean /camera"),
+        ("first", {"to": "xyz"}, "in the run — xyz", "the topics are /a, /b, /camera and 1 more"),
+        ("second", {"from": "/scan"}, "in the run — /scan", "the topics are /lidar"),
+        ("all", {"from_": "/none!"}, "in these runs — /none!", "the topics are"),
+    ],
+)
+def test_topics_that_no_run_has_are_refused(
+    with_topics: duckdb.DuckDBPyConnection,
+    run: str,
+    given: dict[str, Value],
+    message: str,
+    hint: str,
+) -> None:
+    with pytest.raises(UsageError) as raised:
+        run_query(with_topics, header(TOPICS), given, run=run)
+    assert raised.value.message == f"there is no such topic {message}"
+    assert hint in (raised.value.hint or "")
+
+
+def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -> None:
+    with_topics.execute("DELETE FROM publisher")
+    with pytest.raises(UsageError) as raised:
+        run_query(with_topics, header(TOPICS), {"to": "/lidar"})
+    assert raised.value.hint == "msgflow query info-topics"
+    with_topics.execute("DELETE FROM run")
+    assert len(run_query(with_topics, header(TOPICS), {"to": "/lidar"})) == 1
+
+
+@pytest.mark.parametrize(
+    ("methods", "run", "notes"),
+    [
+        (("none",), "first", []),
+        (("none", "messages", "file"), "first", []),
+        (("none", "none", "messages"), "first", ["the run has 2 clocks"]),
+        (("none", "none", "none"), "all", ["run first (1) has 3 clocks"]),
+        (("none", "none"), "second", []),
+    ],
+)
+def test_clocks_that_differ_are_named(
+    connection: duckdb.DuckDBPyConnection, methods: tuple[str, ...], run: str, notes: list[str]
+) -> None:
+    connection.execute("CREATE TABLE clock (run_id BIGINT, method VARCHAR)")
+    connection.executemany("INSERT INTO clock VALUES (1, ?)", [[method] for method in methods])
+    connection.execute("INSERT INTO clock VALUES (2, 'none')")
+    query = QUERY.replace("-- param", "-- note: clocks\n-- param")
+    rest = " that are not synchronised: times between their hosts are not comparable"
+    result = run_query(connection, header(query), {}, run=run, internal=True)
+    assert result.notes == [f"{note}{rest}" for note in notes]
+    assert run_query(connection, header(QUERY), {}, run=run, internal=True).notes == []
+    late = run_query(connection, header(query), {"topic": "/none"}, run=run)
+    assert late.notes == []
+
+
+@pytest.mark.parametrize("given", [1, "1", None])
+def test_the_minimum_itself_will_do(given: Value) -> None:
+    least = header(
+        "-- name: example\n-- description: x\n-- param: depth BIGINT {1..} = 3  x\nSELECT 1\n"
+    )
+    assert bind(least, {"depth": given}) == {"depth": None if given is None else 1}
+    for less in (0, "-1"):
+        with pytest.raises(UsageError, match=f"depth is at least 1 — {less}"):
+            bind(least, {"depth": less})
+
+
 @pytest.mark.parametrize(
     ("given", "bound"),
     [

@@ -11,6 +11,7 @@ from msgflow.query.window import (
     Run,
     choose_runs,
     format_epoch,
+    is_run_name,
     time_window,
 )
 
@@ -96,6 +97,34 @@ def test_relative_times_need_one_run_with_a_start() -> None:
         time_window(RUNS, start="1s")
     with pytest.raises(UsageError, match="no events"):
         time_window((Run(1, "empty", None),), skip_first=1)
+
+
+@pytest.mark.parametrize("seconds", [1e300, 1e200, 1e10, float("inf"), float("nan"), -1.0])
+def test_seconds_that_no_run_has_are_refused(seconds: float) -> None:
+    with pytest.raises(UsageError, match="--skip-first takes the seconds to leave out"):
+        time_window((FIRST,), skip_first=seconds)
+
+
+@pytest.mark.parametrize("text", [str(2**63), str(-(2**63) - 1), 2**63, "300000000000s"])
+def test_times_out_of_range_are_refused(text: str | int) -> None:
+    with pytest.raises(UsageError, match="the time of --start is out of range"):
+        time_window((FIRST,), start=text)
+    with pytest.raises(UsageError, match="the time of --end is out of range"):
+        time_window((FIRST,), end=text)
+
+
+def test_the_start_of_a_run_and_what_is_skipped_may_be_too_much_together() -> None:
+    with pytest.raises(UsageError, match="the time of --skip-first is out of range"):
+        time_window((FIRST,), skip_first=9e9)
+
+
+@pytest.mark.parametrize(
+    ("name", "is_possible"),
+    [("robot", True), ("2026-03-14", True), ("all", False), ("12", False), ("-1", False)],
+)
+def test_names_that_a_run_can_be_chosen_by(name: str, is_possible: bool) -> None:
+    assert is_run_name(name) == is_possible
+    assert not is_run_name("")
 
 
 def test_contradictions_are_refused() -> None:

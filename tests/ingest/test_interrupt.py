@@ -1,0 +1,109 @@
+"""Ctrl-C in an ingest: nothing has changed, or the run is stored and the exit code says so."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from ingested import contents
+
+from msgflow.errors import ExitCode
+from msgflow.ingest import ingest
+
+# The command line, which says on stdout when a stage begins and then waits for the signal.
+_COMMAND = """
+import sys, time
+from msgflow.cli import app, progress
+from contextlib import contextmanager
+
+awaited = sys.argv.pop(1)
+
+@contextmanager
+def watched(quiet):
+    def show(state):
+        if state.stage == awaited and not shown:
+            shown.append(state)
+            print(state.stage, flush=True)
+            time.sleep(0.2)
+    shown = []
+    yield show
+
+progress.ingest_progress = watched
+app.main()
+"""
+STAGES = (
+    "opening the traces",
+    "reading the traces",
+    "building the model",
+    "storing the run",
+    "linking messages",
+    "checking the database",
+)
+
+
+def interrupted_at(stage: str, trace: Path, database: Path, signals: int = 1) -> tuple[int, str]:
+    """Return exit code and stderr of an ingest that gets Ctrl-C when `stage` begins."""
+    arguments = [stage, "ingest", str(trace), "--db", str(database)]
+    with subprocess.Popen(
+        [sys.executable, "-c", _COMMAND, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == f"{stage}\n"
+        for _ in range(signals):
+            process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_an_interrupt_leaves_nothing(trace: Path, new_database: Path, stage: str) -> None:
+    assert interrupted_at(stage, trace, new_database) == (
+        ExitCode.INTERRUPTED,
+        "error: interrupted\n",
+    )
+    assert os.listdir(new_database.parent) == []
+
+
+@pytest.mark.parametrize("stage", ["reading the traces", "linking messages"])
+def test_an_impatient_interrupt_leaves_the_database_as_it_was(
+    database: Path, other_trace: Path, stage: str
+) -> None:
+    before = contents(database)
+    code, errors = interrupted_at(stage, other_trace, database, signals=3)
+    assert (code, errors) == (ExitCode.INTERRUPTED, "error: interrupted\n")
+    assert contents(database) == before
+    assert os.listdir(database.parent) == [database.name]
+
+
+@pytest.mark.parametrize("signals", [1, 3])
+def test_an_interrupt_that_comes_too_late_is_none(
+    database: Path, other_trace: Path, signals: int
+) -> None:
+    """The run is stored already, so that is what is reported."""
+    code, errors = interrupted_at("closing the database", other_trace, database, signals)
+    assert code == ExitCode.OK
+    assert "as run pair (2)" in errors
+    assert [name for _, name, *_ in contents(database)["run"]] == ["robot", "pair"]
+    assert os.listdir(database.parent) == [database.name]
+
+
+def test_an_ingest_runs_in_any_thread(new_database: Path, trace: Path) -> None:
+    """Where no signals arrive, and no handler can be installed."""
+    worker = threading.Thread(target=ingest, args=([trace], new_database))
+    worker.start()
+    worker.join()
+    assert os.listdir(new_database.parent) == [new_database.name]
+
+
+def test_the_handler_of_the_program_is_back_afterwards(new_database: Path, trace: Path) -> None:
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    ingest([trace], new_database)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

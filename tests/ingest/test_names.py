@@ -1,0 +1,51 @@
+"""Names of runs, and of the database itself."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from msgflow.errors import UsageError
+from msgflow.ingest import ingest
+
+
+@pytest.mark.parametrize("name", ["all", "7", "-7", ""])
+def test_a_name_that_means_something_else_is_refused(
+    trace: Path, new_database: Path, name: str
+) -> None:
+    with pytest.raises(UsageError, match="takes for something else"):
+        ingest([trace], new_database, name=name)
+    assert os.listdir(new_database.parent) == []
+
+
+@pytest.mark.parametrize("name", ["all", "20260314"])
+def test_a_directory_of_such_a_name_gives_another(
+    trace: Path, new_database: Path, tmp_path: Path, name: str
+) -> None:
+    shutil.copytree(trace, tmp_path / name)
+    assert ingest([tmp_path / name], new_database).run_name == f"run-{name}"
+
+
+def test_no_path_is_not_the_current_directory(new_database: Path) -> None:
+    with pytest.raises(UsageError, match="the path of a trace is empty"):
+        ingest([""], new_database)
+
+
+def test_a_link_that_leads_nowhere_yet_leads_to_the_new_database(
+    trace: Path, new_database: Path, tmp_path: Path
+) -> None:
+    """It stays a link; a second ingest through it adds to the same database."""
+    link = tmp_path / "links" / "msgflow.duckdb"
+    link.parent.mkdir()
+    link.symlink_to(new_database)
+    ingest([trace], link)
+    assert link.is_symlink()
+    assert os.listdir(link.parent) == [link.name]
+    assert os.listdir(new_database.parent) == [new_database.name]
+    assert ingest([trace], link, replace=True).run_id == 2
+    with duckdb.connect(str(new_database), read_only=True) as connection:
+        assert connection.execute("SELECT run_id FROM run").fetchall() == [(2,)]
