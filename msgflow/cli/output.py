@@ -61,16 +61,22 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
     else:
         if form is Format.PARQUET and sys.stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        write_result(result, form, _stdout())
+        write_result(result, form, data_stream())
     if path is None and not len(result):
         print_note("no rows")
     for note in result.notes:
         print_note(note)
 
 
+def data_stream() -> IO[bytes]:
+    """Return stdout as bytes."""
+    sys.stdout.flush()
+    return sys.stdout.buffer
+
+
 def print_lines(lines: Iterable[str]) -> None:
     """Write lines of text to stdout."""
-    stream = _stdout()
+    stream = data_stream()
     for line in lines:
         stream.write(f"{line}\n".encode())
 
@@ -78,11 +84,6 @@ def print_lines(lines: Iterable[str]) -> None:
 def count(number: int, thing: str) -> str:
     """Return '1 row', '1,234 rows'."""
     return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
-
-
-def _stdout() -> IO[bytes]:
-    sys.stdout.flush()
-    return sys.stdout.buffer
 
 
 def _labelled(label: str, color: str, text: str) -> None:

@@ -14,7 +14,7 @@ from msgflow.cli.output import print_error
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
-COMMANDS = ("ingest", "query", "sql", "info", "export", "db", "simulate")
+COMMANDS = ("ingest", "query", "sql", "info", "events", "export", "db", "simulate")
 
 
 class RootGroup(TyperGroup):

@@ -20,6 +20,7 @@ from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
 from msgflow.ingest.workspace import workspace
 from msgflow.query.interrupt import interruptible
+from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def ingest(
     Everything happens in one transaction; a new database appears only when it is complete.
 
     Args:
-        paths: CTF traces, session directories, or directories above such.
+        paths: CTF traces, session directories, directories above such, or archives of such.
         database: the database file; created where it does not exist.
         name: name of the run; that of the first path when None.
         replace: delete the runs that hold some of these packets already, or have this name.
@@ -144,7 +145,7 @@ def ingest(
                     progress=watch.reading,
                 )
                 judge.require_ros_events(traces.traces, loaded.event_counts)
-                fallback = Path(paths[0]).resolve().name or "run"
+                fallback = archive.stem(Path(paths[0]).resolve()) or "run"
                 run = interruptible(
                     con, lambda: _write(con, name, fallback, loaded, keep_staging, watch)
                 )
