@@ -28,7 +28,8 @@ def command(
         list[str],
         typer.Argument(
             metavar="TRACE...",
-            help="Directories with CTF traces, at any depth; all of them become one run",
+            help="Directories with CTF traces, at any depth, or archives of such; all of them"
+            " become one run",
         ),
     ],
     name: Annotated[

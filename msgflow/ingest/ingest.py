@@ -23,6 +23,7 @@ from msgflow.ingest import judge, model, staging
 from msgflow.ingest.workspace import workspace
 from msgflow.query.interrupt import interruptible, noted_interrupts
 from msgflow.query.window import is_run_name
+from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def ingest(
     ends the ingest until the run is stored, and is ignored while it is being finished after that.
 
     Args:
-        paths: CTF traces, session directories, or directories above such.
+        paths: CTF traces, session directories, directories above such, or archives of such.
         database: the database file; created where it does not exist, or where a symbolic link of
             that name points to.
         name: name of the run; that of the first path when None.
@@ -265,7 +266,7 @@ def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
 
 
 def _fallback_name(paths: Sequence[str | Path]) -> str:
-    name = Path(paths[0]).resolve().name
+    name = archive.stem(Path(paths[0]).resolve())
     return name if is_run_name(name) else f"run-{name}".rstrip("-")
 
 

@@ -34,9 +34,11 @@ class RowStore:
         """Empty the store into a batch."""
         rows = renumber(self.rows, new_ids) if new_ids else self.rows
         columns = dict(zip(self.columns, zip(*rows, strict=True), strict=True))
-        batch = record_batch(schema, columns, _WITHOUT_CONTEXT, len(rows))
+        payload = list(schema)[len(COMMON_SCHEMA) :]
+        distinct = pa.schema([*COMMON_SCHEMA, *(f.with_name(_distinct(f.name)) for f in payload)])
+        batch = record_batch(distinct, columns, _WITHOUT_CONTEXT, len(rows))
         self.rows.clear()
-        return batch
+        return pa.RecordBatch.from_arrays(batch.columns, schema=schema)
 
 
 @dataclass(slots=True)
@@ -94,7 +96,7 @@ class Planner:
         missing = [field for field in contexts if field.name not in from_common]
         from_specific = _matching(missing, specific)
         from_payload = _matching(payload_schema, payload)
-        columns = (*_ROW_HEAD, *from_common, *from_specific, *from_payload)
+        columns = (*_ROW_HEAD, *from_common, *from_specific, *map(_distinct, from_payload))
         store = self._stores.setdefault(name, {}).setdefault(columns, RowStore(columns))
         return ClassPlan(
             trace_index,
@@ -129,6 +131,11 @@ def merged_schema(declared: Iterable[tuple[Member, ...]]) -> pa.Schema:
             known = types.setdefault(member.name, member.type)
             types[member.name] = union_type(known, member.type) or known
     return pa.schema(list(types.items()))
+
+
+def _distinct(name: str) -> str:
+    """Return a name for a payload column that no common column has."""
+    return f"payload {name}"
 
 
 def _matching(schema: Iterable[pa.Field], members: Iterable[Member]) -> dict[str, Member]:

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
 ALIASES = b"aliases"
 """Key of a field's metadata: other names under which traces have it, comma separated."""
+
+BASE = b"base"
+"""Key of a field's metadata: the base in which to show an integer, or the elements of an array."""
 
 
 def names_of(field: pa.Field) -> tuple[str, ...]:
@@ -40,6 +43,30 @@ def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
     if pa.types.is_integer(first) and pa.types.is_integer(second):
         return pa.int64()
     return None
+
+
+def in_hexadecimal(schema: pa.Schema, names: Collection[str]) -> pa.Schema:
+    """Return the schema with these columns marked as to be shown in base 16."""
+    return pa.schema(
+        [
+            field.with_metadata({**(field.metadata or {}), BASE: b"16"})
+            if field.name in names
+            else field
+            for field in schema
+        ]
+    )
+
+
+def complete_schemas(
+    wanted: Mapping[str, pa.Schema | None] | None, declared: Mapping[str, pa.Schema]
+) -> Mapping[str, pa.Schema]:
+    """Return the payload columns of each wanted event, all declared fields where none are named."""
+    if wanted is None:
+        return declared
+    return {
+        name: declared.get(name, pa.schema([])) if schema is None else schema
+        for name, schema in wanted.items()
+    }
 
 
 def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:

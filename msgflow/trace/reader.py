@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.trace.archive import is_archive
 from msgflow.trace.discovery import discover
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
     from types import TracebackType
 
     import pyarrow as pa
 
-    from msgflow.trace.model import EventBatch, Progress, TraceInfo
+    from msgflow.trace.model import EventBatch, Progress, TraceInfo, TraceLocation
 
 READERS = ("auto", "bt2")
 DEFAULT_BATCH_ROWS = 65_536
@@ -40,20 +41,20 @@ class TraceSet(ABC):
     @abstractmethod
     def batches(
         self,
-        wanted: Mapping[str, pa.Schema] | None = None,
+        wanted: Mapping[str, pa.Schema | None] | None = None,
         *,
         progress: Callable[[Progress], None] | None = None,
         batch_rows: int = DEFAULT_BATCH_ROWS,
     ) -> Iterator[EventBatch]:
         """Read everything once; may be called again, which reads again from the start.
 
-        The batches of one name come in order of `event_id`. Memory stays bounded by
-        `batch_rows`, whatever the size of the traces.
+        The batches of one name come in order of `event_id`, those of all names in rounds: see
+        `EventBatch.round`. Memory stays bounded by `batch_rows`, whatever the size of the traces.
 
         Args:
-            wanted: event name to the payload columns to deliver. A column is filled from the
-                field of its name, else of a name in its metadata `aliases` (comma separated),
-                else it is NULL. None: all events with all their fields.
+            wanted: event name to the payload columns to deliver, None for all its fields. A
+                column is filled from the field of its name, else of a name in its metadata
+                `aliases` (comma separated), else it is NULL. None: all events with all fields.
             progress: called every few thousand events and once at the end.
             batch_rows: events held before they are handed over.
 
@@ -81,17 +82,36 @@ class TraceSet(ABC):
 def open(paths: Sequence[str | Path], *, reader: str = "auto") -> TraceSet:
     """Open all traces below `paths` as one set.
 
+    Archives are unpacked to the temporary directory (TMPDIR) until the set is closed.
+
     Args:
-        paths: CTF directories or directories above such.
+        paths: CTF directories, directories above such, or archives of such (.tar, also with .gz,
+            .xz or .zst, and .zip).
         reader: 'bt2' (Babeltrace 2's Python bindings), or 'auto' for the best there is.
 
     Raises:
-        TraceError: there is no readable trace below a path, or the reader is not installed.
+        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
+            the reader is not installed.
         UsageError: there is no reader of that name.
     """
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
-    locations = discover(paths)
+    if not any(is_archive(Path(path)) for path in paths):
+        return _open(discover(paths))
+    from msgflow.trace.unpacked import Unpacked, UnpackedTraceSet
+
+    unpacked = Unpacked(paths)
+    try:
+        with unpacked.explained():
+            locations = discover(unpacked.paths)
+            locations.sort(key=lambda location: unpacked.shown(location.path))
+            return UnpackedTraceSet(_open(locations), unpacked)
+    except BaseException:
+        unpacked.remove()
+        raise
+
+
+def _open(locations: Sequence[TraceLocation]) -> TraceSet:
     from msgflow.trace.bt2_reader import Bt2TraceSet
 
     return Bt2TraceSet(locations)
