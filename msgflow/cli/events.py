@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from msgflow.events.selection import Selection
 
 
+_DAMAGES_SHOWN = 10
+
+
 def command(
     traces: Annotated[
         list[Path],
@@ -85,6 +88,7 @@ def command(
     reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
         Reader.AUTO
     ),
+    strict: Annotated[bool, typer.Option("--strict", help="End at the first damage")] = False,
 ) -> None:
     """List the events of traces in order of time, whatever they are.
 
@@ -95,13 +99,20 @@ def command(
     from msgflow.cli.output import print_note
     from msgflow.events.selection import Selection
 
-    with trace.open(traces, reader=reader.value) as opened:
+    with trace.open(traces, reader=reader.value, strict=strict) as opened:
         selection = Selection(opened, event or (), start, end)
         if count:
             _print_counts(selection, form, output)
         else:
             _write(selection, form or format_of(output), output)
         lost = selection.lost_event_count
+        damages = list(opened.damages)
+    for damage in damages[:_DAMAGES_SHOWN]:
+        print_note(
+            f"{damage.message} — {damage.file}, packet {damage.position}, byte {damage.offset}"
+        )
+    if len(damages) > _DAMAGES_SHOWN:
+        print_note(f"{counted(len(damages) - _DAMAGES_SHOWN, 'further damage')}")
     if lost:
         print_note(f"{counted(lost, 'event')} lost by the tracer while recording")
 

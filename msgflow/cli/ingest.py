@@ -20,6 +20,7 @@ class Reader(StrEnum):
     """What decodes the traces."""
 
     AUTO = "auto"
+    MSGFLOW = "msgflow"
     BT2 = "bt2"
 
 
@@ -50,6 +51,10 @@ def command(
     reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
         Reader.AUTO
     ),
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Refuse damaged traces, keep nothing"),
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only")] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -68,6 +73,7 @@ def command(
                 hosts=hosts,
                 keep_staging=keep_staging,
                 reader=reader.value,
+                strict=strict,
                 progress=progress,
             )
         if not quiet:

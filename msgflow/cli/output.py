@@ -85,7 +85,7 @@ def count(number: int, thing: str) -> str:
     return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
 
 
-def discarddata_stream() -> None:
+def discard_stdout() -> None:
     """Let stdout lead nowhere, also what is still to be written to it."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

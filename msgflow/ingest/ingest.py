@@ -96,6 +96,7 @@ def ingest(
     hosts: Mapping[str, str] | None = None,
     keep_staging: Path | None = None,
     reader: str = "auto",
+    strict: bool = False,
     ignore: Sequence[str] = (),
     memory_limit: str | None = None,
     progress: Callable[[IngestProgress], None] | None = None,
@@ -113,7 +114,8 @@ def ingest(
         replace: delete the runs that hold some of these packets already, or have this name.
         hosts: name of a host -> path; the traces below the path belong to that host.
         keep_staging: directory to which the staged events are written as Parquet.
-        reader: which reader to use: 'auto' or 'bt2'.
+        reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
+        strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
         memory_limit: most memory that the database takes, such as '4GB'.
         progress: called every now and then.
@@ -131,7 +133,7 @@ def ingest(
     with noted_interrupts() as interrupts:
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
-        with trace_package.open(paths, reader=reader) as traces:
+        with trace_package.open(paths, reader=reader, strict=strict) as traces:
             judge.require_ros_traces(traces.traces)
             hostnames = _hostnames(traces.traces, hosts or {})
             migrate.require_ingestable(database)

@@ -9,9 +9,9 @@ from msgflow.errors import TraceError
 from msgflow.trace.bt2_duplicates import DuplicateFilter
 from msgflow.trace.bt2_fields import FieldReader
 from msgflow.trace.bt2_graph import Bt2Graph
-from msgflow.trace.bt2_plan import ClassPlan, Planner, merged_schema
+from msgflow.trace.bt2_plan import ClassPlan, Planner
 from msgflow.trace.bt2_streams import PacketRow, StreamTable
-from msgflow.trace.columns import complete_schemas, in_hexadecimal, record_batch
+from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema, record_batch
 from msgflow.trace.losses import DiscardCounters
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.order import Entry, new_numbers

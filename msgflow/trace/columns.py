@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import pyarrow as pa
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+
+class Field(Protocol):
+    """A field that a trace declares: its name, and the Arrow type that holds its values."""
+
+    @property
+    def name(self) -> str:
+        """As declared."""
+
+    @property
+    def type(self) -> pa.DataType:
+        """The Arrow type."""
+
+
+AnyField = TypeVar("AnyField", bound=Field)
 
 ALIASES = b"aliases"
 """Key of a field's metadata: other names under which traces have it, comma separated."""
@@ -69,6 +84,33 @@ def complete_schemas(
     }
 
 
+def merged_schema(declared: Iterable[Iterable[Field]]) -> pa.Schema:
+    """Return the payload columns of several declarations of one event.
+
+    Integers of different types become int64; a field of types that do not go together keeps
+    the first one and is NULL where it is declared otherwise.
+    """
+    types: dict[str, pa.DataType] = {}
+    for fields in declared:
+        for field in fields:
+            known = types.setdefault(field.name, field.type)
+            types[field.name] = union_type(known, field.type) or known
+    return pa.schema(list(types.items()))
+
+
+def matching(columns: Iterable[pa.Field], fields: Iterable[AnyField]) -> dict[str, AnyField]:
+    """Return column to the field that fills it, for those columns that a field can fill."""
+    by_name = {field.name: field for field in fields}
+    found = {}
+    for column in columns:
+        for name in names_of(column):
+            field = by_name.get(name)
+            if field is not None and can_hold(_plain(column.type), field.type):
+                found[column.name] = field
+                break
+    return found
+
+
 def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:
     """Convert a column of Python values.
 
@@ -106,6 +148,10 @@ def renumber(rows: list[list[Any]], new_ids: Mapping[int, int]) -> list[list[Any
     changed = [[new_ids.get(row[0], row[0]), *row[1:]] for row in rows]
     changed.sort(key=itemgetter(0))
     return changed
+
+
+def _plain(data_type: pa.DataType) -> pa.DataType:
+    return data_type.value_type if pa.types.is_dictionary(data_type) else data_type
 
 
 def _valid_text(value: Any) -> Any:

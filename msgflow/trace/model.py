@@ -90,3 +90,22 @@ class Progress:
     events: int
     fraction: float
     time_ns: int
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Something in a stream file that is not as it should be.
+
+    Attributes:
+        trace_index: which trace.
+        file: the stream file.
+        position: which packet of the file, from 0.
+        offset: where in the file, in bytes.
+        message: what is wrong, without full stop.
+    """
+
+    trace_index: int
+    file: Path
+    position: int
+    offset: int
+    message: str
