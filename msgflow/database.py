@@ -96,6 +96,7 @@ class Database:
         hosts: Mapping[str, str] | None = None,
         keep_staging: str | Path | None = None,
         reader: str = "auto",
+        strict: bool = False,
         ignore: Sequence[str] = (),
         progress: Callable[[IngestProgress], None] | None = None,
     ) -> IngestReport:
@@ -107,7 +108,8 @@ class Database:
             replace: take the place of a run with the same name or packets.
             hosts: name of a host -> path of one of its traces.
             keep_staging: directory for the staging tables as Parquet.
-            reader: 'auto' or 'bt2'.
+            reader: 'auto', 'msgflow' or 'bt2'.
+            strict: refuse a trace at its first damage, instead of keeping what is good.
             ignore: names of events to leave out.
             progress: called now and then while reading.
 
@@ -126,6 +128,7 @@ class Database:
             hosts=dict(hosts) if hosts else None,
             keep_staging=Path(keep_staging) if keep_staging is not None else None,
             reader=reader,
+            strict=strict,
             ignore=ignore,
             memory_limit=self._memory_limit,
             progress=progress,

@@ -358,7 +358,7 @@ CREATE TABLE store.executor_state (
     thread_id            BIGINT NOT NULL,        -- Thread it happened on -> thread.thread_id
     state                VARCHAR NOT NULL,       -- 'wait', 'process' or 'execute'
     start_ns             BIGINT NOT NULL,        -- Executor event that began it [epoch ns]
-    end_ns               BIGINT,                 -- Next executor event of the thread; NULL: not known (the last, or a gap) [epoch ns]
+    end_ns               BIGINT,                 -- Next executor event; NULL: not known (the last, or a gap) [epoch ns]
     callback_instance_id BIGINT,                 -- First callback run in it -> callback_instance.callback_instance_id
     start_event_id       BIGINT                  -- Executor event that began it [event order]
 );

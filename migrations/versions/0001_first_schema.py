@@ -739,7 +739,7 @@ def upgrade() -> None:
         sa.Column(
             "end_ns",
             sa.BigInteger(),
-            comment="Next executor event of the thread; NULL: not known (the last, or a gap) [epoch ns]",
+            comment="Next executor event; NULL: not known (the last, or a gap) [epoch ns]",
         ),
         sa.Column("callback_instance_id", sa.BigInteger(), comment="First callback run in it"),
         sa.Column(

@@ -20,6 +20,7 @@ class Reader(StrEnum):
     """What decodes the traces."""
 
     AUTO = "auto"
+    MSGFLOW = "msgflow"
     BT2 = "bt2"
 
 
@@ -28,7 +29,8 @@ def command(
         list[str],
         typer.Argument(
             metavar="TRACE...",
-            help="Directories with CTF traces, at any depth; all of them become one run",
+            help="Directories with CTF traces, at any depth, or archives of such; all of them"
+            " become one run",
         ),
     ],
     name: Annotated[
@@ -49,6 +51,10 @@ def command(
     reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
         Reader.AUTO
     ),
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Refuse damaged traces, keep nothing"),
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only")] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -67,6 +73,7 @@ def command(
                 hosts=hosts,
                 keep_staging=keep_staging,
                 reader=reader.value,
+                strict=strict,
                 progress=progress,
             )
         if not quiet:

@@ -59,7 +59,7 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
             write_result(result, form, stream)
         print_status(f"{count(len(result), 'row')} written to {path}")
     else:
-        stdout = _stdout()
+        stdout = data_stream()
         if form is Format.PARQUET and stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
         write_result(result, form, stdout)
@@ -75,7 +75,7 @@ def print_lines(lines: Iterable[str]) -> None:
     Raises:
         UsageError: stdout is closed.
     """
-    stream = _stdout()
+    stream = data_stream()
     for line in lines:
         stream.write(f"{line}\n".encode())
 
@@ -90,7 +90,12 @@ def discard_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _stdout() -> IO[bytes]:
+def data_stream() -> IO[bytes]:
+    """Return stdout as bytes.
+
+    Raises:
+        UsageError: stdout is closed.
+    """
     if sys.stdout is None:  # closed by whoever started this process
         raise UsageError(
             "cannot write to stdout: it is closed", "write to a file, for instance with -o FILE"

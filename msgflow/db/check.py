@@ -1,7 +1,7 @@
 """Audits: what must be true of every database, and which rows break it.
 
-`schema/check` holds one audit per file, a query that returns the offending rows with their run. Relations between
-tables are audited from what `tables.py` declares, since there are no foreign keys.
+`schema/check` holds one audit per file, a query that returns the offending rows with their run.
+Relations between tables are audited from what `tables.py` declares: there are no foreign keys.
 """
 
 from __future__ import annotations

@@ -539,7 +539,7 @@ executor_state = _table(
     _thread(),
     _text("state", "'wait', 'process' or 'execute'", required=True),
     _time("start_ns", "Executor event that began it", required=True),
-    _time("end_ns", "Next executor event of the thread; NULL: not known (the last, or a gap)"),
+    _time("end_ns", "Next executor event; NULL: not known (the last, or a gap)"),
     _reference(
         "callback_instance_id",
         "First callback run in it",

@@ -23,6 +23,7 @@ from msgflow.ingest import judge, model, staging
 from msgflow.ingest.workspace import workspace
 from msgflow.query.interrupt import interruptible, noted_interrupts
 from msgflow.query.window import is_run_name
+from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -95,6 +96,7 @@ def ingest(
     hosts: Mapping[str, str] | None = None,
     keep_staging: Path | None = None,
     reader: str = "auto",
+    strict: bool = False,
     ignore: Sequence[str] = (),
     memory_limit: str | None = None,
     progress: Callable[[IngestProgress], None] | None = None,
@@ -105,14 +107,15 @@ def ingest(
     ends the ingest until the run is stored, and is ignored while it is being finished after that.
 
     Args:
-        paths: CTF traces, session directories, or directories above such.
+        paths: CTF traces, session directories, directories above such, or archives of such.
         database: the database file; created where it does not exist, or where a symbolic link of
             that name points to.
         name: name of the run; that of the first path when None.
         replace: delete the runs that hold some of these packets already, or have this name.
         hosts: name of a host -> path; the traces below the path belong to that host.
         keep_staging: directory to which the staged events are written as Parquet.
-        reader: which reader to use: 'auto' or 'bt2'.
+        reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
+        strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
         memory_limit: most memory that the database takes, such as '4GB'.
         progress: called every now and then.
@@ -130,7 +133,7 @@ def ingest(
     with noted_interrupts() as interrupts:
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
-        with trace_package.open(paths, reader=reader) as traces:
+        with trace_package.open(paths, reader=reader, strict=strict) as traces:
             judge.require_ros_traces(traces.traces)
             hostnames = _hostnames(traces.traces, hosts or {})
             migrate.require_ingestable(database)
@@ -265,7 +268,7 @@ def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
 
 
 def _fallback_name(paths: Sequence[str | Path]) -> str:
-    name = Path(paths[0]).resolve().name
+    name = archive.stem(Path(paths[0]).resolve())
     return name if is_run_name(name) else f"run-{name}".rstrip("-")
 
 

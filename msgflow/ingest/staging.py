@@ -49,6 +49,12 @@ CREATE TABLE staging.event_count (
 )
 """
 
+_DAMAGE_TABLE = """
+CREATE TABLE staging.damage (
+    trace_index INTEGER, file VARCHAR, position BIGINT, byte_offset BIGINT, message VARCHAR
+)
+"""
+
 # Packets of the target database that the packets just read are the same as.
 _SAME_PACKETS = """
 SELECT DISTINCT r.run_id, r.name
@@ -86,7 +92,7 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     con.execute("ATTACH ':memory:' AS staging")
     for tracepoint in load().tracepoints.values():
         con.execute(tracepoint.create_table_sql("raw"))
-    for statement in (_PACKET_TABLE, _SOURCE_TABLE, _EVENT_COUNT_TABLE):
+    for statement in (_PACKET_TABLE, _SOURCE_TABLE, _EVENT_COUNT_TABLE, _DAMAGE_TABLE):
         con.execute(statement)
     con.execute(_event_view(list(load().tracepoints.values())))
 
@@ -158,6 +164,17 @@ def load_traces(
         con.execute(
             "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",
             [trace_index, name, name in tracepoints, count],
+        )
+    for damage in traces.damages:
+        con.execute(
+            "INSERT INTO staging.damage VALUES (?, ?, ?, ?, ?)",
+            [
+                damage.trace_index,
+                str(damage.file),
+                damage.position,
+                damage.offset,
+                damage.message,
+            ],
         )
     return Loaded(dict(traces.event_counts), traces.duplicate_packet_count, frozenset(replaced))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from msgflow.trace.discovery import discover
-from msgflow.trace.model import EventBatch, Progress, TraceInfo, TraceLocation
+from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.reader import TraceSet, open
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ __all__ = [
     "COMMON_SCHEMA",
     "PACKET",
     "PACKET_SCHEMA",
+    "Damage",
     "EventBatch",
     "Progress",
     "TraceInfo",

@@ -25,12 +25,14 @@ class Member:
         index: its place in the structure.
         type: the Arrow type that holds every value of it.
         get: a pointer to the field to its value.
+        is_hexadecimal: it is, or is an array of, integers to be shown in base 16.
     """
 
     name: str
     index: int
     type: pa.DataType
     get: Callable[[Any], Any]
+    is_hexadecimal: bool
 
 
 class FieldReader:
@@ -57,8 +59,21 @@ class FieldReader:
             name = native.field_class_structure_member_get_name(member)
             field_class = native.field_class_structure_member_borrow_field_class_const(member)
             field_type, get = self._reader(field_class)
-            result.append(Member(name, index, field_type, get))
+            is_hexadecimal = self._is_hexadecimal(field_class)
+            result.append(Member(name, index, field_type, get, is_hexadecimal))
         return tuple(result)
+
+    def _is_hexadecimal(self, field_class: Any) -> bool:
+        native = self._native
+        kind = native.field_class_get_type(field_class)
+        if native.field_class_type_is(kind, native.FIELD_CLASS_TYPE_ARRAY):
+            return self._is_hexadecimal(
+                native.field_class_array_borrow_element_field_class_const(field_class)
+            )
+        if not native.field_class_type_is(kind, native.FIELD_CLASS_TYPE_INTEGER):
+            return False
+        base = native.field_class_integer_get_preferred_display_base(field_class)
+        return bool(base == native.FIELD_CLASS_INTEGER_PREFERRED_DISPLAY_BASE_HEXADECIMAL)
 
     def _reader(self, field_class: Any) -> tuple[pa.DataType, Callable[[Any], Any]]:
         native = self._native

@@ -9,9 +9,9 @@ from msgflow.errors import TraceError
 from msgflow.trace.bt2_duplicates import DuplicateFilter
 from msgflow.trace.bt2_fields import FieldReader
 from msgflow.trace.bt2_graph import Bt2Graph
-from msgflow.trace.bt2_plan import ClassPlan, Planner, merged_schema
+from msgflow.trace.bt2_plan import ClassPlan, Planner
 from msgflow.trace.bt2_streams import PacketRow, StreamTable
-from msgflow.trace.columns import record_batch
+from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema, record_batch
 from msgflow.trace.losses import DiscardCounters
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.order import Entry, new_numbers
@@ -40,7 +40,7 @@ class Iteration:
         self,
         library: Bt2Library,
         traces: Sequence[TraceInfo],
-        wanted: Mapping[str, pa.Schema] | None,
+        wanted: Mapping[str, pa.Schema | None] | None,
         progress: Callable[[Progress], None] | None,
         batch_rows: int,
     ) -> None:
@@ -66,6 +66,7 @@ class Iteration:
         self._plans: dict[int, ClassPlan] = {}
         self._packets: list[PacketRow] = []
         self._ties: list[list[Entry]] = []
+        self._round = 0
         self.event_count = 0
 
     @property
@@ -248,9 +249,7 @@ class Iteration:
         )
 
     def _new_planner(self) -> Planner:
-        schemas = self._wanted
-        if schemas is None:
-            schemas = self._declared_schemas()
+        schemas = complete_schemas(self._wanted, self._declared_schemas())
         return Planner(self._library, self._fields, schemas)
 
     def _declared_schemas(self) -> dict[str, pa.Schema]:
@@ -260,7 +259,13 @@ class Iteration:
             name = native.event_class_get_name(event_class) or ""
             payload = native.event_class_borrow_payload_field_class_const(event_class)
             declared.setdefault(name, []).append(self._fields.members(payload))
-        return {name: merged_schema(members) for name, members in declared.items()}
+        return {
+            name: in_hexadecimal(
+                merged_schema(classes),
+                {member.name for members in classes for member in members if member.is_hexadecimal},
+            )
+            for name, classes in declared.items()
+        }
 
     def _plan(self, event_class: Any, trace_index: int) -> ClassPlan:
         assert self._planner is not None
@@ -274,12 +279,13 @@ class Iteration:
         self._ties.clear()
         if self._planner is not None:
             for name, batch in self._planner.take(new_ids):
-                yield EventBatch(name, batch)
+                yield EventBatch(name, batch, self._round)
         if self._packets:
             columns = dict(zip(PACKET_SCHEMA.names, zip(*self._packets, strict=True), strict=True))
             batch = record_batch(PACKET_SCHEMA, columns, {}, len(self._packets))
             self._packets.clear()
-            yield EventBatch(PACKET, batch)
+            yield EventBatch(PACKET, batch, self._round)
+        self._round += 1
 
     def _fraction(self, time_ns: int) -> float:
         begin = min((trace.begin_ns for trace in self._traces if trace.begin_ns), default=0)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from msgflow.trace.columns import can_hold, names_of, record_batch, renumber, union_type
+from msgflow.trace.columns import matching, record_batch, renumber
 from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from msgflow.trace.bt2_fields import FieldReader, Member
+    from msgflow.trace.bt2_fields import FieldReader
     from msgflow.trace.bt2_library import Bt2Library
 
 Getter = tuple[int, "Callable[[Any], Any]"]
@@ -34,9 +34,11 @@ class RowStore:
         """Empty the store into a batch."""
         rows = renumber(self.rows, new_ids) if new_ids else self.rows
         columns = dict(zip(self.columns, zip(*rows, strict=True), strict=True))
-        batch = record_batch(schema, columns, _WITHOUT_CONTEXT, len(rows))
+        payload = list(schema)[len(COMMON_SCHEMA) :]
+        distinct = pa.schema([*COMMON_SCHEMA, *(f.with_name(_distinct(f.name)) for f in payload)])
+        batch = record_batch(distinct, columns, _WITHOUT_CONTEXT, len(rows))
         self.rows.clear()
-        return batch
+        return pa.RecordBatch.from_arrays(batch.columns, schema=schema)
 
 
 @dataclass(slots=True)
@@ -90,11 +92,11 @@ class Planner:
             native.event_class_borrow_payload_field_class_const(event_class)
         )
         contexts = [field for field in COMMON_SCHEMA if field.name in _CONTEXT_COLUMNS]
-        from_common = _matching(contexts, common)
+        from_common = matching(contexts, common)
         missing = [field for field in contexts if field.name not in from_common]
-        from_specific = _matching(missing, specific)
-        from_payload = _matching(payload_schema, payload)
-        columns = (*_ROW_HEAD, *from_common, *from_specific, *from_payload)
+        from_specific = matching(missing, specific)
+        from_payload = matching(payload_schema, payload)
+        columns = (*_ROW_HEAD, *from_common, *from_specific, *map(_distinct, from_payload))
         store = self._stores.setdefault(name, {}).setdefault(columns, RowStore(columns))
         return ClassPlan(
             trace_index,
@@ -117,31 +119,6 @@ class Planner:
                 yield name, table.combine_chunks().to_batches()[0]
 
 
-def merged_schema(declared: Iterable[tuple[Member, ...]]) -> pa.Schema:
-    """Return the payload columns of several declarations of one event.
-
-    Integers of different types become int64; a field of types that do not go together keeps
-    the first one and is NULL where it is declared otherwise.
-    """
-    types: dict[str, pa.DataType] = {}
-    for members in declared:
-        for member in members:
-            known = types.setdefault(member.name, member.type)
-            types[member.name] = union_type(known, member.type) or known
-    return pa.schema(list(types.items()))
-
-
-def _matching(schema: Iterable[pa.Field], members: Iterable[Member]) -> dict[str, Member]:
-    by_name = {member.name: member for member in members}
-    matching = {}
-    for wanted in schema:
-        for name in names_of(wanted):
-            member = by_name.get(name)
-            if member is not None and can_hold(_plain(wanted.type), member.type):
-                matching[wanted.name] = member
-                break
-    return matching
-
-
-def _plain(data_type: pa.DataType) -> pa.DataType:
-    return data_type.value_type if pa.types.is_dictionary(data_type) else data_type
+def _distinct(name: str) -> str:
+    """Return a name for a payload column that no common column has."""
+    return f"payload {name}"

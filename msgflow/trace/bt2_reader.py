@@ -40,7 +40,7 @@ class Bt2TraceSet(TraceSet):
 
     def batches(
         self,
-        wanted: Mapping[str, pa.Schema] | None = None,
+        wanted: Mapping[str, pa.Schema | None] | None = None,
         *,
         progress: Callable[[Progress], None] | None = None,
         batch_rows: int = DEFAULT_BATCH_ROWS,
@@ -69,7 +69,7 @@ class Bt2TraceSet(TraceSet):
 
     def _batches(
         self,
-        wanted: Mapping[str, pa.Schema] | None,
+        wanted: Mapping[str, pa.Schema | None] | None,
         progress: Callable[[Progress], None] | None,
         batch_rows: int,
     ) -> Generator[EventBatch, None, None]:

@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import pyarrow as pa
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+
+class Field(Protocol):
+    """A field that a trace declares: its name, and the Arrow type that holds its values."""
+
+    @property
+    def name(self) -> str:
+        """As declared."""
+
+    @property
+    def type(self) -> pa.DataType:
+        """The Arrow type."""
+
+
+AnyField = TypeVar("AnyField", bound=Field)
 
 ALIASES = b"aliases"
 """Key of a field's metadata: other names under which traces have it, comma separated."""
+
+BASE = b"base"
+"""Key of a field's metadata: the base in which to show an integer, or the elements of an array."""
 
 
 def names_of(field: pa.Field) -> tuple[str, ...]:
@@ -40,6 +58,57 @@ def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
     if pa.types.is_integer(first) and pa.types.is_integer(second):
         return pa.int64()
     return None
+
+
+def in_hexadecimal(schema: pa.Schema, names: Collection[str]) -> pa.Schema:
+    """Return the schema with these columns marked as to be shown in base 16."""
+    return pa.schema(
+        [
+            field.with_metadata({**(field.metadata or {}), BASE: b"16"})
+            if field.name in names
+            else field
+            for field in schema
+        ]
+    )
+
+
+def complete_schemas(
+    wanted: Mapping[str, pa.Schema | None] | None, declared: Mapping[str, pa.Schema]
+) -> Mapping[str, pa.Schema]:
+    """Return the payload columns of each wanted event, all declared fields where none are named."""
+    if wanted is None:
+        return declared
+    return {
+        name: declared.get(name, pa.schema([])) if schema is None else schema
+        for name, schema in wanted.items()
+    }
+
+
+def merged_schema(declared: Iterable[Iterable[Field]]) -> pa.Schema:
+    """Return the payload columns of several declarations of one event.
+
+    Integers of different types become int64; a field of types that do not go together keeps
+    the first one and is NULL where it is declared otherwise.
+    """
+    types: dict[str, pa.DataType] = {}
+    for fields in declared:
+        for field in fields:
+            known = types.setdefault(field.name, field.type)
+            types[field.name] = union_type(known, field.type) or known
+    return pa.schema(list(types.items()))
+
+
+def matching(columns: Iterable[pa.Field], fields: Iterable[AnyField]) -> dict[str, AnyField]:
+    """Return column to the field that fills it, for those columns that a field can fill."""
+    by_name = {field.name: field for field in fields}
+    found = {}
+    for column in columns:
+        for name in names_of(column):
+            field = by_name.get(name)
+            if field is not None and can_hold(_plain(column.type), field.type):
+                found[column.name] = field
+                break
+    return found
 
 
 def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:
@@ -79,6 +148,10 @@ def renumber(rows: list[list[Any]], new_ids: Mapping[int, int]) -> list[list[Any
     changed = [[new_ids.get(row[0], row[0]), *row[1:]] for row in rows]
     changed.sort(key=itemgetter(0))
     return changed
+
+
+def _plain(data_type: pa.DataType) -> pa.DataType:
+    return data_type.value_type if pa.types.is_dictionary(data_type) else data_type
 
 
 def _valid_text(value: Any) -> Any:

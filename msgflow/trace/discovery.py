@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace import metadata
+from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
 
 if TYPE_CHECKING:
@@ -148,8 +149,8 @@ def _describe(path: Path) -> str:
 
 def _hint_for(path: Path) -> str:
     kind = _describe(path)
-    if path.suffix == ".zip":
-        return f"unzip {path}"
+    if is_archive(path):
+        return f"msgflow ingest {path}"
     if "archive" in kind or "compressed" in kind:
         return f"tar xf {path}"
     if "tracetools_analysis" in kind:

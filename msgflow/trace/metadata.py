@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 FILE_NAME = "metadata"
 
-_BYTE_ORDER_OF_MAGIC = {b"\x57\x1d\xd1\x75": "<", b"\x75\xd1\x1d\x57": ">"}
+BYTE_ORDER_OF_MAGIC = {b"\x57\x1d\xd1\x75": "<", b"\x75\xd1\x1d\x57": ">"}
 # Of a metadata packet: magic, uuid, checksum, content size and packet size in bits, then five
 # bytes that say nothing useful (the version in them is 1.8 even for CTF 2).
-_HEADER_SIZE = 37
-_SIZES_OFFSET = 24
+HEADER_SIZE = 37
+SIZES_OFFSET = 24
 _RECORD_SEPARATOR = b"\x1e"
 _TSDL_BEGIN = (b"/* CTF 1.", b"trace", b"typealias", b"typedef", b"clock", b"env", b"struct")
 
@@ -45,7 +45,7 @@ def kind_of(directory: Path) -> MetadataKind:
             f"the trace's `metadata` is empty, the recording did not get started — {directory}",
             hint="record again, and stop the recording before copying it",
         )
-    order = _BYTE_ORDER_OF_MAGIC.get(content[:4])
+    order = BYTE_ORDER_OF_MAGIC.get(content[:4])
     if order is not None:
         content = _first_content(content, order, directory)
     if content.startswith(_RECORD_SEPARATOR):
@@ -63,14 +63,14 @@ def _first_content(content: bytes, order: str, directory: Path) -> bytes:
     offset = 0
     while offset < len(content):
         rest = len(content) - offset
-        if rest < _HEADER_SIZE:
+        if rest < HEADER_SIZE:
             raise _cut_off_error(directory)
-        bits = struct.unpack_from(f"{order}II", content, offset + _SIZES_OFFSET)
+        bits = struct.unpack_from(f"{order}II", content, offset + SIZES_OFFSET)
         content_size, packet_size = bits[0] // 8, bits[1] // 8
-        if not _HEADER_SIZE <= content_size <= packet_size <= rest:
+        if not HEADER_SIZE <= content_size <= packet_size <= rest:
             raise _cut_off_error(directory)
         offset += packet_size
-    return content[_HEADER_SIZE:]
+    return content[HEADER_SIZE:]
 
 
 def _cut_off_error(directory: Path) -> TraceError:

@@ -32,7 +32,7 @@ class TraceInfo:
 
     Attributes:
         index: place of the trace among those opened together, from 0, in order of path.
-        path: the directory.
+        path: the directory; in an archive, the archive's path followed by that inside.
         uuid: the CTF trace uuid, lower case with hyphens, or None.
         domain: 'ust', 'kernel', or None when the tracer does not say.
         hostname: name of the machine or container, or None.
@@ -68,10 +68,13 @@ class EventBatch:
     Attributes:
         name: the event's full name such as 'ros2:rcl_publish', or `PACKET` for packets.
         batch: `COMMON_SCHEMA` and the payload columns; `PACKET_SCHEMA` for packets.
+        round: number of the stretch of the total order that the batch belongs to, never falling:
+            all events of a round come before all events of later rounds.
     """
 
     name: str
     batch: pa.RecordBatch
+    round: int
 
 
 @dataclass(frozen=True)
@@ -87,3 +90,22 @@ class Progress:
     events: int
     fraction: float
     time_ns: int
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Something in a stream file that is not as it should be.
+
+    Attributes:
+        trace_index: which trace.
+        file: the stream file.
+        position: which packet of the file, from 0.
+        offset: where in the file, in bytes.
+        message: what is wrong, without full stop.
+    """
+
+    trace_index: int
+    file: Path
+    position: int
+    offset: int
+    message: str

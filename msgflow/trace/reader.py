@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.trace.archive import is_archive
 from msgflow.trace.discovery import discover
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
     from types import TracebackType
 
     import pyarrow as pa
 
-    from msgflow.trace.model import EventBatch, Progress, TraceInfo
+    from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo, TraceLocation
 
-READERS = ("auto", "bt2")
+READERS = ("auto", "msgflow", "bt2")
 DEFAULT_BATCH_ROWS = 65_536
 
 
@@ -31,34 +32,38 @@ class TraceSet(ABC):
         event_counts: (trace index, event name) to the number of events read, wanted or not;
             only events that occur. Complete after `batches` has ended.
         duplicate_packet_count: packets skipped because the set holds them twice.
+        damages: what is damaged and was left out or read as far as possible. Complete after
+            `batches` has ended.
     """
 
     traces: tuple[TraceInfo, ...]
     event_counts: Mapping[tuple[int, str], int]
     duplicate_packet_count: int
+    damages: Sequence[Damage] = ()
 
     @abstractmethod
     def batches(
         self,
-        wanted: Mapping[str, pa.Schema] | None = None,
+        wanted: Mapping[str, pa.Schema | None] | None = None,
         *,
         progress: Callable[[Progress], None] | None = None,
         batch_rows: int = DEFAULT_BATCH_ROWS,
     ) -> Iterator[EventBatch]:
         """Read everything once; may be called again, which reads again from the start.
 
-        The batches of one name come in order of `event_id`. Memory stays bounded by
-        `batch_rows`, whatever the size of the traces.
+        The batches of one name come in order of `event_id`, those of all names in rounds: see
+        `EventBatch.round`. Memory stays bounded by `batch_rows`, whatever the size of the traces.
 
         Args:
-            wanted: event name to the payload columns to deliver. A column is filled from the
-                field of its name, else of a name in its metadata `aliases` (comma separated),
-                else it is NULL. None: all events with all their fields.
-            progress: called every few thousand events and once at the end.
+            wanted: event name to the payload columns to deliver, None for all its fields. A
+                column is filled from the field of its name, else of a name in its metadata
+                `aliases` (comma separated), else it is NULL. None: all events with all fields.
+            progress: called now and then, at the least for every 16 MB, and once at the end.
             batch_rows: events held before they are handed over.
 
         Raises:
-            TraceError: a trace is damaged; what came before has been delivered.
+            TraceError: a trace is damaged, and the reader does not go on after that (it is
+                strict, or bt2); what came before has been delivered.
             UsageError: the set is closed, or an earlier iteration has not ended.
         """
 
@@ -78,20 +83,45 @@ class TraceSet(ABC):
         self.close()
 
 
-def open(paths: Sequence[str | Path], *, reader: str = "auto") -> TraceSet:
+def open(paths: Sequence[str | Path], *, reader: str = "auto", strict: bool = False) -> TraceSet:
     """Open all traces below `paths` as one set.
 
+    Archives are unpacked to the temporary directory (TMPDIR) until the set is closed.
+
     Args:
-        paths: CTF directories or directories above such.
-        reader: 'bt2' (Babeltrace 2's Python bindings), or 'auto' for the best there is.
+        paths: CTF directories, directories above such, or archives of such (.tar, also with .gz,
+            .xz or .zst, and .zip).
+        reader: 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which end at
+            the first damage), or 'auto', which is 'msgflow'.
+        strict: end at the first damage.
 
     Raises:
-        TraceError: there is no readable trace below a path, or the reader is not installed.
+        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
+            the reader is not installed.
         UsageError: there is no reader of that name.
     """
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
-    locations = discover(paths)
-    from msgflow.trace.bt2_reader import Bt2TraceSet
+    if not any(is_archive(Path(path)) for path in paths):
+        return _open(discover(paths), reader, strict)
+    from msgflow.trace.unpacked import Unpacked, UnpackedTraceSet
 
-    return Bt2TraceSet(locations)
+    unpacked = Unpacked(paths)
+    try:
+        with unpacked.explained():
+            locations = discover(unpacked.paths)
+            locations.sort(key=lambda location: unpacked.shown(location.path))
+            return UnpackedTraceSet(_open(locations, reader, strict), unpacked)
+    except BaseException:
+        unpacked.remove()
+        raise
+
+
+def _open(locations: Sequence[TraceLocation], reader: str, strict: bool) -> TraceSet:
+    if reader == "bt2":
+        from msgflow.trace.bt2_reader import Bt2TraceSet
+
+        return Bt2TraceSet(locations)
+    from msgflow.trace.ctf.reader import CtfTraceSet
+
+    return CtfTraceSet(locations, strict=strict)

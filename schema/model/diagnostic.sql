@@ -1,9 +1,9 @@
 -- name: staging.diagnostic
 -- description: What was found in the input while the model was built.
 -- grain: one row per finding
--- needs: staging.event_count, staging.loss_interval, staging.process, staging.callback_instance,
---     staging.callback_event, staging.callback_pair, staging.node, staging.publisher,
---     staging.subscription, staging.callback, staging.host
+-- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
+--     staging.callback_instance, staging.callback_event, staging.callback_pair,
+--     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host
 WITH unmatched_end AS (
     SELECT e.trace_index
     FROM staging.callback_event AS e
@@ -15,6 +15,13 @@ process_label AS (
         AS label
     FROM staging.process AS p
     JOIN staging.host AS h ON p.host_id = h.host_id
+),
+damage AS (
+    SELECT
+        trace_index, file, position, byte_offset, message,
+        row_number() OVER (PARTITION BY trace_index ORDER BY file, position, byte_offset, message)
+            AS number
+    FROM staging.damage
 ),
 inferred AS (
     SELECT 'node' AS kind, process_id FROM staging.node WHERE is_inferred
@@ -55,6 +62,25 @@ SELECT
     END
 FROM staging.loss_interval
 GROUP BY trace_id, kind
+UNION ALL
+SELECT
+    trace_index + 1,
+    'damaged_trace',
+    'data_loss',
+    1,
+    printf('%s — %s, packet %d, byte %d', message, file, position, byte_offset)
+FROM damage
+WHERE number <= 20
+UNION ALL
+SELECT
+    trace_index + 1,
+    'damaged_trace',
+    'data_loss',
+    count(*),
+    'further damages of the same trace'
+FROM damage
+WHERE number > 20
+GROUP BY trace_index
 UNION ALL
 SELECT
     NULL,

@@ -17,6 +17,7 @@ COMMANDS = (
     "query",
     "sql",
     "info",
+    "events",
     "export",
     "export parquet",
     "db",

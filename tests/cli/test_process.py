@@ -50,6 +50,7 @@ def imported(*arguments: object) -> set[str]:
         ("query", "info-topics", "--show"),
         ("sql", "--help"),
         ("info", "--help"),
+        ("events", "--help"),
         ("export", "parquet", "--help"),
         ("db", "upgrade", "--help"),
         ("simulate", "--help"),

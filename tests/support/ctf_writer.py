@@ -19,6 +19,7 @@ CONTEXTS = {"vpid": "i32", "vtid": "i32", "procname": "text[17]"}
 _NUMBERS = {
     **{f"u{bits}": code for bits, code in ((8, "B"), (16, "H"), (32, "I"), (64, "Q"))},
     **{f"i{bits}": code for bits, code in ((8, "b"), (16, "h"), (32, "i"), (64, "q"))},
+    "x64": "Q",
     "f32": "f",
     "f64": "d",
 }
@@ -51,8 +52,8 @@ class Packet:
 class TraceContent:
     """A trace: field types per event, and packets per stream instance.
 
-    Types: u8 … u64, i8 … i64, f32, f64, str, text[N], TYPE[N], TYPE[] (its length is an extra
-    u32 member `NAME_length` before it).
+    Types: u8 … u64, i8 … i64, x64 (u64 to be shown in base 16), f32, f64, str, text[N], TYPE[N],
+    TYPE[] (its length is an extra u32 member `NAME_length` before it).
     """
 
     events: Mapping[str, Mapping[str, str]]
@@ -223,4 +224,5 @@ def _number(kind: str) -> str:
         exponent, mantissa = (8, 24) if kind == "f32" else (11, 53)
         return f"floating_point {{ exp_dig = {exponent}; mant_dig = {mantissa}; align = 8; }}"
     signed = "true" if kind.startswith("i") else "false"
-    return f"integer {{ size = {kind[1:]}; align = 8; signed = {signed}; }}"
+    base = 16 if kind.startswith("x") else 10
+    return f"integer {{ size = {kind[1:]}; align = 8; signed = {signed}; base = {base}; }}"

@@ -25,12 +25,21 @@ def bt2_bindings() -> bt2_library.Bt2Library:
         pytest.skip(error.message)
 
 
+@pytest.fixture(scope="session", params=["msgflow", "bt2"])
+def reader(request: pytest.FixtureRequest) -> str:
+    """Every reader that there is, one after the other."""
+    name: str = request.param
+    if name == "bt2":
+        request.getfixturevalue("bt2_bindings")
+    return name
+
+
 @pytest.fixture(scope="session")
-def open_traces(bt2_bindings: bt2_library.Bt2Library) -> Callable[..., TraceSet]:
-    """`msgflow.trace.open` of one or more paths, where there is a reader."""
+def open_traces(reader: str) -> Callable[..., TraceSet]:
+    """`msgflow.trace.open` of one or more paths."""
 
     def open_paths(*paths: Path) -> TraceSet:
-        return msgflow.trace.open(paths)
+        return msgflow.trace.open(paths, reader=reader)
 
     return open_paths
 

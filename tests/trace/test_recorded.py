@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
+import msgflow.trace
 from msgflow.ingest import catalogue
 from msgflow.trace import PACKET, TraceSet, bt2_library
 
@@ -238,9 +239,11 @@ def plain(field: Any) -> Any:
     return int(field)
 
 
-def test_memory_is_bounded_by_the_batch(shared_traces: Path, open_traces: Open) -> None:
+def test_memory_is_bounded_by_the_batch(
+    shared_traces: Path, bt2_bindings: bt2_library.Bt2Library
+) -> None:
     def peak(batch_rows: int) -> int:
-        with open_traces(shared_traces / "services") as traces:
+        with msgflow.trace.open([shared_traces / "services"], reader="bt2") as traces:
             tracemalloc.start()
             try:
                 for batch in traces.batches(batch_rows=batch_rows):

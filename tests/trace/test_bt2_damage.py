@@ -1,4 +1,4 @@
-"""Damaged and unusual input: a clear error, what came before it delivered, never a hang."""
+"""Damaged and unusual input through bt2: a clear error, what came before it delivered."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ Open = Callable[..., TraceSet]
 PACKET_COUNT = 10
 EVENTS_PER_PACKET = 50
 HEADER_SIZE = 84
+
+
+@pytest.fixture
+def open_traces(bt2_bindings: bt2_library.Bt2Library) -> Open:
+    return lambda *paths: msgflow.trace.open(paths, reader="bt2")
 
 
 @pytest.fixture
@@ -121,7 +126,7 @@ def test_ctf2_needs_a_newer_library(
     monkeypatch.setattr(bt2_library, "load", lambda: old)
     message = f"the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is 2.0.4 — {trace}"
     with pytest.raises(TraceError, match=message) as caught:
-        msgflow.trace.open([trace])
+        msgflow.trace.open([trace], reader="bt2")
     assert "--trace-format=ctf-1.8" in (caught.value.hint or "")
 
 

@@ -1,0 +1,162 @@
+"""`msgflow events`: what stands in a trace, without a database."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msgflow.cli.ingest import Reader
+from msgflow.cli.options import OUTPUT, SELECTION
+from msgflow.errors import UsageError
+from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
+from msgflow.export.formats import Format
+
+if TYPE_CHECKING:
+    from msgflow.events.selection import Selection
+
+
+_DAMAGES_SHOWN = 10
+
+
+def command(
+    traces: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="TRACE...",
+            help="Directories with CTF traces, at any depth, or archives of such; all are merged",
+        ),
+    ],
+    event: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--event",
+            "-e",
+            metavar="PATTERN",
+            help="Name of events to list, such as 'ros2:rcl_*'; may be repeated",
+            show_default="all",
+            rich_help_panel=SELECTION,
+        ),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            "--start",
+            metavar="TIME",
+            help="First time to list: 2.5s from the begin of the trace, epoch ns, or ISO time",
+            rich_help_panel=SELECTION,
+        ),
+    ] = None,
+    end: Annotated[
+        str | None,
+        typer.Option(
+            "--end",
+            metavar="TIME",
+            help="Time at which the listing ends, written likewise",
+            rich_help_panel=SELECTION,
+        ),
+    ] = None,
+    count: Annotated[
+        bool,
+        typer.Option(
+            "--count", help="Print how often each event occurs instead", rich_help_panel=OUTPUT
+        ),
+    ] = False,
+    form: Annotated[
+        EventFormat | None,
+        typer.Option(
+            "--format",
+            help="How to write them",
+            show_default="by the suffix of PATH, else text, parquet for a directory",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="PATH",
+            help="File to write or replace; or, for CSV and Parquet, a new directory (a name"
+            " without suffix) that gets one file per event name, with a column per field",
+            show_default="stdout",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
+        Reader.AUTO
+    ),
+    strict: Annotated[bool, typer.Option("--strict", help="End at the first damage")] = False,
+) -> None:
+    """List the events of traces in order of time, whatever they are.
+
+    A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and fields.
+    """
+    from msgflow import trace
+    from msgflow.cli.output import count as counted
+    from msgflow.cli.output import print_note
+    from msgflow.events.selection import Selection
+
+    with trace.open(traces, reader=reader.value, strict=strict) as opened:
+        selection = Selection(opened, event or (), start, end)
+        if count:
+            _print_counts(selection, form, output)
+        else:
+            _write(selection, form or format_of(output), output)
+        lost = selection.lost_event_count
+        damages = list(opened.damages)
+    for damage in damages[:_DAMAGES_SHOWN]:
+        print_note(
+            f"{damage.message} — {damage.file}, packet {damage.position}, byte {damage.offset}"
+        )
+    if len(damages) > _DAMAGES_SHOWN:
+        print_note(f"{counted(len(damages) - _DAMAGES_SHOWN, 'further damage')}")
+    if lost:
+        print_note(f"{counted(lost, 'event')} lost by the tracer while recording")
+
+
+def _write(selection: Selection, form: EventFormat, output: Path | None) -> None:
+    from msgflow.atomic import replacing
+    from msgflow.cli.output import count, data_stream, print_note, print_status
+    from msgflow.cli.progress import reading_progress
+    from msgflow.events.listing import write_events
+    from msgflow.events.tables import write_event_tables
+
+    if output is None:
+        if form is EventFormat.PARQUET and sys.stdout.isatty():
+            raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
+        if not write_events(selection, form, data_stream()):
+            print_note("no events")
+        return
+    with reading_progress() as progress:
+        if is_directory(output) and (form in TABLES or output.is_dir()):
+            if form not in TABLES:
+                raise UsageError(
+                    f"this is a directory, which only CSV and Parquet can fill — {output}",
+                    f"name a file: -o {output / f'events.{form}'}",
+                )
+            number = write_event_tables(selection, form, output, progress)
+        else:
+            with replacing(output) as temporary, temporary.open("wb") as stream:
+                number = write_events(selection, form, stream, progress)
+    print_status(f"{count(number, 'event')} written to {output}")
+
+
+def _print_counts(selection: Selection, form: EventFormat | None, output: Path | None) -> None:
+    import pyarrow
+
+    from msgflow.cli.output import print_result
+    from msgflow.query.result import QueryResult
+
+    counts = selection.counts()
+    table = pyarrow.table(
+        {
+            "name": pyarrow.array(counts.keys(), "string"),
+            "event_count": pyarrow.array(counts.values(), "int64"),
+        }
+    )
+    formats = {EventFormat.TEXT: Format.TABLE}
+    chosen = None if form is None else formats.get(form) or Format(form.value)
+    print_result(QueryResult(table), chosen, output)

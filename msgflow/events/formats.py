@@ -1,0 +1,63 @@
+"""The formats in which events are written."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pyarrow as pa
+
+
+class EventFormat(StrEnum):
+    """How events are written; all but text are exact."""
+
+    TEXT = "text"
+    JSON = "json"
+    JSONL = "jsonl"
+    CSV = "csv"
+    PARQUET = "parquet"
+
+
+TABLES = (EventFormat.CSV, EventFormat.PARQUET)
+"""The formats with columns."""
+
+_SUFFIXES = {
+    ".json": EventFormat.JSON,
+    ".jsonl": EventFormat.JSONL,
+    ".csv": EventFormat.CSV,
+    ".parquet": EventFormat.PARQUET,
+}
+
+
+def is_directory(path: Path) -> bool:
+    """Tell whether an output path means a directory: one that exists, or a name without suffix."""
+    return path.is_dir() or not (path.suffix or path.is_file())
+
+
+def format_of(path: Path | None) -> EventFormat:
+    """Return the format that an output path asks for: by its suffix, Parquet for a directory."""
+    if path is None:
+        return EventFormat.TEXT
+    if is_directory(path):
+        return EventFormat.PARQUET
+    return _SUFFIXES.get(path.suffix.lower(), EventFormat.TEXT)
+
+
+def table_writer(form: EventFormat, sink: Any, schema: pa.Schema) -> Any:
+    """Open a writer of CSV or Parquet: a context manager with `write_table`.
+
+    Args:
+        form: one of `TABLES`.
+        sink: a path or a binary stream.
+        schema: of all tables to be written.
+    """
+    if form is EventFormat.CSV:
+        import pyarrow.csv
+
+        return pyarrow.csv.CSVWriter(sink, schema)
+    import pyarrow.parquet
+
+    return pyarrow.parquet.ParquetWriter(sink, schema, compression="zstd")

@@ -1,0 +1,140 @@
+"""Which events of a set of traces are listed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from fnmatch import fnmatchcase
+from itertools import groupby
+from operator import attrgetter
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from msgflow.errors import UsageError
+from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, Run, time_window
+from msgflow.trace import COMMON_SCHEMA, PACKET, EventBatch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from msgflow.trace import Progress, TraceSet
+
+# Few, so that the first lines come soon.
+_BATCH_ROWS = 20_000
+_NOTHING = pa.schema([])
+# By place: a payload may have a field of the same name.
+_TIME = COMMON_SCHEMA.get_field_index("ts_ns")
+
+
+class Selection:
+    """The events of a set of traces whose name and time are wanted.
+
+    Attributes:
+        traces: the set.
+        lost_event_count: events that the tracer lost, as far as they have been read and whatever
+            their names, which nobody knows.
+    """
+
+    def __init__(
+        self,
+        traces: TraceSet,
+        patterns: Sequence[str] = (),
+        start: str | int | None = None,
+        end: str | int | None = None,
+    ) -> None:
+        """Choose events.
+
+        Args:
+            traces: what to read.
+            patterns: names with wildcards, such as 'ros2:rcl_*'; all events when empty.
+            start: epoch ns, an offset from the begin of the traces ('2.5s', '100ms'), or ISO
+                time. Events at that time belong to the selection.
+            end: likewise, but events at that time do not belong to it.
+
+        Raises:
+            UsageError: a time that cannot be read, or a pattern that fits no declared event.
+        """
+        self.traces = traces
+        self.lost_event_count = 0
+        begins = [info.begin_ns for info in traces.traces if info.begin_ns is not None]
+        whole = Run(0, "", min(begins, default=None))
+        self._start_ns, self._end_ns = time_window([whole], start, end)
+        self._names = _matching(patterns, {n for t in traces.traces for n in t.event_names})
+
+    def rounds(
+        self, progress: Callable[[Progress], None] | None = None
+    ) -> Iterator[list[EventBatch]]:
+        """Yield the events with all their fields; those of a list precede those of the next.
+
+        Raises:
+            TraceError: a trace is damaged.
+        """
+        return self._read(dict.fromkeys(self._names), progress)
+
+    def counts(self) -> dict[str, int]:
+        """Count the events by name, only those that occur; the most frequent first.
+
+        Raises:
+            TraceError: a trace is damaged.
+        """
+        counts: Counter[str] = Counter()
+        if (self._start_ns, self._end_ns) == (MINIMUM_NS, MAXIMUM_NS):
+            for _ in self._read({}, None):
+                pass
+            for (_, name), count in self.traces.event_counts.items():
+                if name in self._names:
+                    counts[name] += count
+        else:
+            for events in self._read(dict.fromkeys(self._names, _NOTHING), None):
+                for item in events:
+                    counts[item.name] += item.batch.num_rows
+        return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+
+    def _read(
+        self,
+        wanted: dict[str, pa.Schema | None],
+        progress: Callable[[Progress], None] | None,
+    ) -> Iterator[list[EventBatch]]:
+        self.lost_event_count = 0
+        batches = self.traces.batches(wanted, progress=progress, batch_rows=_BATCH_ROWS)
+        for _, items in groupby(batches, key=attrgetter("round")):
+            events = []
+            for item in items:
+                if item.name == PACKET:
+                    lost = pc.sum(item.batch.column("discarded_event_count")).as_py()
+                    self.lost_event_count += lost or 0
+                else:
+                    events.append(item)
+            begins = [item.batch.column(_TIME)[0].as_py() for item in events]
+            if begins and min(begins) >= self._end_ns:
+                return
+            events = [self._within_window(item) for item in events]
+            events = [item for item in events if item.batch.num_rows]
+            if events:
+                yield events
+
+    def _within_window(self, item: EventBatch) -> EventBatch:
+        times = item.batch.column(_TIME)
+        first, last = times[0].as_py(), times[-1].as_py()
+        if self._start_ns <= first and last < self._end_ns:
+            return item
+        inside = pc.and_(
+            pc.greater_equal(times, self._start_ns),
+            pc.less(times, self._end_ns),
+        )
+        return EventBatch(item.name, item.batch.filter(inside), item.round)
+
+
+def _matching(patterns: Sequence[str], names: set[str]) -> list[str]:
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise UsageError(
+                f"no event of the trace has such a name — {pattern}",
+                "msgflow events TRACE --count lists the names; quote a pattern: --event 'ros2:*'",
+            )
+    return sorted(
+        name
+        for name in names
+        if not patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
+    )

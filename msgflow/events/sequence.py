@@ -1,0 +1,144 @@
+"""Merges events of different names into one sequence, each rendered as asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import duckdb
+import pyarrow as pa
+
+from msgflow.events.values import exact, literal, printable, readable
+from msgflow.trace import COMMON_SCHEMA
+from msgflow.trace.columns import BASE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from msgflow.trace import EventBatch, TraceInfo
+
+Rendering = Callable[[str, pa.Schema], str]
+"""From an event's name and payload columns to the SQL of its row, over `COLUMNS` and `hostname`,
+`thread` and the payload as `column_name` gives it."""
+
+COLUMNS = (
+    "event_id",
+    "ts_ns",
+    "trace_index",
+    "hostname",
+    "name",
+    "cpu_id",
+    "vpid",
+    "vtid",
+    "procname",
+    "pid_ns",
+)
+"""The columns that events of every name have, where a format has columns."""
+
+_WITHOUT = -1
+
+
+def column_name(position: int) -> str:
+    """Return the name in SQL of the payload column at this position."""
+    return f"payload_{position}"
+
+
+class Sequencer:
+    """Renders rounds of events; a context manager."""
+
+    def __init__(self, traces: Sequence[TraceInfo], rendering: Rendering) -> None:
+        """Prepare to render events of these traces."""
+        self._rendering = rendering
+        self._connection = duckdb.connect(
+            config={"autoinstall_known_extensions": False, "autoload_known_extensions": False}
+        )
+        hosts = pa.table(
+            {
+                "trace_index": pa.array([trace.index for trace in traces], "int32"),
+                "hostname": pa.array([trace.hostname for trace in traces], "string"),
+            }
+        )
+        self._connection.register("host", hosts)
+
+    def __enter__(self) -> Sequencer:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._connection.close()
+
+    def rows(self, events: Sequence[EventBatch]) -> pa.Table:
+        """Return one row per event, in order of `event_id`."""
+        names = [f"batch_{position}" for position in range(len(events))]
+        parts = []
+        for name, item in zip(names, events, strict=True):
+            payload = pa.schema(list(item.batch.schema)[len(COMMON_SCHEMA) :])
+            columns = [*COMMON_SCHEMA.names, *map(column_name, range(len(payload)))]
+            self._connection.register(name, item.batch.rename_columns(columns))
+            parts.append(self._select(name, item.name, payload))
+        try:
+            return self._connection.sql(
+                f"SELECT * EXCLUDE (event_order) FROM ({' UNION ALL '.join(parts)}) "
+                "ORDER BY event_order"
+            ).to_arrow_table()
+        finally:
+            for name in names:
+                self._connection.unregister(name)
+
+    def _select(self, batch: str, name: str, payload: pa.Schema) -> str:
+        return f"""
+SELECT event_id AS event_order, {self._rendering(name, payload)}
+FROM (
+    SELECT * REPLACE (nullif(vpid, {_WITHOUT}) AS vpid, nullif(vtid, {_WITHOUT}) AS vtid)
+    FROM {batch}
+)
+LEFT JOIN host USING (trace_index)"""
+
+
+def text_line(name: str, payload: pa.Schema) -> str:
+    """Render an event as a line: time, host, process and thread, CPU, name, fields."""
+    fields = "".join(
+        f" || {literal(f' {field.name}=')} || "
+        + readable(column_name(position), field.type, is_hexadecimal=_is_hexadecimal(field))
+        for position, field in enumerate(payload)
+    )
+    process = printable("nullif(procname, '')")
+    return f"""
+    strftime(make_timestamp(ts_ns // 1000), '%Y-%m-%dT%H:%M:%S.%f')
+    || format('{{:03d}}Z ', ts_ns % 1000)
+    || coalesce({printable("hostname")}, '-') || ' '
+    || coalesce({process}, '-') || '/' || coalesce(CAST(vpid AS VARCHAR), '-')
+    || '/' || coalesce(CAST(vtid AS VARCHAR), '-')
+    || ' [' || coalesce(CAST(cpu_id AS VARCHAR), '-') || '] '
+    || {printable(literal(name))}{fields} AS line"""
+
+
+def json_line(name: str, payload: pa.Schema) -> str:
+    """Render an event as a JSON object."""
+    members = ", ".join(f"'{column}', {_common(column, name)}" for column in COLUMNS)
+    return f"CAST(json_object({members}, 'fields', {_json_fields(payload)}) AS VARCHAR) AS line"
+
+
+def json_column(name: str, payload: pa.Schema) -> str:
+    """Render an event as `COLUMNS` and its fields as one column of JSON."""
+    return f"{common_columns(name)}, CAST({_json_fields(payload)} AS VARCHAR) AS fields"
+
+
+def common_columns(name: str) -> str:
+    """Return the SQL of `COLUMNS` for an event of this name."""
+    return ", ".join(f"{_common(column, name)} AS {column}" for column in COLUMNS)
+
+
+def _common(column: str, name: str) -> str:
+    return literal(name) if column == "name" else column
+
+
+def _json_fields(payload: pa.Schema) -> str:
+    members = (
+        f"{literal(field.name)}, {exact(column_name(position), field.type)}"
+        for position, field in enumerate(payload)
+    )
+    return f"json_object({', '.join(members)})"
+
+
+def _is_hexadecimal(field: pa.Field) -> bool:
+    return (field.metadata or {}).get(BASE) == b"16"

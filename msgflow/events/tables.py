@@ -1,0 +1,148 @@
+"""Writes events as one table per name, with a column for each of its fields."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+
+from msgflow.errors import UsageError
+from msgflow.events.formats import EventFormat, table_writer
+from msgflow.events.sequence import COLUMNS, Sequencer, column_name, common_columns
+from msgflow.events.values import exact, identifier
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from msgflow.events.selection import Selection
+    from msgflow.trace import Progress
+
+_MOST_BYTES_HELD = 64 << 20
+_UNSAFE = re.compile(r"[^\w.-]+", re.ASCII)
+
+
+def write_event_tables(
+    selection: Selection,
+    form: EventFormat,
+    directory: Path,
+    progress: Callable[[Progress], None] | None = None,
+) -> int:
+    """Write one file per event name to a new directory, and return the number of events.
+
+    `ros2:rcl_init` goes to `ros2.rcl_init.parquet`. The columns are those of `COLUMNS`, then the
+    fields; one that is called like a column before it is called `field_` and its name. In CSV,
+    lists and structures are JSON. The directory appears when all is written.
+
+    Args:
+        selection: the events.
+        form: CSV or Parquet.
+        directory: must not exist, or be empty.
+        progress: called every now and then.
+
+    Raises:
+        TraceError: a trace is damaged.
+        UsageError: the directory is not empty or cannot be written.
+    """
+    with _new_directory(directory) as temporary, contextlib.ExitStack() as opened:
+        files = _Files(temporary, form, opened)
+        sequencer = opened.enter_context(
+            Sequencer(selection.traces.traces, _csv_row if form is EventFormat.CSV else _typed_row)
+        )
+        count = 0
+        for events in selection.rounds(progress):
+            for item in events:
+                rows = sequencer.rows([item])
+                files.add(item.name, rows)
+                count += len(rows)
+        files.flush()
+    return count
+
+
+class _Files:
+    """The files being written; few large pieces go to each, rather than many small ones."""
+
+    def __init__(self, directory: Path, form: EventFormat, opened: contextlib.ExitStack) -> None:
+        self._directory = directory
+        self._form = form
+        self._opened = opened
+        self._writers: dict[str, Any] = {}
+        self._taken: set[str] = set()
+        self._held: dict[str, list[pa.Table]] = {}
+        self._bytes = 0
+
+    def add(self, name: str, rows: pa.Table) -> None:
+        """Take the next rows of an event."""
+        self._held.setdefault(name, []).append(rows)
+        self._bytes += rows.nbytes
+        if self._bytes > _MOST_BYTES_HELD:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what is held."""
+        for name, parts in self._held.items():
+            rows = pa.concat_tables(parts)
+            if name not in self._writers:
+                self._writers[name] = self._opened.enter_context(
+                    table_writer(self._form, self._directory / self._file_name(name), rows.schema)
+                )
+            self._writers[name].write_table(rows)
+        self._held.clear()
+        self._bytes = 0
+
+    def _file_name(self, name: str) -> str:
+        stem = base = _UNSAFE.sub("_", name.replace(":", ".")).lstrip(".") or "event"
+        number = 1
+        # Some file systems do not tell upper from lower case.
+        while stem.lower() in self._taken:
+            number += 1
+            stem = f"{base}-{number}"
+        self._taken.add(stem.lower())
+        return f"{stem}.{self._form}"
+
+
+def _typed_row(name: str, payload: pa.Schema) -> str:
+    expressions = [column_name(position) for position in range(len(payload))]
+    return _row(name, payload, expressions)
+
+
+def _csv_row(name: str, payload: pa.Schema) -> str:
+    expressions = []
+    for position, field in enumerate(payload):
+        expression = column_name(position)
+        if pa.types.is_nested(field.type):
+            expression = f"CAST(to_json({exact(expression, field.type)}) AS VARCHAR)"
+        expressions.append(expression)
+    return _row(name, payload, expressions)
+
+
+def _row(name: str, payload: pa.Schema, expressions: list[str]) -> str:
+    taken = set(COLUMNS)
+    parts = [common_columns(name)]
+    for field, expression in zip(payload, expressions, strict=True):
+        column = field.name
+        while column.lower() in taken:
+            column = f"field_{column}"
+        taken.add(column.lower())
+        parts.append(f"{expression} AS {identifier(column)}")
+    return ", ".join(parts)
+
+
+@contextlib.contextmanager
+def _new_directory(directory: Path) -> Iterator[Path]:
+    temporary = directory.with_name(f".{directory.name}.{os.getpid()}.part")
+    try:
+        if directory.exists() and any(directory.iterdir()):
+            raise UsageError(f"the directory is not empty — {directory}", "choose another with -o")
+        temporary.mkdir()
+        yield temporary
+        temporary.replace(directory)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(f"cannot write the directory: {reason} — {directory}") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

@@ -1,0 +1,94 @@
+"""SQL expressions that turn values of any type into text or JSON.
+
+Names of fields come from traces: they stand in SQL only as quoted literals.
+"""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+# Controls, characters without a shape, and line separators: no terminal shall obey a trace.
+_UNPRINTABLE = r"[\p{C}\p{Zl}\p{Zp}]"
+_REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+
+
+def literal(text: str) -> str:
+    """Return a text as an SQL literal."""
+    return "'" + text.replace("'", "''") + "'"
+
+
+def identifier(name: str) -> str:
+    """Return a name as an SQL identifier."""
+    return '"' + name.replace('"', '""') + '"'
+
+
+def printable(expression: str) -> str:
+    """Return the SQL of a text without what is not for display."""
+    return f"regexp_replace({expression}, '{_UNPRINTABLE}', '{_REPLACEMENT}', 'g')"
+
+
+def exact(expression: str, data_type: pa.DataType) -> str:
+    """Return the SQL of a value that JSON can hold: NaN and infinities, which it cannot, are NULL.
+
+    Args:
+        expression: SQL of the value.
+        data_type: of the value.
+    """
+    types = pa.types
+    if not _has_floats(data_type):
+        return expression
+    if types.is_floating(data_type):
+        return f"CASE WHEN isfinite({expression}) THEN {expression} END"
+    if types.is_list(data_type):
+        element = exact("element", data_type.value_type)
+        return f"list_transform({expression}, lambda element: {element})"
+    members = ", ".join(
+        f"{literal(field.name)}, {exact(_member(expression, field), field.type)}"
+        for field in data_type
+    )
+    return f"CASE WHEN {expression} IS NOT NULL THEN json_object({members}) END"
+
+
+def readable(expression: str, data_type: pa.DataType, *, is_hexadecimal: bool = False) -> str:
+    """Return the SQL of a value as people read it, never NULL.
+
+    Text is quoted as in JSON, lists are `[1, 2]`, structures `{name=value, …}` of the members that
+    are there.
+
+    Args:
+        expression: SQL of the value.
+        data_type: of the value.
+        is_hexadecimal: show unsigned integers in base 16.
+    """
+    types = pa.types
+    if types.is_string(data_type):
+        text = printable(f"CAST(to_json({expression}) AS VARCHAR)")
+    elif types.is_list(data_type):
+        element = readable("element", data_type.value_type, is_hexadecimal=is_hexadecimal)
+        elements = f"list_transform({expression}, lambda element: {element})"
+        text = f"'[' || array_to_string({elements}, ', ') || ']'"
+    elif types.is_struct(data_type):
+        members = ", ".join(
+            f"CASE WHEN {_member(expression, field)} IS NOT NULL THEN "
+            f"{literal(f'{field.name}=')} || {readable(_member(expression, field), field.type)} END"
+            for field in data_type
+        )
+        text = f"'{{' || concat_ws(', ', {members}) || '}}'"
+        text = f"CASE WHEN {expression} IS NOT NULL THEN {text} END"
+    elif is_hexadecimal and types.is_unsigned_integer(data_type):
+        text = f"format('0x{{:x}}', {expression})"
+    else:
+        text = f"CAST({expression} AS VARCHAR)"
+    return f"coalesce({text}, 'null')"
+
+
+def _member(expression: str, field: pa.Field) -> str:
+    return f"struct_extract({expression}, {literal(field.name)})"
+
+
+def _has_floats(data_type: pa.DataType) -> bool:
+    if pa.types.is_list(data_type):
+        return _has_floats(data_type.value_type)
+    if pa.types.is_struct(data_type):
+        return any(_has_floats(field.type) for field in data_type)
+    return bool(pa.types.is_floating(data_type))

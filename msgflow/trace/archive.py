@@ -1,0 +1,24 @@
+"""Which files are archives of traces, by their names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SUFFIXES = (".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst", ".tar.xz", ".txz", ".zip")
+"""Ends of the names of archives that can be read."""
+
+
+def is_archive(path: Path) -> bool:
+    """Tell whether this is a file whose name says that it is an archive which can be read."""
+    return path.name.lower().endswith(SUFFIXES) and path.is_file()
+
+
+def stem(path: Path) -> str:
+    """Return the name of an archive without its suffix, that of anything else as it is."""
+    if not is_archive(path):
+        return path.name
+    suffix = max((end for end in SUFFIXES if path.name.lower().endswith(end)), key=len)
+    return path.name[: -len(suffix)]

@@ -1,0 +1,75 @@
+"""Reads compressed files, whichever of the usual compressions they have."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import lzma
+import struct
+import tarfile
+import zipfile
+import zlib
+from typing import IO, Any
+
+_MAGIC_SIZE = 6
+_GZIP = b"\x1f\x8b"
+_XZ = b"\xfd7zXZ\x00"
+_ZSTD = b"\x28\xb5\x2f\xfd"
+
+
+class _ZstdError(Exception):
+    """Zstandard data are damaged."""
+
+
+CORRUPT = (
+    tarfile.TarError,
+    zipfile.BadZipFile,
+    gzip.BadGzipFile,
+    lzma.LZMAError,
+    zlib.error,
+    struct.error,
+    _ZstdError,
+    EOFError,
+    UnicodeError,
+    ValueError,
+)
+"""What reading a damaged archive raises."""
+
+UNPACKABLE = (RuntimeError, NotImplementedError)
+"""What reading an encrypted archive, or one of an unknown compression, raises."""
+
+
+def open_plain(file: IO[bytes]) -> Any:
+    """Return the content of a file without its compression, of which the first bytes tell.
+
+    It has a method `read`, which raises one of `CORRUPT` where the file is damaged.
+    """
+    magic = file.read(_MAGIC_SIZE)
+    file.seek(0)
+    if magic.startswith(_GZIP):
+        return gzip.open(file)
+    if magic.startswith(_XZ):
+        return lzma.LZMAFile(file)
+    if magic.startswith(_ZSTD):
+        return io.BufferedReader(_Zstd(file))
+    return file
+
+
+class _Zstd(io.RawIOBase):
+    """Zstandard through Arrow: the standard library learned it only in Python 3.14."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        import pyarrow
+
+        self._content = pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), "zstd")
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        try:
+            chunk = self._content.read(len(buffer))
+        except OSError as error:
+            raise _ZstdError(str(error)) from error
+        buffer[: len(chunk)] = chunk
+        return len(chunk)

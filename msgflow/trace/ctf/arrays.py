@@ -1,0 +1,52 @@
+"""From numpy arrays to Arrow arrays of the wanted type."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def number_array(values: NDArray[Any], data_type: pa.DataType) -> pa.Array:
+    """Return numbers; integers that do not fit are wrapped round as C would."""
+    return pa.array(_converted(values, data_type))
+
+
+def list_array(
+    offsets: NDArray[np.int64], elements: NDArray[Any], data_type: pa.DataType
+) -> pa.Array:
+    """Return lists of numbers."""
+    return pa.ListArray.from_arrays(
+        pa.array(offsets.astype(np.int32)),
+        number_array(elements, data_type.value_type),
+        type=data_type,
+    )
+
+
+def text_array(offsets: NDArray[np.int64], content: NDArray[np.uint8]) -> pa.Array:
+    """Return texts; what is not UTF-8 gets replacement characters."""
+    array = pa.StringArray.from_buffers(
+        offsets.size - 1,
+        pa.py_buffer(offsets.astype(np.int32)),
+        pa.py_buffer(np.ascontiguousarray(content)),
+    )
+    if content.size and int(content.max()) >= 0x80:
+        try:
+            array.validate(full=True)
+        except pa.ArrowInvalid:
+            return pa.array(
+                [value.as_py().decode("utf-8", "replace") for value in array.cast(pa.binary())],
+                pa.string(),
+            )
+    return array
+
+
+def _converted(values: NDArray[Any], data_type: pa.DataType) -> NDArray[Any]:
+    if pa.types.is_boolean(data_type):
+        is_true: NDArray[Any] = values != 0
+        return is_true
+    return np.ascontiguousarray(values, dtype=data_type.to_pandas_dtype())

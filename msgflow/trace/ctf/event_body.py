@@ -1,0 +1,261 @@
+"""What follows an event's header: its contexts and payload, as a list of plain fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.extent import DynamicError, is_dense, lay_out
+from msgflow.trace.ctf.types import (
+    BYTE,
+    Array,
+    Integer,
+    Real,
+    Scope,
+    Sequence,
+    String,
+    Structure,
+    Type,
+)
+from msgflow.trace.ctf.walk import FieldError
+
+if TYPE_CHECKING:
+    from msgflow.trace.ctf.declarations import EventClass, StreamClass
+
+_WIDTHS = {8, 16, 32, 64}
+
+
+class Kind(Enum):
+    """The kinds of plain fields."""
+
+    NUMBER = "a number"
+    NUMBERS = "an array of numbers"
+    TEXT = "an array of characters"
+    STRING = "text up to a NUL"
+    SEQUENCE = "numbers, as many as another field says"
+    TEXT_SEQUENCE = "characters, as many as another field says"
+    NOTHING = "no field, only the alignment of an empty structure"
+
+
+@dataclass(frozen=True)
+class PlainField:
+    """A field that lies on whole bytes.
+
+    Attributes:
+        scope: the structure that it is in.
+        name: its name there.
+        kind: what it is.
+        align: in bytes.
+        dtype: of the number or element, as numpy calls it.
+        width: bytes of the number or element.
+        count: of the elements of an array, otherwise 1.
+        length_at: for a sequence, the place in the list of the field with its length.
+        is_length: it is the length of a sequence.
+        type: as declared.
+        size: in bytes, None if it varies.
+    """
+
+    scope: Scope
+    name: str
+    kind: Kind
+    align: int
+    dtype: str = "u1"
+    width: int = 1
+    count: int = 1
+    length_at: int = -1
+    is_length: bool = False
+    type: Type | None = None
+
+    size: int | None = dataclass_field(init=False)
+
+    def __post_init__(self) -> None:
+        varies = self.kind in {Kind.STRING, Kind.SEQUENCE, Kind.TEXT_SEQUENCE}
+        width = 0 if self.kind is Kind.NOTHING else self.width
+        object.__setattr__(self, "size", None if varies else width * self.count)
+
+
+@dataclass(frozen=True)
+class EventBody:
+    """How to read the contexts and payload of one event class.
+
+    Attributes:
+        fields: its fields in order; None if they must be read one by one.
+        sizes: of the whole in bytes, by residue of its position; None if that varies.
+        offsets: of each field, by residue; None if the sizes are.
+    """
+
+    fields: tuple[PlainField, ...] | None
+    sizes: tuple[int, ...] | None
+    offsets: tuple[tuple[int, ...], ...] | None
+
+    def end(self, data: bytearray, position: int, limit: int) -> int:
+        """Return the byte at which the body that begins at `position` ends.
+
+        Raises:
+            FieldError: it does not fit in front of the byte `limit`.
+        """
+        assert self.fields is not None
+        lengths: dict[int, int] = {}
+        for number, field in enumerate(self.fields):
+            position = (position + field.align - 1) & -field.align
+            size = field.size
+            if size is None:
+                if field.kind is Kind.STRING:
+                    size = data.find(0, position, limit) + 1 - position
+                    if size <= 0:
+                        raise FieldError("a text does not end within the packet")
+                else:
+                    size = lengths[field.length_at] * field.width
+            elif field.is_length:
+                order = "big" if field.dtype[0] == ">" else "little"
+                lengths[number] = int.from_bytes(
+                    data[position : position + size],
+                    order,  # type: ignore[arg-type]
+                )
+            position += size
+            if position > limit:
+                raise FieldError("a field goes beyond the end of the packet")
+        return position
+
+
+def compile_body(stream: StreamClass, event: EventClass, residues: int) -> EventBody:
+    """Return how to read the body of an event class.
+
+    Args:
+        stream: its stream class.
+        event: the event class.
+        residues: how many residues of positions are told apart.
+    """
+    structures = {
+        Scope.EVENT_CONTEXT: stream.event_context,
+        Scope.SPECIFIC_CONTEXT: event.specific_context,
+        Scope.PAYLOAD: event.payload,
+    }
+    fields: list[PlainField] | None = []
+    for scope, structure in structures.items():
+        if fields is not None:
+            fields = _add_fields(fields, scope, structure)
+    sizes = _sizes(list(structures.values()), residues)
+    offsets = None
+    if fields is not None and sizes is not None:
+        offsets = tuple(zip(*(_offsets(fields, r) for r in range(residues)), strict=True))
+    return EventBody(None if fields is None else tuple(fields), sizes, offsets)
+
+
+def _sizes(structures: list[Structure], residues: int) -> tuple[int, ...] | None:
+    sizes = []
+    for residue in range(residues):
+        end = residue * BYTE
+        try:
+            for structure in structures:
+                end = lay_out(structure, end)
+        except DynamicError:
+            return None
+        # The next header lies on a whole byte.
+        sizes.append((end + BYTE - 1) // BYTE - residue)
+    return tuple(sizes)
+
+
+def _offsets(fields: list[PlainField], residue: int) -> list[int]:
+    offsets = []
+    position = residue
+    for field in fields:
+        position = (position + field.align - 1) & -field.align
+        offsets.append(position - residue)
+        position += field.size or 0
+    return offsets
+
+
+def _add_fields(
+    fields: list[PlainField], scope: Scope, structure: Structure
+) -> list[PlainField] | None:
+    fields = list(fields)
+    if structure.align > 1:
+        if structure.align % BYTE:
+            return None
+        fields.append(PlainField(scope, "", Kind.NOTHING, structure.align // BYTE))
+    for member in structure.members:
+        field = _plain(fields, scope, member.name, member.type)
+        if field is None:
+            return None
+        if field.length_at >= 0:
+            fields[field.length_at] = replace(fields[field.length_at], is_length=True)
+        fields.append(field)
+    return fields
+
+
+def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) -> PlainField | None:
+    if declared.align % BYTE:
+        return None
+    align = declared.align // BYTE
+    match declared:
+        case String():
+            return PlainField(scope, name, Kind.STRING, align, type=declared)
+        case Integer() | Real() if declared.size in _WIDTHS:
+            return PlainField(
+                scope,
+                name,
+                Kind.NUMBER,
+                align,
+                _dtype(declared),
+                declared.size // BYTE,
+                type=declared,
+            )
+        case Array() if _is_plain_element(declared.element):
+            element = declared.element
+            assert isinstance(element, Integer | Real)
+            kind = Kind.TEXT if declared.is_text else Kind.NUMBERS
+            return PlainField(
+                scope,
+                name,
+                kind,
+                align,
+                _dtype(element),
+                element.size // BYTE,
+                declared.length,
+                type=declared,
+            )
+        case Sequence() if _is_plain_element(declared.element):
+            element = declared.element
+            assert isinstance(element, Integer | Real)
+            kind = Kind.TEXT_SEQUENCE if declared.is_text else Kind.SEQUENCE
+            length_at = _length_field(fields, scope, declared)
+            if length_at is None:
+                return None
+            return PlainField(
+                scope,
+                name,
+                kind,
+                align,
+                _dtype(element),
+                element.size // BYTE,
+                length_at=length_at,
+                type=declared,
+            )
+        case _:
+            return None
+
+
+def _is_plain_element(element: Type) -> bool:
+    return isinstance(element, Integer | Real) and element.size in _WIDTHS and is_dense(element)
+
+
+def _dtype(number: Integer | Real) -> str:
+    kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
+    return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"
+
+
+def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) -> int | None:
+    """Return the place of the field with the length, None if it is not a plain one before."""
+    reference = declared.length
+    if len(reference.path) != 1:
+        return None
+    scopes = [scope] if reference.scope is None else [reference.scope]
+    for number in range(len(fields) - 1, -1, -1):
+        field = fields[number]
+        if field.name == reference.path[0] and field.scope in scopes:
+            is_unsigned = isinstance(field.type, Integer) and not field.type.signed
+            return number if field.kind is Kind.NUMBER and is_unsigned else None
+    return None

@@ -1,0 +1,198 @@
+"""Event headers that can be read from many events at once.
+
+A header is an id and a time stamp; with LTTng there are two forms of it, and the first number
+tells which one and, in the short form, the id as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
+from msgflow.trace.ctf.types import (
+    BYTE,
+    EVENT_CLASS_ROLE,
+    TIME_ROLE,
+    Choice,
+    Integer,
+    Scope,
+    Structure,
+    Type,
+    Variant,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an integer lies.
+
+    Attributes:
+        offsets: bytes from the begin of the header, by residue of the header's own position.
+        width: bytes to read there: 1, 2, 4 or 8.
+        big_endian: their order.
+        shift: bits below the integer in what was read.
+        bits: of the integer.
+    """
+
+    offsets: tuple[int, ...]
+    width: int
+    big_endian: bool
+    shift: int
+    bits: int
+
+    @property
+    def mask(self) -> int:
+        """The bits of the integer."""
+        return (1 << self.bits) - 1
+
+    @property
+    def dtype(self) -> str:
+        """The type of what is read, as numpy calls it."""
+        return f"{'>' if self.big_endian else '<'}u{self.width}"
+
+    def read(self, data: bytearray, begin: int, residue: int) -> int:
+        """Read it from the header that begins at this byte."""
+        first = begin + self.offsets[residue]
+        order = "big" if self.big_endian else "little"
+        word = int.from_bytes(data[first : first + self.width], order)  # type: ignore[arg-type]
+        return word >> self.shift & self.mask
+
+
+@dataclass(frozen=True)
+class Form:
+    """One form of the header.
+
+    Attributes:
+        choice: for which selector values; None: always.
+        id: where the event's class is; None if there is only one.
+        time: where the time stamp is; None if there is none.
+        sizes: of the header in bytes, by residue.
+    """
+
+    choice: Choice | None
+    id: Place | None
+    time: Place | None
+    sizes: tuple[int, ...]
+
+    def holds(self, selector: int) -> bool:
+        """Tell whether a header with this selector has this form."""
+        return self.choice is None or self.choice.holds(selector)
+
+
+@dataclass(frozen=True)
+class EventHeader:
+    """How to read a stream's event headers.
+
+    Attributes:
+        align: of the header, in bytes.
+        selector: the number that tells the form, and the id unless the form has its own.
+        forms: all forms.
+        narrow_bits: size of the time stamps that are not whole clock values, None if all are.
+    """
+
+    align: int
+    selector: Place
+    forms: tuple[Form, ...]
+    narrow_bits: int | None
+
+
+def compile_header(structure: Structure, residues: int) -> EventHeader | None:
+    """Return how to read such headers at once; None if they must be read one by one.
+
+    Args:
+        structure: the header.
+        residues: how many residues of positions are told apart.
+    """
+    if structure.align % BYTE or not structure.members:
+        return None
+    last = structure.members[-1].type
+    choices: Sequence[Choice | None] = [None]
+    if isinstance(last, Variant):
+        choices = last.choices
+    try:
+        forms = [_form(structure, choice, residues) for choice in choices]
+        selector = forms[0].id
+        if isinstance(last, Variant):
+            path = last.selector.path
+            if last.selector.scope not in {None, Scope.EVENT_HEADER} or len(path) != 1:
+                return None
+            leaves = [
+                _find(_leaves(structure, choices[0], r), lambda leaf: leaf.path == path)
+                for r in range(residues)
+            ]
+            selector = _place(leaves)
+    except DynamicError:
+        return None
+    widths = {form.time.bits for form in forms if form.time is not None} - {64}
+    if selector is None or len(widths) > 1:
+        return None
+    return EventHeader(
+        structure.align // BYTE, selector, tuple(forms), widths.pop() if widths else None
+    )
+
+
+def _leaves(structure: Structure, choice: Choice | None, residue: int) -> tuple[list[Leaf], int]:
+    leaves: list[Leaf] = []
+    position = residue * BYTE
+    for member in structure.members:
+        declared: Type = member.type
+        if isinstance(declared, Variant) and choice is not None:
+            declared = choice.type
+        position = lay_out(declared, position, leaves, (member.name,))
+    return leaves, position
+
+
+def _form(structure: Structure, choice: Choice | None, residues: int) -> Form:
+    laid_out = [_leaves(structure, choice, residue) for residue in range(residues)]
+    sizes = []
+    for residue, (_, end) in enumerate(laid_out):
+        if end % BYTE:
+            raise DynamicError
+        sizes.append(end // BYTE - residue)
+    return Form(
+        choice,
+        _place([_last_of_role(found, EVENT_CLASS_ROLE) for found in laid_out]),
+        _place([_last_of_role(found, TIME_ROLE) for found in laid_out]),
+        tuple(sizes),
+    )
+
+
+def _last_of_role(laid_out: tuple[list[Leaf], int], role: str) -> Leaf | None:
+    found = None
+    for leaf in laid_out[0]:
+        if isinstance(leaf.type, Integer) and role in leaf.type.roles:
+            found = leaf
+    return found
+
+
+def _find(laid_out: tuple[list[Leaf], int], matches: Callable[[Leaf], bool]) -> Leaf | None:
+    return next((leaf for leaf in laid_out[0] if matches(leaf)), None)
+
+
+def _place(leaves: Sequence[Leaf | None]) -> Place | None:
+    """Return where an integer lies, given its leaf for each residue."""
+    offsets = []
+    shifts = set()
+    for residue, leaf in enumerate(leaves):
+        if leaf is None:
+            return None
+        if not isinstance(leaf.type, Integer) or leaf.type.signed:
+            raise DynamicError
+        size, big_endian = leaf.type.size, leaf.type.big_endian
+        first = leaf.position // BYTE
+        end = leaf.position + size
+        used = (end + BYTE - 1) // BYTE - first
+        width = next((width for width in (1, 2, 4, 8) if width >= used), None)
+        if width is None:
+            raise DynamicError
+        offsets.append(first - residue)
+        shift = (first + width) * BYTE - end if big_endian else leaf.position - first * BYTE
+        shifts.add((shift, width))
+    if len(shifts) != 1:
+        raise DynamicError
+    shift, width = shifts.pop()
+    return Place(tuple(offsets), width, big_endian, shift, size)

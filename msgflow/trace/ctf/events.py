@@ -1,0 +1,143 @@
+"""The events of packets in memory: where they begin, of which class, and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msgflow.trace.ctf.headers import read_headers
+from msgflow.trace.ctf.lockstep import scan_lockstep
+from msgflow.trace.ctf.types import BYTE
+from msgflow.trace.ctf.walk import FieldError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from msgflow.trace.ctf.entries import Entry
+    from msgflow.trace.ctf.layout import StreamLayout
+    from msgflow.trace.ctf.memory import Memory
+    from msgflow.trace.ctf.slow import PacketWalk
+
+
+@dataclass(frozen=True)
+class Events:
+    """Events of some packets, packet after packet.
+
+    Attributes:
+        counts: how many each packet has.
+        classes: numbers of their classes.
+        clock: values of the clock.
+        bodies: where contexts and payload begin: bytes of memory.
+        positions: where headers begin: bytes of memory, or for slow streams bits of the packet.
+    """
+
+    counts: NDArray[np.int64]
+    classes: NDArray[np.uint32]
+    clock: NDArray[np.uint64]
+    bodies: NDArray[np.int64]
+    positions: NDArray[np.int64]
+
+
+def find_events(
+    layout: StreamLayout,
+    memory: Memory,
+    entries: Sequence[Entry],
+    report: Callable[[Entry, int, str], None],
+) -> None:
+    """Fill in `Entry.events` of packets of one stream class, which lie in memory in this order.
+
+    What follows damage in a packet is left out; `report` is called with the packet, the byte of
+    the packet, and a message.
+    """
+    if layout.header is None:
+        for entry in entries:
+            entry.events = _walk_through(layout, memory, entry, report)
+        return
+    spans = [
+        layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
+        for entry in entries
+    ]
+    for entry, found in zip(entries, scan_lockstep(layout, memory, spans), strict=True):
+        entry.events = found.positions - entry.base
+        if found.problem is not None:
+            position, message = found.problem
+            report(entry, position - entry.base, message)
+
+
+def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) -> Events:
+    """Read the headers of all events that were found in these packets of one stream class."""
+    counts = np.array([_begins(entry).size for entry in entries], np.int64)
+    if layout.header is None:
+        return _walk_headers(layout, memory, entries, counts)
+    bases = np.array([entry.base for entry in entries], np.int64)
+    positions = np.concatenate([_begins(entry) for entry in entries])
+    positions += np.repeat(bases, counts)
+    begins = np.array([entry.begin for entry in entries], np.uint64)
+    headers = read_headers(layout, memory, positions, counts, begins)
+    return Events(counts, headers.classes, headers.clock, headers.bodies, positions)
+
+
+def walk_of(layout: StreamLayout, memory: Memory, entry: Entry, base: int) -> PacketWalk:
+    """Return the slow path through a packet that lies at `base`."""
+    content = memoryview(memory.data)[base : base + entry.size]
+    return layout.walk(content, entry.packet.content_bits)
+
+
+def _begins(entry: Entry) -> NDArray[np.int64]:
+    assert entry.events is not None
+    return entry.events
+
+
+def _walk_through(
+    layout: StreamLayout,
+    memory: Memory,
+    entry: Entry,
+    report: Callable[[Entry, int, str], None],
+) -> NDArray[np.int64]:
+    walk = walk_of(layout, memory, entry, entry.base)
+    end = entry.packet.content_bits
+    begins = []
+    position = walk.begin(entry.packet.header.events_at)
+    while position < end:
+        try:
+            following = walk.event_end(position)
+            if following == position:
+                raise FieldError("an event has no size")
+        except FieldError as error:
+            report(entry, position // BYTE, str(error))
+            break
+        begins.append(position)
+        position = walk.begin(following)
+    return np.array(begins, np.int64)
+
+
+def _walk_headers(
+    layout: StreamLayout, memory: Memory, entries: Sequence[Entry], counts: NDArray[np.int64]
+) -> Events:
+    classes = []
+    values = []
+    for entry in entries:
+        walk = walk_of(layout, memory, entry, entry.base)
+        clock = entry.begin
+        for position in _begins(entry).tolist():
+            header = walk.header(position)
+            if header.time is not None:
+                size = 1 << header.time_bits
+                if header.time_bits < 64:
+                    clock += (header.time - clock) % size
+                else:
+                    clock = header.time
+            classes.append(layout.classes[header.event.id].number)
+            values.append(clock % (1 << 64))
+    positions = np.concatenate([_begins(entry) for entry in entries])
+    return Events(
+        counts,
+        np.array(classes, np.uint32),
+        np.array(values, np.uint64),
+        np.zeros(positions.size, np.int64),
+        positions,
+    )

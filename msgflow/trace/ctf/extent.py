@@ -1,0 +1,89 @@
+"""Where the fields of a type lie when that does not depend on their values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from msgflow.trace.ctf.types import (
+    Array,
+    Integer,
+    Real,
+    Structure,
+    Type,
+    aligned,
+)
+
+_MOST_ELEMENTS = 4096
+_MOST_LEAVES = 100_000
+
+
+class DynamicError(Exception):
+    """Where a field ends depends on values."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A number, or an array of numbers that follow each other without gaps.
+
+    Attributes:
+        path: names of the members from the outermost to this one.
+        type: its type.
+        position: in bits.
+    """
+
+    path: tuple[str, ...]
+    type: Integer | Real | Array
+    position: int
+
+
+def lay_out(
+    declared: Type,
+    position: int,
+    leaves: list[Leaf] | None = None,
+    path: tuple[str, ...] = (),
+) -> int:
+    """Return the bit at which a field that is due at `position` ends.
+
+    Args:
+        declared: the type of the field.
+        position: in bits from the begin of the packet.
+        leaves: if given, gets the numbers in it.
+        path: names of the structures around it.
+
+    Raises:
+        DynamicError: it is not always the same.
+    """
+    position = aligned(position, declared.align)
+    match declared:
+        case Integer() | Real():
+            if leaves is not None:
+                leaves.append(Leaf(path, declared, position))
+            return position + declared.size
+        case Array() if is_dense(declared.element):
+            if leaves is not None:
+                leaves.append(Leaf(path, declared, position))
+            return position + declared.length * _dense_size(declared.element)
+        case Array():
+            if declared.length > _MOST_ELEMENTS:
+                raise DynamicError
+            for number in range(declared.length):
+                position = lay_out(declared.element, position, leaves, (*path, str(number)))
+                if leaves is not None and len(leaves) > _MOST_LEAVES:
+                    raise DynamicError
+            return position
+        case Structure():
+            for member in declared.members:
+                position = lay_out(member.type, position, leaves, (*path, member.name))
+            return position
+        case _:
+            raise DynamicError
+
+
+def is_dense(element: Type) -> bool:
+    """Tell whether elements of this type follow each other without gaps."""
+    return isinstance(element, Integer | Real) and element.size % element.align == 0
+
+
+def _dense_size(element: Type) -> int:
+    assert isinstance(element, Integer | Real)
+    return element.size

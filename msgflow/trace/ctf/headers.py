@@ -1,0 +1,180 @@
+"""From positions of events to their classes, times and bodies, for many events at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from msgflow.trace.ctf.event_header import Form, Place
+    from msgflow.trace.ctf.layout import StreamLayout
+    from msgflow.trace.ctf.memory import Memory
+
+
+@dataclass
+class Headers:
+    """Event headers, in the order of their positions.
+
+    Attributes:
+        classes: number of the event class.
+        clock: value of the clock.
+        bodies: where contexts and payload begin: bytes of memory.
+    """
+
+    classes: NDArray[np.uint32]
+    clock: NDArray[np.uint64]
+    bodies: NDArray[np.int64]
+
+
+def read_headers(
+    layout: StreamLayout,
+    memory: Memory,
+    positions: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    begins: NDArray[np.uint64],
+) -> Headers:
+    """Read the headers of the events at these positions.
+
+    Args:
+        layout: of their stream class.
+        memory: where they lie.
+        positions: as a scan found them, packet after packet.
+        counts: events of each packet.
+        begins: value of the clock at the begin of each packet.
+    """
+    reader = _Reader(layout, memory, positions)
+    owner_begins = begins[counts > 0]
+    firsts = (np.cumsum(counts) - counts)[counts > 0]
+    header = layout.header
+    assert header is not None
+    selector = reader.gather(header.selector, slice(None))
+    forms = reader.rows_of_forms(selector)
+    classes = np.empty(positions.size, np.uint32)
+    values = np.empty(positions.size, np.uint64)
+    bodies = np.empty(positions.size, np.int64)
+    whole = []
+    for form, rows in zip(header.forms, forms, strict=True):
+        if not isinstance(rows, slice) and rows.size == 0:
+            continue
+        classes[rows] = reader.classes(form, selector, rows)
+        bodies[rows] = positions[rows] + reader.by_residue(form.sizes, rows)
+        if form.time is not None:
+            values[rows] = reader.gather(form.time, rows)
+            if form.time.bits == 64:
+                whole.append(np.arange(positions.size) if isinstance(rows, slice) else rows)
+        else:
+            values[rows] = np.repeat(begins, counts)[rows]
+    if header.narrow_bits is None:
+        return Headers(classes, values, bodies)
+    whole_rows = np.sort(np.concatenate([*whole, np.empty(0, np.int64)]))
+    clock = _unwrapped(values, header.narrow_bits, firsts, owner_begins, whole_rows)
+    return Headers(classes, clock, bodies)
+
+
+class _Reader:
+    def __init__(self, layout: StreamLayout, memory: Memory, positions: NDArray[np.int64]) -> None:
+        self._layout = layout
+        self._memory = memory
+        self._positions = positions
+
+    def by_residue(self, values: tuple[int, ...], rows: Any) -> Any:
+        """Return for each row the value that belongs to the residue of its position."""
+        if len(set(values)) == 1:
+            return values[0]
+        residue = self._positions[rows] & (self._layout.residues - 1)
+        return np.array(values, np.int64)[residue]
+
+    def gather(self, place: Place, rows: Any) -> NDArray[Any]:
+        """Return the integers at this place of these rows."""
+        at = self._positions[rows] + self.by_residue(place.offsets, rows)
+        values: NDArray[Any] = self._memory.view(place.dtype)[at]
+        values = values.astype(f"u{place.width}", copy=False)
+        if place.shift:
+            values = values >> place.shift
+        if place.bits < place.width * 8:
+            values = values & place.mask
+        return values
+
+    def rows_of_forms(self, selector: NDArray[Any]) -> list[Any]:
+        """Return for each form its rows."""
+        header = self._layout.header
+        assert header is not None
+        if len(header.forms) == 1:
+            return [slice(None)]
+        remaining = np.arange(selector.size)
+        rows = []
+        for form in header.forms:
+            matches = np.zeros(remaining.size, np.bool_)
+            for first, last in form.choice.ranges if form.choice else ():
+                if last < 0 or first > header.selector.mask:
+                    continue
+                low, high = max(first, 0), min(last, header.selector.mask)
+                matches |= (selector[remaining] >= low) & (selector[remaining] <= high)
+            if remaining.size == selector.size and matches.all():
+                # The usual case: all events of a batch have the short form.
+                return [
+                    slice(None) if other is form else np.empty(0, np.int64)
+                    for other in header.forms
+                ]
+            rows.append(remaining[matches])
+            remaining = remaining[~matches]
+        return rows
+
+    def classes(self, form: Form, selector: NDArray[Any], rows: Any) -> Any:
+        """Return the numbers of the event classes of rows that have this form."""
+        layout = self._layout
+        assert layout.header is not None
+        if form.id is None:
+            return layout.classes[layout.only_id].number
+        is_selector = form.id == layout.header.selector
+        ids = selector[rows] if is_selector else self.gather(form.id, rows)
+        known = np.array(sorted(layout.classes), np.uint64)
+        numbers = np.array([layout.classes[int(i)].number for i in known], np.uint32)
+        if known.size and int(known[-1]) < 1 << 16:
+            table = np.zeros(int(known[-1]) + 1, np.uint32)
+            table[known] = numbers
+            return table[ids]
+        return numbers[np.searchsorted(known, ids)]
+
+
+def _unwrapped(
+    values: NDArray[np.uint64],
+    bits: int,
+    firsts: NDArray[np.int64],
+    begins: NDArray[np.uint64],
+    whole: NDArray[np.int64],
+) -> NDArray[np.uint64]:
+    """Turn the low bits of a clock into its values.
+
+    A time stamp is the first value at or after the previous one with these low bits, and the
+    previous one of a packet's first event is the packet's begin. So the distances are known from
+    the low bits alone, and their sum from a whole value on is the clock.
+
+    Args:
+        values: low bits, or whole values.
+        bits: how many low bits.
+        firsts: rows at which packets begin.
+        begins: value of the clock there.
+        whole: rows that have a whole value.
+    """
+    if not values.size:
+        return values
+    distance = np.empty_like(values)
+    np.subtract(values[1:], values[:-1], out=distance[1:])
+    distance[firsts] = values[firsts] - begins
+    distance &= np.uint64((1 << bits) - 1)
+    known = np.zeros(values.size, np.bool_)
+    known[firsts] = True
+    known[whole] = True
+    clock = np.cumsum(distance, dtype=np.uint64)
+    starts = np.flatnonzero(known)
+    start_values = np.empty(values.size, np.uint64)
+    start_values[firsts] = begins + distance[firsts]
+    start_values[whole] = values[whole]
+    shifts = start_values[starts] - clock[starts]
+    clock += np.repeat(shifts, np.diff(starts, append=values.size))
+    return clock

@@ -1,0 +1,176 @@
+"""One pass over a set of traces: from packets to record batches."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+
+from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema
+from msgflow.trace.ctf.arrow_types import declared_schema, hexadecimal_names
+from msgflow.trace.ctf.build import EventRows, build_batch
+from msgflow.trace.ctf.events import walk_of
+from msgflow.trace.ctf.order import ordered_batches
+from msgflow.trace.ctf.packet_rows import PacketRows
+from msgflow.trace.ctf.plans import ClassPlan, make_plan
+from msgflow.trace.ctf.prefetch import Prefetch
+from msgflow.trace.ctf.thread_names import ThreadNames
+from msgflow.trace.ctf.types import BYTE
+from msgflow.trace.model import EventBatch, Progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from msgflow.trace.ctf.entries import Entry
+    from msgflow.trace.ctf.layout import StreamLayout
+    from msgflow.trace.ctf.order import Batch
+    from msgflow.trace.ctf.slow import PacketWalk
+
+_LARGEST_BATCH = 16 << 20
+_SMALLEST_BATCH = 64 << 10
+_BYTES_PER_ROW = 256
+_AHEAD = 1
+
+
+class Iteration:
+    """Reads packets once.
+
+    Attributes:
+        event_count: events read so far.
+    """
+
+    def __init__(
+        self,
+        layouts: Sequence[StreamLayout],
+        entries: Sequence[Entry],
+        wanted: Mapping[str, pa.Schema | None] | None,
+        progress: Callable[[Progress], None] | None,
+        batch_rows: int,
+        report: Callable[[Entry, int, str], None],
+    ) -> None:
+        """Prepare to read `entries`; see `TraceSet.batches` for the rest."""
+        self._entries = entries
+        self._progress = progress
+        self._batch_rows = batch_rows
+        self._report_damage = report
+        self._classes = [(layout, known) for layout in layouts for known in layout.classes.values()]
+        self._counts = np.zeros(len(self._classes), np.int64)
+        self._names = ThreadNames()
+        self._plans = self._planned(complete_schemas(wanted, _declared(layouts)))
+        self.event_count = 0
+
+    def event_counts(self) -> dict[tuple[int, str], int]:
+        """Return (trace index, event name) to the number of events read so far."""
+        counts: dict[tuple[int, str], int] = {}
+        for (layout, known), count in zip(self._classes, self._counts.tolist(), strict=True):
+            if count:
+                key = (layout.trace_index, known.event.name)
+                counts[key] = counts.get(key, 0) + count
+        return dict(sorted(counts.items()))
+
+    def run(self) -> Iterator[EventBatch]:
+        """Yield all batches."""
+        size = min(max(self._batch_rows * _BYTES_PER_ROW, _SMALLEST_BATCH), _LARGEST_BATCH)
+        total = sum(entry.size for entry in self._entries) or 1
+        done = 0
+        latest_ns = 0
+        packets = PacketRows(self._report_damage)
+        # Events of the next batch are found while columns of this one are made and used.
+        batches = Prefetch(
+            lambda: ordered_batches(self._entries, size, self._report_damage, _AHEAD), _AHEAD
+        )
+        try:
+            for number, batch in enumerate(batches.items()):
+                packets.add(batch)
+                if batch.order.size:
+                    latest_ns = int(batch.ts_ns[batch.order[-1]])
+                yield from self._events(batch, number)
+                yield from packets.take(self._batch_rows, number)
+                sizes = zip(batch.entries, batch.new, strict=True)
+                done += sum(entry.size for entry, new in sizes if new)
+                if done < total:
+                    self._report_progress(done / total, latest_ns)
+        finally:
+            batches.close()
+        self._report_progress(1.0, latest_ns)
+
+    def _planned(self, wanted: Mapping[str, pa.Schema]) -> dict[str, list[ClassPlan]]:
+        plans: dict[str, list[ClassPlan]] = {}
+        for layout, known in self._classes:
+            name = known.event.name
+            if name in wanted:
+                plans.setdefault(name, []).append(make_plan(layout, known, wanted[name]))
+        return plans
+
+    def _events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
+        order = batch.order
+        first_id = self.event_count
+        self.event_count += order.size
+        classes = batch.classes[order].astype(
+            np.uint16 if len(self._classes) < 1 << 16 else np.uint32
+        )
+        counts = np.bincount(classes, minlength=len(self._classes))
+        self._counts += counts
+        by_class = np.argsort(classes, kind="stable")
+        ends = np.cumsum(counts)
+        walks: dict[int, PacketWalk] = {}
+
+        def walk_at(packet: int, position: int) -> tuple[PacketWalk, int]:
+            entry, base = batch.entries[packet], batch.bases[packet]
+            layout = entry.stream.layout
+            if packet not in walks:
+                walks[packet] = walk_of(layout, batch.memory, entry, base)
+            is_slow = layout.header is None
+            return walks[packet], position if is_slow else (position - base) * BYTE
+
+        for name, plans in self._plans.items():
+            parts = []
+            for plan in plans:
+                place = plan.layout.number
+                if counts[place]:
+                    of_class = by_class[ends[place] - counts[place] : ends[place]]
+                    rows = _rows(batch, order[of_class], of_class + first_id)
+                    parts.append(build_batch(plan, batch.memory, rows, self._names, walk_at))
+            if parts:
+                whole = parts[0] if len(parts) == 1 else _in_order(parts)
+                for begin in range(0, whole.num_rows, self._batch_rows):
+                    yield EventBatch(name, whole.slice(begin, self._batch_rows), number)
+
+    def _report_progress(self, fraction: float, time_ns: int) -> None:
+        if self._progress is not None:
+            self._progress(Progress(self.event_count, fraction, time_ns))
+
+
+def _rows(batch: Batch, rows: NDArray[np.int64], event_ids: NDArray[np.int64]) -> EventRows:
+    packets = batch.packets[rows]
+    return EventRows(
+        event_ids=event_ids,
+        ts_ns=batch.ts_ns[rows],
+        cpus=batch.cpus[packets],
+        has_cpu=None if batch.has_cpu is None else batch.has_cpu[packets],
+        bodies=batch.bodies[rows],
+        positions=batch.positions[rows],
+        packets=packets,
+    )
+
+
+def _in_order(parts: list[pa.RecordBatch]) -> pa.RecordBatch:
+    table = pa.Table.from_batches(parts).unify_dictionaries().sort_by("event_id")
+    return table.combine_chunks().to_batches()[0]
+
+
+def _declared(layouts: Sequence[StreamLayout]) -> dict[str, pa.Schema]:
+    declared: dict[str, list[pa.Schema]] = {}
+    hexadecimal: dict[str, set[str]] = {}
+    for layout in layouts:
+        for known in layout.classes.values():
+            name, payload = known.event.name, known.event.payload
+            declared.setdefault(name, []).append(declared_schema(payload))
+            hexadecimal.setdefault(name, set()).update(hexadecimal_names(payload))
+    return {
+        name: in_hexadecimal(merged_schema(schemas), hexadecimal[name])
+        for name, schemas in declared.items()
+    }

@@ -1,0 +1,238 @@
+"""Everything needed to find the events of one stream class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from msgflow.trace.ctf.event_body import EventBody, compile_body
+from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
+from msgflow.trace.ctf.slow import PacketWalk
+from msgflow.trace.ctf.types import (
+    BYTE,
+    Array,
+    Optional,
+    Sequence,
+    Structure,
+    Type,
+    Variant,
+    aligned,
+)
+from msgflow.trace.ctf.walk import FieldError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+
+GAP = 64
+"""Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
+
+_MOST_RESIDUES = 8
+_WIDEST_TABLE = 1 << 16
+_LARGEST_STEP = 1 << 30
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where the events of a packet lie in memory, in bytes.
+
+    Attributes:
+        base: the begin of the packet.
+        begin: where the first event begins.
+        end: where the next header would begin after the last event.
+        limit: the end of the content, not after `end`.
+    """
+
+    base: int
+    begin: int
+    end: int
+    limit: int
+
+
+@dataclass(frozen=True, eq=False)
+class ClassLayout:
+    """An event class and how to read it.
+
+    Attributes:
+        number: its place among all classes of a set of traces.
+        event: what is declared.
+        body: how to read it.
+    """
+
+    number: int
+    event: EventClass
+    body: EventBody
+
+
+class StreamLayout:
+    """How to find the events of one stream class.
+
+    Attributes:
+        residues: positions that differ by a multiple of this are laid out alike.
+        header: how to read event headers at once, None if they must be read one by one.
+        classes: event class id to layout.
+    """
+
+    def __init__(
+        self, trace_index: int, trace: TraceClass, stream: StreamClass, first_number: int
+    ) -> None:
+        """Work it out.
+
+        Args:
+            trace_index: place of the trace in the set.
+            trace: its declarations.
+            stream: the stream class.
+            first_number: number of the first event class; the others follow.
+        """
+        self.trace_index = trace_index
+        self.trace = trace
+        self.stream = stream
+        align = max(
+            largest_align(stream.event_header),
+            largest_align(stream.event_context),
+            *(largest_align(event.specific_context) for event in stream.events.values()),
+            *(largest_align(event.payload) for event in stream.events.values()),
+            BYTE,
+        )
+        self.residues = min(align // BYTE, _MOST_RESIDUES)
+        self.header: EventHeader | None = None
+        if align // BYTE <= _MOST_RESIDUES:
+            self.header = compile_header(stream.event_header, self.residues)
+        self.classes = {
+            event_id: ClassLayout(number, event, compile_body(stream, event, self.residues))
+            for number, (event_id, event) in enumerate(stream.events.items(), first_number)
+        }
+
+    def span(self, base: int, events_at: int, content_bits: int) -> Span:
+        """Return where events lie in a packet that lies at `base`; needs `header`."""
+        assert self.header is not None
+        align = self.header.align * BYTE
+        begin = base + aligned(events_at, align) // BYTE
+        end = base + aligned(content_bits, align) // BYTE
+        return Span(base, min(begin, end), end, base + (content_bits + BYTE - 1) // BYTE)
+
+    @cached_property
+    def only_id(self) -> int:
+        """Id of the events whose headers have none."""
+        return next(iter(self.classes)) if len(self.classes) == 1 else 0
+
+    @cached_property
+    def steps(self) -> dict[int, int]:
+        """From selector * `residues` + residue to the size of such an event in bytes.
+
+        Only of those events whose size is always the same.
+        """
+        header = self.header
+        assert header is not None
+        steps = {}
+        for event_id, layout in self.classes.items():
+            form = self._short_form(event_id)
+            if form is None or layout.body.sizes is None:
+                continue
+            for residue in range(self.residues):
+                body_at = residue + form.sizes[residue]
+                end = body_at + layout.body.sizes[body_at % self.residues]
+                step = aligned(end, header.align) - residue
+                if step < _LARGEST_STEP:
+                    steps[event_id * self.residues + residue] = step
+        return steps
+
+    def _short_form(self, event_id: int) -> Form | None:
+        """Return the form in which the selector is this id, None if there is none."""
+        assert self.header is not None
+        for form in self.header.forms:
+            if form.holds(event_id):
+                is_short = form.id == self.header.selector
+                return form if is_short and event_id <= self.header.selector.mask else None
+        return None
+
+    @cached_property
+    def selector_limit(self) -> int | None:
+        """The largest selector that tables have room for; larger ones count as this one.
+
+        None if tables would be too large.
+        """
+        assert self.header is not None
+        mask = self.header.selector.mask
+        limit = mask if mask < _WIDEST_TABLE else max(self.classes, default=0) + 1
+        return limit if limit < _WIDEST_TABLE else None
+
+    @cached_property
+    def step_table(self) -> NDArray[np.int64] | None:
+        """`steps` as an array, 0 where they have none; None if there is no room for one.
+
+        The selector whose bits are all one has none: it is what follows the last event.
+        """
+        limit = self.selector_limit
+        assert self.header is not None
+        if limit is None or self.header.selector.mask * self.residues in self.steps:
+            return None
+        table = np.zeros((limit + 1) * self.residues, np.int64)
+        for key, step in self.steps.items():
+            table[key] = step
+        return table
+
+    def form_of(self, selector: int) -> Form:
+        """Return the form of a header with this selector.
+
+        Raises:
+            FieldError: there is none.
+        """
+        assert self.header is not None
+        for form in self.header.forms:
+            if form.holds(selector):
+                return form
+        raise FieldError(f"there is no form of an event header for {selector}")
+
+    def next_event(self, data: bytearray, position: int, span: Span) -> int:
+        """Return where the event after the one at this byte begins.
+
+        Raises:
+            FieldError: there is no event of this layout.
+        """
+        header = self.header
+        assert header is not None
+        residue = position % self.residues
+        selector = header.selector.read(data, position, residue)
+        form = self.form_of(selector)
+        event_id = form.id.read(data, position, residue) if form.id else self.only_id
+        body_at = position + form.sizes[residue]
+        layout = self.classes.get(event_id)
+        if layout is None or body_at > span.limit:
+            raise FieldError(f"there is no event class {event_id}")
+        body = layout.body
+        if body.sizes is not None:
+            end = body_at + body.sizes[body_at % self.residues]
+        elif body.fields is not None:
+            end = body.end(data, body_at, span.limit)
+        else:
+            walk = self.walk(
+                memoryview(data)[span.base : span.limit], (span.limit - span.base) * BYTE
+            )
+            end = span.base + (walk.event_end((position - span.base) * BYTE) + BYTE - 1) // BYTE
+        if end > span.limit or end == position:
+            raise FieldError("an event goes beyond the end of the packet")
+        return aligned(end, header.align)
+
+    def walk(self, data: memoryview, bits: int) -> PacketWalk:
+        """Return the slow path through a packet of so many bits."""
+        return PacketWalk(self.trace, self.stream, data, bits)
+
+
+def largest_align(declared: Type) -> int:
+    """Return the largest alignment of a type and everything in it."""
+    match declared:
+        case Structure():
+            return max(declared.align, *(largest_align(m.type) for m in declared.members), 1)
+        case Array() | Sequence():
+            return max(declared.align, largest_align(declared.element))
+        case Variant():
+            return max(1, *(largest_align(choice.type) for choice in declared.choices), 1)
+        case Optional():
+            return largest_align(declared.content)
+        case _:
+            return declared.align

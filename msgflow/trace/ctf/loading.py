@@ -1,0 +1,79 @@
+"""Brings packets into memory."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.layout import GAP
+from msgflow.trace.ctf.memory import Memory, room_for
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from msgflow.trace.ctf.entries import Entry
+
+_MOST_FILES = 64
+_ONES = b"\xff" * GAP
+
+
+class Loader:
+    """Keeps the packets of the current batch in memory.
+
+    What a batch does not use up is copied to the next one. The memories are used in turn: one is
+    not touched before as many batches have been loaded as there are others.
+    """
+
+    def __init__(self, memories: int = 2) -> None:
+        self._memories = [Memory(0) for _ in range(memories)]
+        self._files: dict[Path, int] = {}
+
+    @property
+    def memory(self) -> Memory:
+        """Where the packets of the current batch are."""
+        return self._memories[-1]
+
+    def load(self, entries: Sequence[Entry]) -> list[Entry]:
+        """Put these packets into memory in this order, those that are there already included.
+
+        Returns:
+            packets that their files no longer hold.
+        """
+        missing = []
+        size = sum(room_for(entry.size) for entry in entries)
+        before = self.memory
+        memory = self._memories.pop(0)
+        if memory.size < size:
+            memory = Memory(size)
+        at = 0
+        with memoryview(memory.data) as target, memoryview(before.data) as source:
+            for entry in entries:
+                end = at + entry.size
+                if entry.base >= 0:
+                    target[at:end] = source[entry.base : entry.base + entry.size]
+                elif not self._read(entry, target[at:end]):
+                    missing.append(entry)
+                # Where no event can begin: it stops the scan.
+                target[end : end + GAP] = _ONES
+                entry.base = at
+                at += room_for(entry.size)
+        self._memories.append(memory)
+        return missing
+
+    def close(self) -> None:
+        """Close all files."""
+        for descriptor in self._files.values():
+            os.close(descriptor)
+        self._files.clear()
+
+    def _read(self, entry: Entry, target: memoryview) -> bool:
+        path = entry.packet.path
+        try:
+            if path not in self._files:
+                if len(self._files) >= _MOST_FILES:
+                    self.close()
+                self._files[path] = os.open(path, os.O_RDONLY)
+            return os.preadv(self._files[path], [target], entry.packet.offset) == len(target)
+        except OSError:
+            return False

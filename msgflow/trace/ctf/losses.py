@@ -1,0 +1,66 @@
+"""Events and packets that were lost, from the counters in the packets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from msgflow.trace.ctf.packets import Packet
+    from msgflow.trace.ctf.streams import Stream
+
+Recording = tuple[str, int, int]
+"""Trace uuid (or path), stream class and stream instance: one counter, through all chunks."""
+
+_LARGEST = (1 << 63) - 1
+
+
+class LossCounter:
+    """Turns the counters of one packet after the other into what each lost.
+
+    A recording may be rotated into several directories; the counter of lost events goes on in the
+    next one, that of packets is only compared within one (before its first packet may be what a
+    snapshot left out on purpose).
+    """
+
+    def __init__(self) -> None:
+        self._counters: dict[Recording, int] = {}
+        self._previous: dict[int, Packet] = {}
+
+    def losses(
+        self, recording: Recording, stream: Stream, packet: Packet, counts: bool
+    ) -> tuple[int | None, int]:
+        """Return the events lost in a packet, and the packets lost right before it.
+
+        Args:
+            recording: what the counter of events counts for.
+            stream: the packet's stream.
+            packet: must come in order of time.
+            counts: False for a copy of a packet, which only serves to be compared with.
+        """
+        previous = self._previous.get(id(stream))
+        self._previous[id(stream)] = packet
+        lost = 0
+        header = packet.header
+        if previous is not None and previous.header.sequence is not None:
+            sequence = header.sequence or 0
+            lost = min(max(sequence - previous.header.sequence - 1, 0), _LARGEST)
+        if header.discarded is None:
+            return 0, lost
+        before = self._counters.get(recording, 0)
+        if previous is not None and previous.header.discarded is not None:
+            before = previous.header.discarded
+        if counts:
+            self._counters[recording] = header.discarded
+        return min(_rise(before, header.discarded, header.discarded_bits), _LARGEST), lost
+
+
+def recording_of(stream: Stream, uuid: str | None, path: str) -> Recording:
+    """Return what a stream's counter of lost events counts for."""
+    return uuid or path, stream.class_id, stream.instance
+
+
+def _rise(before: int, counter: int, bits: int) -> int:
+    if counter >= before:
+        return counter - before
+    # A narrow counter has wrapped round; a wide one cannot, it has started again.
+    return counter if bits == 64 else counter - before + (1 << bits)

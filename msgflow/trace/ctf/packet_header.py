@@ -1,0 +1,268 @@
+"""Reads what a packet says of itself: its header and context."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
+from msgflow.trace.ctf.types import (
+    BYTE,
+    CONTENT_SIZE_ROLE,
+    DISCARDED_ROLE,
+    END_ROLE,
+    MAGIC_ROLE,
+    PACKET_SIZE_ROLE,
+    SEQUENCE_ROLE,
+    STREAM_CLASS_ROLE,
+    STREAM_ROLE,
+    TIME_ROLE,
+    UUID_ROLE,
+    Array,
+    Integer,
+    Scope,
+    Structure,
+)
+from msgflow.trace.ctf.walk import FieldError, Walker
+
+if TYPE_CHECKING:
+    from msgflow.trace.ctf.declarations import StreamClass, TraceClass
+
+MAGIC = 0xC1FC1FC1
+_CPU = "cpu_id"
+_LONGEST_HEADER = 1 << 16
+_KNOWN_ROLES = {
+    MAGIC_ROLE,
+    UUID_ROLE,
+    STREAM_CLASS_ROLE,
+    STREAM_ROLE,
+    PACKET_SIZE_ROLE,
+    CONTENT_SIZE_ROLE,
+    TIME_ROLE,
+    END_ROLE,
+    SEQUENCE_ROLE,
+    DISCARDED_ROLE,
+}
+_CODES = {1: "B", 2: "H", 4: "I", 8: "Q"}
+_CUT_OFF = "the file ends within the header of a packet"
+
+
+@dataclass(frozen=True, slots=True)
+class PacketHeader:
+    """What a packet says of itself; None where it does not.
+
+    Attributes:
+        stream: its stream class.
+        instance: which stream of the class (the buffer).
+        size_bits: of the packet.
+        content_bits: of the part of it that is used, header and context included.
+        events_at: the bit at which its events begin.
+        begin: clock value at its begin.
+        end: clock value at its end.
+        sequence: its number in the stream.
+        discarded: events lost in the stream so far.
+        discarded_bits: size of that counter.
+        cpu: the CPU it was written on.
+    """
+
+    stream: StreamClass
+    instance: int | None
+    size_bits: int | None
+    content_bits: int | None
+    events_at: int
+    begin: int | None
+    end: int | None
+    sequence: int | None
+    discarded: int | None
+    discarded_bits: int
+    cpu: int | None
+
+
+class HeaderReader:
+    """Reads the packet headers of one trace.
+
+    Attributes:
+        size: bytes that are enough to read any header, as far as that can be told.
+    """
+
+    def __init__(self, trace: TraceClass) -> None:
+        self._trace = trace
+        self._plans: dict[int, _Plan | None] = {}
+        self._start = _plan(trace.packet_header, 0)
+        contexts = [self._plan_of(stream) for stream in trace.streams.values()]
+        ends = [_LONGEST_HEADER if plan is None else plan.end // BYTE + 1 for plan in contexts]
+        self.size = max(ends, default=_LONGEST_HEADER)
+
+    def read(self, data: bytes) -> PacketHeader:
+        """Read the header at the begin of `data`.
+
+        Raises:
+            FieldError: it is not the header of a packet of this trace.
+        """
+        if self._start is None:
+            return self._walk(data)
+        found = self._start.read(data)
+        stream = self._check(found)
+        plan = self._plans[stream.id]
+        if plan is None:
+            return self._walk(data)
+        found |= plan.read(data)
+        return _header(stream, found, plan.end, plan.discarded_bits)
+
+    def pattern(self) -> bytes | None:
+        """Return bytes with which every packet begins, None if there are none to rely on."""
+        if self._start is None or self._trace.uuid is None:
+            return None
+        places = self._start.places
+        if MAGIC_ROLE not in places or UUID_ROLE not in places:
+            return None
+        magic, uuid = places[MAGIC_ROLE], places[UUID_ROLE]
+        if (magic.first, magic.last, uuid.first) != (0, 4, 4):
+            return None
+        return MAGIC.to_bytes(4, magic.order) + bytes.fromhex(self._trace.uuid.replace("-", ""))
+
+    def _plan_of(self, stream: StreamClass) -> _Plan | None:
+        plan = None if self._start is None else _plan(stream.packet_context, self._start.end)
+        self._plans[stream.id] = plan
+        return plan
+
+    def _check(self, found: dict[str, Any]) -> StreamClass:
+        if found.get(MAGIC_ROLE, MAGIC) != MAGIC:
+            raise FieldError("no packet begins here, the magic number is missing")
+        uuid = found.get(UUID_ROLE)
+        if uuid is not None and self._trace.uuid not in {None, _uuid_text(uuid)}:
+            raise FieldError(f"the packet belongs to another trace, {_uuid_text(uuid)}")
+        streams = self._trace.streams
+        class_id = found.get(STREAM_CLASS_ROLE)
+        if class_id is None and len(streams) == 1:
+            return next(iter(streams.values()))
+        stream = streams.get(class_id or 0)
+        if stream is None:
+            raise FieldError(f"there is no stream class {class_id}")
+        return stream
+
+    def _walk(self, data: bytes) -> PacketHeader:
+        walker = Walker(data, len(data) * BYTE)
+        walker.read_scope(Scope.PACKET_HEADER, self._trace.packet_header)
+        stream = self._check(walker.found)
+        context = walker.read_scope(Scope.PACKET_CONTEXT, stream.packet_context)
+        found = dict(walker.found)
+        if isinstance(context.get(_CPU), int):
+            found[_CPU] = context[_CPU]
+        return _header(stream, found, walker.position, 64)
+
+
+def _header(
+    stream: StreamClass, found: dict[str, Any], events_at: int, discarded_bits: int
+) -> PacketHeader:
+    return PacketHeader(
+        stream=stream,
+        instance=found.get(STREAM_ROLE),
+        size_bits=found.get(PACKET_SIZE_ROLE),
+        content_bits=found.get(CONTENT_SIZE_ROLE),
+        events_at=events_at,
+        begin=found.get(TIME_ROLE),
+        end=found.get(END_ROLE),
+        sequence=found.get(SEQUENCE_ROLE),
+        discarded=found.get(DISCARDED_ROLE),
+        discarded_bits=discarded_bits,
+        cpu=found.get(_CPU),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Bytes in which a value lies; an array of bytes is no number."""
+
+    first: int
+    last: int
+    shift: int
+    mask: int
+    order: Literal["little", "big"]
+    is_number: bool
+
+    def read(self, data: bytes) -> Any:
+        content = data[self.first : self.last]
+        if len(content) < self.last - self.first:
+            raise FieldError(_CUT_OFF)
+        if not self.is_number:
+            return content
+        return int.from_bytes(content, self.order) >> self.shift & self.mask
+
+
+class _Plan:
+    """Where the values of a structure lie, when that is always the same.
+
+    Attributes:
+        places: role (or name) to place.
+        end: the bit at which the structure ends.
+        discarded_bits: size of the counter of lost events.
+    """
+
+    def __init__(self, places: dict[str, _Place], end: int, discarded_bits: int) -> None:
+        self.places = places
+        self.end = end
+        self.discarded_bits = discarded_bits
+        self._names = sorted(places, key=lambda name: places[name].first)
+        self._unpack = _unpacker([places[name] for name in self._names])
+
+    def read(self, data: bytes) -> dict[str, Any]:
+        if self._unpack is None:
+            return {name: place.read(data) for name, place in self.places.items()}
+        if len(data) < self._unpack.size:
+            raise FieldError(_CUT_OFF)
+        return dict(zip(self._names, self._unpack.unpack_from(data), strict=True))
+
+
+def _unpacker(places: list[_Place]) -> struct.Struct | None:
+    """Return what reads all places at once, None if they are not all plain."""
+    orders = {place.order for place in places if place.is_number}
+    if len(orders) > 1:
+        return None
+    code = ">" if orders == {"big"} else "<"
+    at = 0
+    for place in places:
+        width = place.last - place.first
+        if place.first < at or (place.is_number and place.mask.bit_length() != width * BYTE):
+            return None
+        if place.is_number and width not in _CODES:
+            return None
+        code += f"{place.first - at}x" + (_CODES[width] if place.is_number else f"{width}s")
+        at = place.last
+    return struct.Struct(code)
+
+
+def _plan(structure: Structure, position: int) -> _Plan | None:
+    leaves: list[Leaf] = []
+    try:
+        end = lay_out(structure, position, leaves)
+    except DynamicError:
+        return None
+    places = {}
+    discarded_bits = 64
+    for leaf in leaves:
+        roles = leaf.type.roles if isinstance(leaf.type, Integer | Array) else frozenset()
+        for role in roles & _KNOWN_ROLES:
+            places[role] = _place(leaf)
+        if leaf.path == (_CPU,) and isinstance(leaf.type, Integer):
+            places[_CPU] = _place(leaf)
+        if DISCARDED_ROLE in roles and isinstance(leaf.type, Integer):
+            discarded_bits = leaf.type.size
+    return _Plan(places, end, discarded_bits)
+
+
+def _place(leaf: Leaf) -> _Place:
+    first = leaf.position // BYTE
+    if isinstance(leaf.type, Array):
+        return _Place(first, first + leaf.type.length, 0, 0, "little", False)
+    end = leaf.position + leaf.type.size
+    last = (end + BYTE - 1) // BYTE
+    big = leaf.type.big_endian
+    shift = last * BYTE - end if big else leaf.position - first * BYTE
+    return _Place(first, last, shift, (1 << leaf.type.size) - 1, "big" if big else "little", True)
+
+
+def _uuid_text(uuid: bytes) -> str:
+    text = uuid.hex()
+    return f"{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:]}"

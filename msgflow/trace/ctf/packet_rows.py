@@ -1,0 +1,90 @@
+"""Packets as rows, and checks of the times in them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from msgflow.trace.columns import record_batch
+from msgflow.trace.ctf.quirks import events_may_follow_end
+from msgflow.trace.model import EventBatch
+from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from msgflow.trace.ctf.entries import Entry
+    from msgflow.trace.ctf.order import Batch
+
+
+class PacketRows:
+    """Collects packets as they are read."""
+
+    def __init__(self, report: Callable[[Entry, int, str], None]) -> None:
+        """Call `report` for packets whose events contradict them."""
+        self._report = report
+        self._rows: list[tuple[Any, ...]] = []
+
+    def add(self, batch: Batch) -> None:
+        """Add the new packets of a batch."""
+        ends = np.cumsum(batch.counts)
+        backward = np.zeros(ends.size, np.bool_)
+        falls = np.flatnonzero(batch.ts_ns[1:] < batch.ts_ns[:-1]) + 1
+        backward[batch.packets[falls[batch.packets[falls] == batch.packets[falls - 1]]]] = True
+        for entry, new, count, end, falls_back in zip(
+            batch.entries,
+            batch.new,
+            batch.counts.tolist(),
+            ends.tolist(),
+            backward.tolist(),
+            strict=True,
+        ):
+            if not new:
+                continue
+            if falls_back:
+                self._report(entry, 0, "time runs backward in the packet")
+            if count and batch.clock[end - count] < entry.begin:
+                self._report(entry, 0, "an event is earlier than the begin of its packet")
+            last = int(batch.clock[end - 1]) if count else None
+            last_ns = int(batch.ts_ns[end - 1]) if count else None
+            self._rows.append(self._row(entry, count, last, last_ns))
+
+    def take(self, most: int, number: int) -> Iterator[EventBatch]:
+        """Give away what was collected in this round, at most so many rows at once."""
+        for begin in range(0, len(self._rows), most):
+            rows = self._rows[begin : begin + most]
+            columns = dict(zip(PACKET_SCHEMA.names, zip(*rows, strict=True), strict=True))
+            batch = record_batch(PACKET_SCHEMA, columns, {}, len(rows))
+            yield EventBatch(PACKET, batch, number)
+        self._rows.clear()
+
+    def _row(
+        self, entry: Entry, count: int, last: int | None, last_ns: int | None
+    ) -> tuple[Any, ...]:
+        stream, header = entry.stream, entry.packet.header
+        clock = stream.layout.stream.clock
+        assert clock is not None
+        begin_ns = None if header.begin is None else clock.to_ns(header.begin)
+        end_ns = None
+        if header.end is not None:
+            # A crash leaves packets without an end; old tracers give one before the last event.
+            latest = entry.begin if last is None else last
+            end_ns = clock.to_ns(max(header.end, latest))
+            is_late = bool(header.end) and last is not None and last > header.end
+            if is_late and not events_may_follow_end(stream.layout.trace.environment):
+                self._report(entry, 0, "an event is later than the end of its packet")
+        return (
+            stream.trace_index,
+            stream.index,
+            stream.class_id,
+            stream.instance,
+            header.cpu,
+            entry.position,
+            begin_ns,
+            end_ns,
+            last_ns,
+            count,
+            entry.discarded,
+            entry.lost,
+        )

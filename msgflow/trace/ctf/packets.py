@@ -1,0 +1,194 @@
+"""The packets of a stream file, from hopping over it; what is damaged is left out and told."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf import index
+from msgflow.trace.ctf.rising import misplaced
+from msgflow.trace.ctf.types import BYTE
+from msgflow.trace.ctf.walk import FieldError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
+
+_CHUNK = 1 << 20
+_LATEST_NS = (1 << 63) - 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Packet:
+    """A packet whose header makes sense.
+
+    Attributes:
+        path: its file.
+        number: its place in the file.
+        offset: its place in the file, in bytes.
+        size: in bytes, from `offset`.
+        content_bits: how much of that is used.
+        header: what it says of itself.
+    """
+
+    path: Path
+    number: int
+    offset: int
+    size: int
+    content_bits: int
+    header: PacketHeader
+
+
+def packets_of(
+    path: Path, reader: HeaderReader, report: Callable[[Path, int, int, str], None]
+) -> list[Packet]:
+    """Return the packets of a file in its order.
+
+    Args:
+        path: the file.
+        reader: reads the headers of the trace.
+        report: called with file, number of the packet, offset in bytes and a message for
+            everything that is wrong.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        packets = list(_Hopping(path, descriptor, reader, report).run())
+    finally:
+        os.close(descriptor)
+    early = misplaced([packet.header.begin or 0 for packet in packets])
+    for place in sorted(early):
+        packet = packets[place]
+        report(
+            path,
+            packet.number,
+            packet.offset,
+            "the packet begins earlier or later than its neighbours",
+        )
+    return [packet for place, packet in enumerate(packets) if place not in early]
+
+
+class _Hopping:
+    def __init__(
+        self,
+        path: Path,
+        descriptor: int,
+        reader: HeaderReader,
+        report: Callable[[Path, int, int, str], None],
+    ) -> None:
+        self._path = path
+        self._descriptor = descriptor
+        self._reader = reader
+        self._report = report
+        self._file_size = os.fstat(descriptor).st_size
+        self._index = index.entries(path)
+        self._pattern = reader.pattern()
+
+    def run(self) -> Iterator[Packet]:
+        offset = number = 0
+        while offset < self._file_size:
+            try:
+                packet = self._packet(offset, number)
+            except FieldError as error:
+                self._report(self._path, number, offset, str(error))
+                offset = self._next_begin(offset)
+            else:
+                self._compare_with_index(packet)
+                yield packet
+                offset += packet.size
+            number += 1
+        last = max(self._index, default=-1)
+        if last >= self._file_size:
+            self._report(
+                self._path, number, self._file_size, "the file ends before packets of its index"
+            )
+
+    def _packet(self, offset: int, number: int) -> Packet:
+        header = self._reader.read(os.pread(self._descriptor, self._reader.size, offset))
+        rest = self._file_size - offset
+        size_bits = rest * BYTE if header.size_bits is None else header.size_bits
+        content_bits = size_bits if header.content_bits is None else header.content_bits
+        size = size_bits // BYTE
+        if size_bits % BYTE or not header.events_at <= content_bits <= size_bits:
+            raise FieldError(
+                f"a packet of {size_bits} bits with {content_bits} used bits makes no sense"
+            )
+        if size > rest:
+            raise FieldError(
+                "the file ends within this packet, it was cut off or is still being written"
+            )
+        self._check_times(header)
+        size = self._without_swallowed(offset, size, content_bits, number)
+        return Packet(self._path, number, offset, size, content_bits, header)
+
+    def _check_times(self, header: PacketHeader) -> None:
+        clock = header.stream.clock
+        for value in (header.begin, header.end):
+            if clock is not None and value is not None and clock.to_ns(value) > _LATEST_NS:
+                raise FieldError("the time of the packet makes no sense")
+        if header.begin is not None and header.end and header.end < header.begin:
+            raise FieldError("the packet ends before it begins")
+
+    def _without_swallowed(self, offset: int, size: int, content_bits: int, number: int) -> int:
+        """Return where a packet really ends whose unused end holds the next one."""
+        used = (content_bits + BYTE - 1) // BYTE
+        if self._pattern is None or size - used < len(self._pattern):
+            return size
+        found = self._find(offset + used, offset + size)
+        if found is None:
+            return size
+        self._report(
+            self._path, number, offset, "another packet lies where this one says to be unused"
+        )
+        return found - offset
+
+    def _next_begin(self, offset: int) -> int:
+        """Return where a packet begins after the one at `offset`, which cannot be read."""
+        known = [begin for begin in self._index if offset < begin < self._file_size]
+        if known:
+            return min(known)
+        if self._pattern is not None:
+            found = self._find(offset + 1, self._file_size)
+            if found is not None:
+                return found
+        return self._file_size
+
+    def _find(self, begin: int, end: int) -> int | None:
+        """Return the first offset in a part of the file at which a packet seems to begin."""
+        assert self._pattern is not None
+        overlap = len(self._pattern) - 1
+        while begin + overlap < end:
+            content = os.pread(self._descriptor, min(_CHUNK, end - begin), begin)
+            found = content.find(self._pattern)
+            if found >= 0:
+                return begin + found
+            if len(content) <= overlap:
+                break
+            begin += len(content) - overlap
+        return None
+
+    def _compare_with_index(self, packet: Packet) -> None:
+        entry = self._index.get(packet.offset)
+        header = packet.header
+        if self._index and entry is None and packet.offset < max(self._index):
+            self._report(self._path, packet.number, packet.offset, "the packet is not in the index")
+        if entry is None:
+            return
+        for found, expected, what in (
+            (packet.size * BYTE, entry.size_bits, "size"),
+            (packet.content_bits, entry.content_bits, "used size"),
+            (header.begin, entry.begin, "begin"),
+            (header.end, entry.end, "end"),
+        ):
+            if found is not None and found != expected:
+                self._report(
+                    self._path,
+                    packet.number,
+                    packet.offset,
+                    f"the index says that the packet's {what} is {expected}, the packet {found}",
+                )

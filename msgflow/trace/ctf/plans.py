@@ -1,0 +1,80 @@
+"""Which field fills which column, for every event class that is wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from msgflow.trace.columns import matching
+from msgflow.trace.ctf.arrow_types import declared_schema
+from msgflow.trace.ctf.types import Scope, Structure, Type
+from msgflow.trace.schemas import COMMON_SCHEMA
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from msgflow.trace.ctf.layout import ClassLayout, StreamLayout
+
+CONTEXT_COLUMNS = ("vpid", "vtid", "procname", "pid_ns")
+
+
+@dataclass(frozen=True)
+class Source:
+    """The field of a column: by name, and by its place among plain fields if it is one."""
+
+    scope: Scope
+    name: str
+    type: Type
+    number: int | None
+
+
+@dataclass(frozen=True)
+class ClassPlan:
+    """How batches of one event class are made.
+
+    Attributes:
+        layout: the event class.
+        stream: its stream class.
+        schema: of the batches, the common columns first.
+        contexts: common column to field, where there is one.
+        payload: payload column to field, where there is one.
+    """
+
+    layout: ClassLayout
+    stream: StreamLayout
+    schema: pa.Schema
+    contexts: Mapping[str, Source]
+    payload: Mapping[str, Source]
+
+    @property
+    def is_slow(self) -> bool:
+        """Its events are read field by field."""
+        return self.stream.header is None or self.layout.body.fields is None
+
+
+def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> ClassPlan:
+    """Plan the batches of an event class whose payload columns are `wanted`."""
+    columns = [field for field in COMMON_SCHEMA if field.name in CONTEXT_COLUMNS]
+    contexts = _sources(layout, Scope.EVENT_CONTEXT, stream.stream.event_context, columns)
+    missing = [column for column in columns if column.name not in contexts]
+    specific = layout.event.specific_context
+    contexts |= _sources(layout, Scope.SPECIFIC_CONTEXT, specific, missing)
+    payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, wanted)
+    return ClassPlan(layout, stream, pa.schema([*COMMON_SCHEMA, *wanted]), contexts, payload)
+
+
+def _sources(
+    layout: ClassLayout, scope: Scope, structure: Structure, columns: Iterable[pa.Field]
+) -> dict[str, Source]:
+    types = {member.name: member.type for member in structure.members}
+    numbers = {
+        field.name: number
+        for number, field in enumerate(layout.body.fields or ())
+        if field.scope is scope
+    }
+    return {
+        column: Source(scope, field.name, types[field.name], numbers.get(field.name))
+        for column, field in matching(columns, declared_schema(structure)).items()
+    }

@@ -1,0 +1,65 @@
+"""Looks into single packets for times that their headers do not tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.entries import Entry
+from msgflow.trace.ctf.events import find_events, read_events
+from msgflow.trace.ctf.loading import Loader
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from msgflow.trace.ctf.packets import Packet
+    from msgflow.trace.ctf.streams import Stream
+
+
+def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:
+    """Return the clock's value in front of each packet, and the time of its first event.
+
+    Nothing if the packets say themselves when they begin. The clock goes on from packet to
+    packet, so all of the stream must be looked at.
+    """
+    if all(packet.header.begin is not None for packet in stream.packets):
+        return {}
+    clock_class = stream.layout.stream.clock
+    assert clock_class is not None
+    begins = {}
+    clock = 0
+    order_ns = clock_class.to_ns(0)
+    for packet in stream.packets:
+        clock = packet.header.begin or clock
+        values = _clock_values(stream, packet, clock)
+        if values.size:
+            # Time must not fall, or the packets would change places.
+            order_ns = max(order_ns, clock_class.to_ns(int(values[0])))
+        begins[packet] = (clock, order_ns)
+        if values.size:
+            clock = int(values[-1])
+    return begins
+
+
+def end_of(stream: Stream, packet: Packet) -> int | None:
+    """Return the clock's value at the end of a packet, None if it has none.
+
+    A crash leaves packets that do not know their end: it is then that of the last event.
+    """
+    header = packet.header
+    if header.end or header.end is None or not header.begin:
+        return header.end
+    values = _clock_values(stream, packet, header.begin)
+    return int(values[-1]) if values.size else header.begin
+
+
+def _clock_values(stream: Stream, packet: Packet, begin: int) -> NDArray[np.uint64]:
+    """Return the times of a packet's events; damage is told when it is read for good."""
+    loader = Loader()
+    entry = Entry(stream, packet, 0, begin, 0, 0, 0)
+    try:
+        loader.load([entry])
+        find_events(stream.layout, loader.memory, [entry], lambda entry, offset, message: None)
+        return read_events(stream.layout, loader.memory, [entry]).clock
+    finally:
+        loader.close()

@@ -1,0 +1,158 @@
+"""The reader on msgflow's own decoder."""
+
+from __future__ import annotations
+
+import weakref
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError, UsageError
+from msgflow.trace.ctf import metadata
+from msgflow.trace.ctf.describe import describe, undeclared
+from msgflow.trace.ctf.entries import entries_of
+from msgflow.trace.ctf.iteration import Iteration
+from msgflow.trace.ctf.layout import StreamLayout
+from msgflow.trace.ctf.packet_header import HeaderReader
+from msgflow.trace.ctf.probe import begins_of
+from msgflow.trace.ctf.streams import streams_of
+from msgflow.trace.discovery import stream_files
+from msgflow.trace.model import Damage
+from msgflow.trace.reader import DEFAULT_BATCH_ROWS, TraceSet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    import pyarrow as pa
+
+    from msgflow.trace.ctf.entries import Entry
+    from msgflow.trace.ctf.packets import Packet
+    from msgflow.trace.ctf.streams import Stream
+    from msgflow.trace.model import EventBatch, Progress, TraceInfo, TraceLocation
+
+
+class CtfTraceSet(TraceSet):
+    """Traces read by msgflow itself."""
+
+    def __init__(self, locations: Sequence[TraceLocation], *, strict: bool = False) -> None:
+        """Read the metadata and find the packets; no event is read yet.
+
+        Raises:
+            TraceError: a trace's metadata cannot be understood, or `strict` and it is damaged.
+        """
+        self._strict = strict
+        self._layouts: list[StreamLayout] = []
+        self._streams: list[Stream] = []
+        self._begins: dict[Packet, tuple[int, int]] | None = None
+        self._found_early: list[Damage] = []
+        self.damages: list[Damage] = []
+        self.traces: tuple[TraceInfo, ...] = tuple(
+            self._open(location, index) for index, location in enumerate(locations)
+        )
+        self._found_early = list(self.damages)
+        self.event_counts: Mapping[tuple[int, str], int] = {}
+        self.duplicate_packet_count = 0
+        # Weak, so that an iteration which its consumer has dropped is over.
+        self._running: weakref.ref[Generator[EventBatch, None, None]] | None = None
+        self._closed = False
+
+    def batches(
+        self,
+        wanted: Mapping[str, pa.Schema | None] | None = None,
+        *,
+        progress: Callable[[Progress], None] | None = None,
+        batch_rows: int = DEFAULT_BATCH_ROWS,
+    ) -> Iterator[EventBatch]:
+        """Read everything once; see `TraceSet.batches`."""
+        if self._closed:
+            raise UsageError("the traces have been closed", hint="msgflow.trace.open(paths)")
+        if self._under_way() is not None:
+            raise UsageError(
+                "these traces are being read already", hint="open them a second time to read twice"
+            )
+        iteration = self._batches(wanted, progress, batch_rows)
+        self._running = weakref.ref(iteration)
+        return iteration
+
+    def close(self) -> None:
+        """End an iteration under way."""
+        self._closed = True
+        iteration = self._under_way()
+        if iteration is not None:
+            iteration.close()
+        self._running = None
+
+    def _under_way(self) -> Generator[EventBatch, None, None] | None:
+        return None if self._running is None else self._running()
+
+    def _open(self, location: TraceLocation, index: int) -> TraceInfo:
+        path = location.path
+        declared = metadata.read(path)
+        if not location.size_bytes:
+            return undeclared(path, index)
+        layouts = {}
+        for stream_class in declared.streams.values():
+            number = sum(len(layout.classes) for layout in self._layouts)
+            try:
+                layout = StreamLayout(index, declared, stream_class, number)
+            except RecursionError as error:
+                raise metadata.damaged_error(path, "too deeply nested") from error
+            layouts[stream_class.id] = layout
+            self._layouts.append(layout)
+
+        def report(file: Path, position: int, offset: int, message: str) -> None:
+            self._report(Damage(index, file, position, offset, message))
+
+        try:
+            streams = streams_of(stream_files(path), HeaderReader(declared), layouts, report)
+        except OSError as error:
+            raise TraceError(
+                f"cannot read the trace ({error.strerror}) — {error.filename or path}",
+                hint=f"sudo chown -R $USER {path}",
+            ) from error
+        for stream in streams:
+            stream.rank = len(self._streams)
+            self._streams.append(stream)
+        return describe(declared, path, index, streams)
+
+    def _batches(
+        self,
+        wanted: Mapping[str, pa.Schema | None] | None,
+        progress: Callable[[Progress], None] | None,
+        batch_rows: int,
+    ) -> Generator[EventBatch, None, None]:
+        self.damages = list(self._found_early)
+        if self._begins is None:
+            self._begins = {}
+            for stream in self._streams:
+                self._begins |= begins_of(stream)
+        entries, self.duplicate_packet_count = entries_of(self._streams, self.traces, self._begins)
+        iteration = Iteration(
+            self._layouts, entries, wanted, progress, batch_rows, self._report_in_packet
+        )
+        try:
+            yield from iteration.run()
+        finally:
+            self.event_counts = iteration.event_counts()
+            self.damages.sort(key=lambda damage: (damage.trace_index, damage.file, damage.offset))
+            self._running = None
+
+    def _report_in_packet(self, entry: Entry, offset: int, message: str) -> None:
+        packet = entry.packet
+        self._report(
+            Damage(
+                entry.stream.trace_index,
+                packet.path,
+                packet.number,
+                packet.offset + offset,
+                message,
+            )
+        )
+
+    def _report(self, damage: Damage) -> None:
+        if self._strict:
+            raise TraceError(
+                f"{damage.message} — {damage.file}, packet {damage.position}, "
+                f"offset {damage.offset}",
+                hint="copy it again from where it was recorded, or read it without --strict",
+            )
+        self.damages.append(damage)

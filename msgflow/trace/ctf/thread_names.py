@@ -1,0 +1,115 @@
+"""Thread names as a dictionary that all batches share: few of them, repeated in every event."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+_WORD = 8
+_FACTOR = np.uint64(0x9E3779B97F4A7C15)
+
+
+class ThreadNames:
+    """All names seen so far."""
+
+    def __init__(self) -> None:
+        self._index_of_name: dict[str, int] = {}
+        self._dictionary: pa.Array | None = None
+        self._tables: dict[int, _Table] = {}
+
+    def array(self, indexes: NDArray[np.int32]) -> pa.Array:
+        """Return names given by their indexes."""
+        if self._dictionary is None or len(self._dictionary) < len(self._index_of_name):
+            self._dictionary = pa.array(list(self._index_of_name), pa.string())
+        return pa.DictionaryArray.from_arrays(pa.array(indexes), self._dictionary)
+
+    def index_of(self, name: str) -> int:
+        """Return the index of a name."""
+        return self._index_of_name.setdefault(name, len(self._index_of_name))
+
+    def array_of(self, names: Iterable[str | None]) -> pa.Array:
+        """Return an array of names given one by one."""
+        indexes = [None if name is None else self.index_of(name) for name in names]
+        self.array(np.empty(0, np.int32))
+        return pa.DictionaryArray.from_arrays(pa.array(indexes, pa.int32()), self._dictionary)
+
+    def indexes(self, words: list[NDArray[np.uint64]], length: int) -> NDArray[np.int32]:
+        """Return the indexes of names given by their bytes.
+
+        Args:
+            words: the bytes, eight of them in each array; the last word may overlap the one
+                before, see `word_offsets`.
+            length: bytes of a name.
+        """
+        if length not in self._tables:
+            self._tables[length] = _Table(self, length)
+        return self._tables[length].indexes(words)
+
+
+def word_offsets(length: int) -> list[int]:
+    """Return where to read the words that hold a name of so many bytes."""
+    whole = list(range(0, length - _WORD + 1, _WORD))
+    return whole if length % _WORD == 0 else [*whole, max(length - _WORD, 0)]
+
+
+class _Table:
+    """From the bytes of names of one length to their indexes."""
+
+    def __init__(self, names: ThreadNames, length: int) -> None:
+        self._names = names
+        self._length = length
+        self._hashes = np.empty(0, np.uint64)
+        self._words: list[NDArray[np.uint64]] = [
+            np.empty(0, np.uint64) for _ in word_offsets(length)
+        ]
+        self._indexes = np.empty(0, np.int32)
+
+    def indexes(self, words: list[NDArray[np.uint64]]) -> NDArray[np.int32]:
+        if self._length < _WORD:
+            words = [words[0] & np.uint64((1 << (self._length * _WORD)) - 1)] if words else []
+        if not words:
+            raise ValueError("a thread name has no bytes")
+        hashes = words[0]
+        for word in words[1:]:
+            hashes = hashes * _FACTOR ^ word
+        if self._hashes.size == 0:
+            self._learn(hashes, words)
+        places = np.minimum(np.searchsorted(self._hashes, hashes), self._hashes.size - 1)
+        known = self._hashes[places] == hashes
+        if not known.all():
+            self._learn(hashes[~known], [word[~known] for word in words])
+            places = np.searchsorted(self._hashes, hashes)
+        result = self._indexes[places]
+        same = self._words[0][places] == words[0]
+        for mine, word in zip(self._words[1:], words[1:], strict=True):
+            same &= mine[places] == word
+        for row in np.flatnonzero(~same).tolist():
+            # Two names of one hash.
+            result[row] = self._index([word[row] for word in words])
+        return result
+
+    def _learn(self, hashes: NDArray[np.uint64], words: list[NDArray[np.uint64]]) -> None:
+        new, rows = np.unique(hashes, return_index=True)
+        indexes = [self._index([word[row] for word in words]) for row in rows.tolist()]
+        all_hashes = np.concatenate([self._hashes, new])
+        order = np.argsort(all_hashes)
+        self._hashes = all_hashes[order]
+        self._indexes = np.concatenate([self._indexes, np.array(indexes, np.int32)])[order]
+        self._words = [
+            np.concatenate([mine, word[rows]])[order]
+            for mine, word in zip(self._words, words, strict=True)
+        ]
+
+    def _index(self, words: list[Any]) -> int:
+        content = bytearray(max(self._length, _WORD))
+        for offset, word in zip(word_offsets(self._length), words, strict=True):
+            content[offset : offset + _WORD] = int(word).to_bytes(_WORD, "little")
+        name = bytes(content[: self._length]).partition(b"\0")[0]
+        return self._names.index_of(name.decode("utf-8", "replace"))

@@ -1,0 +1,282 @@
+"""Metadata in TSDL, the language of CTF 1.8."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+from uuid import UUID
+
+from msgflow.trace.ctf.clock import Clock
+from msgflow.trace.ctf.declarations import EventClass, MetadataError, StreamClass, TraceClass
+from msgflow.trace.ctf.resolve import resolved
+from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
+from msgflow.trace.ctf.tsdl_types import TypeParser, Value
+from msgflow.trace.ctf.types import (
+    CONTENT_SIZE_ROLE,
+    DISCARDED_ROLE,
+    END_ROLE,
+    EVENT_CLASS_ROLE,
+    MAGIC_ROLE,
+    PACKET_SIZE_ROLE,
+    SEQUENCE_ROLE,
+    STREAM_CLASS_ROLE,
+    STREAM_ROLE,
+    TIME_ROLE,
+    UUID_ROLE,
+    Array,
+    Choice,
+    Integer,
+    Member,
+    Scope,
+    Structure,
+    Type,
+    Variant,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_ROLES: Mapping[Scope, Mapping[str, str]] = {
+    Scope.PACKET_HEADER: {
+        "magic": MAGIC_ROLE,
+        "uuid": UUID_ROLE,
+        "stream_id": STREAM_CLASS_ROLE,
+        "stream_instance_id": STREAM_ROLE,
+    },
+    Scope.PACKET_CONTEXT: {
+        "timestamp_begin": TIME_ROLE,
+        "timestamp_end": END_ROLE,
+        "content_size": CONTENT_SIZE_ROLE,
+        "packet_size": PACKET_SIZE_ROLE,
+        "packet_seq_num": SEQUENCE_ROLE,
+        "events_discarded": DISCARDED_ROLE,
+    },
+    Scope.EVENT_HEADER: {"id": EVENT_CLASS_ROLE, "timestamp": TIME_ROLE},
+}
+_SCOPES = {
+    "packet.header": Scope.PACKET_HEADER,
+    "packet.context": Scope.PACKET_CONTEXT,
+    "event.header": Scope.EVENT_HEADER,
+    "event.context": Scope.EVENT_CONTEXT,
+    "context": Scope.SPECIFIC_CONTEXT,
+    "fields": Scope.PAYLOAD,
+}
+
+
+@dataclass
+class _Block:
+    """A `trace`, `stream`, `event`, `clock` or `env` block."""
+
+    values: dict[str, Value] = field(default_factory=dict)
+    structures: dict[Scope, Structure] = field(default_factory=dict)
+
+    def integer(self, name: str, default: int) -> int:
+        value = self.values.get(name, default)
+        if not isinstance(value, int):
+            raise MetadataError(f"`{name}` is no number")
+        return value
+
+
+def parse(text: str) -> TraceClass:
+    """Parse metadata.
+
+    Raises:
+        MetadataError: the text is not TSDL, or contradicts itself.
+    """
+    tokens = tokens_of(text)
+    blocks = _Blocks(tokens)
+    blocks.parse()
+    return _trace_class(blocks)
+
+
+class _Blocks:
+    """The blocks of a text, in the order of their appearance."""
+
+    def __init__(self, tokens: list[Token]) -> None:
+        self.trace: _Block | None = None
+        self.environment: dict[str, Value] = {}
+        self.clocks: list[_Block] = []
+        self.streams: list[_Block] = []
+        self.events: list[_Block] = []
+        self._tokens = TokenStream(tokens)
+        self._types = TypeParser(self._tokens, _is_big_endian(tokens))
+
+    def parse(self) -> None:
+        tokens = self._tokens
+        while tokens.token.kind != "end":
+            if self._types.at_declaration():
+                self._types.declaration()
+                continue
+            kind = tokens.name()
+            block = self._block()
+            tokens.expect(";")
+            if kind == "trace":
+                self.trace = block
+            elif kind == "env":
+                self.environment.update(block.values)
+            elif kind == "clock":
+                self.clocks.append(block)
+            elif kind == "stream":
+                self.streams.append(block)
+            elif kind == "event":
+                self.events.append(block)
+            elif kind != "callsite":
+                raise tokens.error(f"there is no block {kind!r}")
+
+    def _block(self) -> _Block:
+        tokens = self._tokens
+        block = _Block()
+        self._types.open_block()
+        while tokens.token.value != "}":
+            if self._types.at_declaration():
+                self._types.declaration()
+                continue
+            name = str(self._types.value())
+            if tokens.take_if(":="):
+                if name not in _SCOPES:
+                    raise tokens.error(f"there is no structure {name!r}")
+                block.structures[_SCOPES[name]] = self._types.structure()
+            else:
+                tokens.expect("=")
+                block.values[name] = self._types.value()
+            tokens.expect(";")
+        self._types.close_block()
+        return block
+
+
+def _is_big_endian(tokens: list[Token]) -> bool:
+    """Look for the trace's byte order, which holds for the types declared before it as well."""
+    depth, in_trace = 0, False
+    for token, after, value in zip(tokens, tokens[1:], tokens[2:], strict=False):
+        if depth == 0 and token.kind == "name":
+            in_trace = token.value == "trace"
+        depth += (token.value == "{") - (token.value == "}")
+        if depth == 1 and in_trace and token.value == "byte_order" and after.value == "=":
+            if value.value not in {"le", "be", "network"}:
+                raise MetadataError(f"line {value.line}: unknown byte order {value.value!r}")
+            return value.value != "le"
+    raise MetadataError("the trace's byte order is not declared")
+
+
+def _trace_class(blocks: _Blocks) -> TraceClass:
+    if blocks.trace is None:
+        raise MetadataError("there is no `trace` block")
+    outer = {Scope.PACKET_HEADER: Structure()}
+    _add(outer, blocks.trace, Scope.PACKET_HEADER)
+    clocks = {str(block.values.get("name", "")): _clock(block) for block in blocks.clocks}
+    only_clock = next(iter(clocks.values())) if len(clocks) == 1 else None
+    trace = TraceClass(
+        uuid=_uuid(blocks.trace),
+        environment=dict(blocks.environment),
+        packet_header=outer[Scope.PACKET_HEADER],
+    )
+    scopes: dict[int, dict[Scope, Structure]] = {}
+    # A trace may have a single stream that is not worth a block.
+    for block in blocks.streams or [_Block()]:
+        stream_scopes = dict(outer)
+        for scope in (Scope.PACKET_CONTEXT, Scope.EVENT_HEADER, Scope.EVENT_CONTEXT):
+            _add(stream_scopes, block, scope)
+        stream = StreamClass(
+            id=block.integer("id", 0),
+            packet_context=stream_scopes[Scope.PACKET_CONTEXT],
+            event_header=stream_scopes[Scope.EVENT_HEADER],
+            event_context=stream_scopes[Scope.EVENT_CONTEXT],
+            clock=_clock_of(stream_scopes, clocks) or only_clock,
+        )
+        if stream.id in trace.streams:
+            raise MetadataError(f"there are two streams {stream.id}")
+        trace.streams[stream.id] = stream
+        scopes[stream.id] = stream_scopes
+    for block in blocks.events:
+        stream_id = block.integer("stream_id", next(iter(trace.streams)))
+        if stream_id not in trace.streams:
+            raise MetadataError(f"there is no stream {stream_id}")
+        event_scopes = dict(scopes[stream_id])
+        for scope in (Scope.SPECIFIC_CONTEXT, Scope.PAYLOAD):
+            _add(event_scopes, block, scope)
+        event = EventClass(
+            id=block.integer("id", 0),
+            name=str(block.values.get("name", "")),
+            specific_context=event_scopes[Scope.SPECIFIC_CONTEXT],
+            payload=event_scopes[Scope.PAYLOAD],
+        )
+        if event.id in trace.streams[stream_id].events:
+            raise MetadataError(f"there are two events {event.id} in stream {stream_id}")
+        trace.streams[stream_id].events[event.id] = event
+    return trace
+
+
+def _add(scopes: dict[Scope, Structure], block: _Block, scope: Scope) -> None:
+    structure = resolved(block.structures.get(scope, Structure()), scope, scopes)
+    scopes[scope] = _with_roles(structure, _ROLES[scope]) if scope in _ROLES else structure
+
+
+def _with_roles(structure: Structure, roles: Mapping[str, str]) -> Structure:
+    """Give the fields of these names their role, in nested structures and variants too."""
+    members = tuple(
+        Member(member.name, _with_role(member.name, member.type, roles))
+        for member in structure.members
+    )
+    return Structure(members, structure.minimum_align)
+
+
+def _with_role(name: str, declared: Type, roles: Mapping[str, str]) -> Type:
+    match declared:
+        case Structure():
+            return _with_roles(declared, roles)
+        case Variant():
+            choices = tuple(
+                Choice(choice.name, _with_role("", choice.type, roles), choice.ranges)
+                for choice in declared.choices
+            )
+            return replace(declared, choices=choices)
+        case Integer() | Array() if name in roles:
+            return replace(declared, roles=declared.roles | {roles[name]})
+        case _:
+            return declared
+
+
+def _clock_of(scopes: Mapping[Scope, Structure], clocks: Mapping[str, Clock]) -> Clock | None:
+    """Return the clock to which a field of the packet context or event header is mapped."""
+    for scope in (Scope.EVENT_HEADER, Scope.PACKET_CONTEXT):
+        for name in _mapped_clocks(scopes[scope]):
+            if name in clocks:
+                return clocks[name]
+            raise MetadataError(f"there is no clock {name!r}")
+    return None
+
+
+def _mapped_clocks(declared: Type) -> list[str]:
+    match declared:
+        case Structure(members=members):
+            return [name for member in members for name in _mapped_clocks(member.type)]
+        case Variant(choices=choices):
+            return [name for choice in choices for name in _mapped_clocks(choice.type)]
+        case Integer(roles=roles):
+            return [role.partition(".")[2] for role in roles if role.startswith("clock.")]
+        case _:
+            return []
+
+
+def _clock(block: _Block) -> Clock:
+    frequency = block.integer("freq", Clock.frequency)
+    if frequency < 1:
+        raise MetadataError(f"a clock of {frequency} Hz makes no sense")
+    name = block.values.get("name")
+    return Clock(
+        frequency=frequency,
+        offset_seconds=block.integer("offset_s", 0),
+        offset_cycles=block.integer("offset", 0),
+        name=None if name is None else str(name),
+        uuid=_uuid(block),
+    )
+
+
+def _uuid(block: _Block) -> str | None:
+    value = block.values.get("uuid")
+    if value is None:
+        return None
+    try:
+        return str(UUID(str(value)))
+    except ValueError as error:
+        raise MetadataError(f"{value!r} is no uuid") from error

@@ -1,0 +1,205 @@
+"""The types of fields, whichever language the metadata is in. Sizes and alignments are in bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+MAGIC_ROLE = "packet-magic-number"
+UUID_ROLE = "metadata-stream-uuid"
+STREAM_CLASS_ROLE = "data-stream-class-id"
+STREAM_ROLE = "data-stream-id"
+PACKET_SIZE_ROLE = "packet-total-length"
+CONTENT_SIZE_ROLE = "packet-content-length"
+TIME_ROLE = "default-clock-timestamp"
+END_ROLE = "packet-end-default-clock-timestamp"
+DISCARDED_ROLE = "discarded-event-record-counter-snapshot"
+SEQUENCE_ROLE = "packet-sequence-number"
+EVENT_CLASS_ROLE = "event-record-class-id"
+
+BYTE = 8
+
+
+class Scope(IntEnum):
+    """The structures of a packet and an event, in the order of the stream."""
+
+    PACKET_HEADER = 0
+    PACKET_CONTEXT = 1
+    EVENT_HEADER = 2
+    EVENT_CONTEXT = 3
+    SPECIFIC_CONTEXT = 4
+    PAYLOAD = 5
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where a length or a selector is found.
+
+    Attributes:
+        scope: the path starts at this structure; None: at the innermost structure around that
+            has a member of the path's first name.
+        path: names of members; None is the structure around the current one.
+    """
+
+    scope: Scope | None
+    path: tuple[str | None, ...]
+
+
+@dataclass(frozen=True)
+class Integer:
+    """An integer, enumeration, boolean or bit array of at most 64 bits.
+
+    Attributes:
+        labels: of an enumeration, label to ranges of values (both ends belong to it).
+        is_text: an array of these is text.
+        roles: what the value is for.
+        arrow: 'integer', 'bool' or 'bits': what the value is shown as.
+        base: the base in which to show it.
+    """
+
+    size: int
+    align: int
+    big_endian: bool
+    signed: bool = False
+    labels: Mapping[str, tuple[tuple[int, int], ...]] | None = None
+    is_text: bool = False
+    roles: frozenset[str] = frozenset()
+    arrow: str = "integer"
+    base: int = 10
+
+
+@dataclass(frozen=True)
+class VariableInteger:
+    """An integer in groups of seven bits (LEB128)."""
+
+    signed: bool
+    labels: Mapping[str, tuple[tuple[int, int], ...]] | None = None
+    roles: frozenset[str] = frozenset()
+    align: int = BYTE
+
+
+@dataclass(frozen=True)
+class Real:
+    """An IEEE 754 number of 32 or 64 bits."""
+
+    size: int
+    align: int
+    big_endian: bool
+
+
+@dataclass(frozen=True)
+class String:
+    """Text up to a NUL."""
+
+    align: int = BYTE
+
+
+@dataclass(frozen=True)
+class Array:
+    """A fixed number of elements."""
+
+    element: Type
+    length: int
+    minimum_align: int = 1
+    roles: frozenset[str] = frozenset()
+
+    @property
+    def align(self) -> int:
+        """That of the element, even when there is none."""
+        return max(self.minimum_align, self.element.align)
+
+    @property
+    def is_text(self) -> bool:
+        """The elements are characters."""
+        return is_character(self.element)
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """As many elements as another field says."""
+
+    element: Type
+    length: Reference
+    minimum_align: int = 1
+
+    @property
+    def align(self) -> int:
+        """That of the element, even when there is none."""
+        return max(self.minimum_align, self.element.align)
+
+    @property
+    def is_text(self) -> bool:
+        """The elements are characters."""
+        return is_character(self.element)
+
+
+@dataclass(frozen=True)
+class Member:
+    """A named field of a structure."""
+
+    name: str
+    type: Type
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Fields one after the other."""
+
+    members: tuple[Member, ...] = ()
+    minimum_align: int = 1
+    align: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        aligns = (member.type.align for member in self.members)
+        object.__setattr__(self, "align", max(self.minimum_align, *aligns, 1))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One option of a variant, for selector values in any of the ranges."""
+
+    name: str
+    type: Type
+    ranges: tuple[tuple[int, int], ...]
+
+    def holds(self, value: int) -> bool:
+        """Tell whether this selector value chooses the option."""
+        return any(first <= value <= last for first, last in self.ranges)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One of several types, as a selector says; it has no alignment of its own."""
+
+    selector: Reference
+    choices: tuple[Choice, ...]
+    align: int = 1
+
+
+@dataclass(frozen=True)
+class Optional:
+    """A field that is there if the selector has one of these values."""
+
+    selector: Reference
+    content: Type
+    ranges: tuple[tuple[int, int], ...]
+    align: int = 1
+
+
+Type = Integer | VariableInteger | Real | String | Array | Sequence | Structure | Variant | Optional
+
+
+def is_character(element: Type) -> bool:
+    """Tell whether an array of this element is text."""
+    return (
+        isinstance(element, Integer) and element.is_text and element.size == BYTE == element.align
+    )
+
+
+def aligned(position: int, align: int) -> int:
+    """Return the first multiple of `align` (a power of two) at or after the position."""
+    return (position + align - 1) & -align

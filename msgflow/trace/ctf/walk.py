@@ -1,0 +1,250 @@
+"""Reads fields of any type one by one: slow, and right for every layout."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Any
+
+from msgflow.trace.ctf.types import (
+    BYTE,
+    TIME_ROLE,
+    Array,
+    Integer,
+    Optional,
+    Real,
+    Reference,
+    Scope,
+    Sequence,
+    String,
+    Structure,
+    Type,
+    VariableInteger,
+    Variant,
+    aligned,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+_MOST_EMPTY_ELEMENTS = 1 << 16
+_MOST_VARIABLE_BYTES = 10
+
+
+class FieldError(Exception):
+    """A field cannot be read; the message says why."""
+
+
+class Walker:
+    """Reads the fields of one packet.
+
+    Attributes:
+        position: of the next field, in bits from the begin of the packet.
+        found: role to the value found last, for fields that have a role.
+        time_bits: size of the clock value found last.
+    """
+
+    def __init__(self, data: bytes | memoryview, end: int) -> None:
+        """Read from `data`, which begins with the packet, up to the bit `end`."""
+        self.position = 0
+        self.found: dict[str, Any] = {}
+        self.time_bits = 64
+        self._data = data
+        self._end = min(end, len(data) * BYTE)
+        self._scopes: dict[Scope, dict[str, Any]] = {}
+        self._frames: list[dict[str, Any]] = []
+        self._readers: dict[type, Callable[[Any], Any]] = {
+            Integer: self._integer,
+            VariableInteger: self._variable_integer,
+            Real: self._real,
+            String: self._string,
+            Array: self._array,
+            Sequence: self._sequence,
+            Structure: self._structure,
+            Variant: self._variant,
+            Optional: self._optional,
+        }
+
+    def read_scope(self, scope: Scope, structure: Structure) -> dict[str, Any]:
+        """Read one of the structures of a packet or event.
+
+        Raises:
+            FieldError: it does not fit or makes no sense.
+        """
+        if scope is Scope.EVENT_HEADER:
+            for inner in (Scope.EVENT_CONTEXT, Scope.SPECIFIC_CONTEXT, Scope.PAYLOAD):
+                self._scopes.pop(inner, None)
+        values: dict[str, Any] = {}
+        self._scopes[scope] = values
+        self._frames = [self._scopes[outer] for outer in sorted(self._scopes) if outer < scope]
+        self._fill(structure, values)
+        return values
+
+    def _read(self, field_type: Type) -> Any:
+        return self._readers[type(field_type)](field_type)
+
+    def _take(self, size: int, align: int = 1) -> int:
+        """Return the position of so many bits and go on behind them."""
+        begin = aligned(self.position, align)
+        if begin + size > self._end:
+            raise FieldError("a field goes beyond the end of the packet")
+        self.position = begin + size
+        return begin
+
+    def _bits(self, size: int, align: int, big_endian: bool) -> int:
+        begin = self._take(size, align)
+        first, last = begin // BYTE, (begin + size + BYTE - 1) // BYTE
+        content = bytes(self._data[first:last])
+        if big_endian:
+            shift = last * BYTE - begin - size
+            return int.from_bytes(content, "big") >> shift & ((1 << size) - 1)
+        return int.from_bytes(content, "little") >> (begin - first * BYTE) & ((1 << size) - 1)
+
+    def _integer(self, field_type: Integer) -> int | bool:
+        size = field_type.size
+        value = self._bits(size, field_type.align, field_type.big_endian)
+        if field_type.signed and value >> (size - 1):
+            value -= 1 << size
+        for role in field_type.roles:
+            self.found[role] = value
+            if role == TIME_ROLE:
+                self.time_bits = size
+        return bool(value) if field_type.arrow == "bool" else value
+
+    def _variable_integer(self, field_type: VariableInteger) -> int:
+        value = 0
+        for number in range(_MOST_VARIABLE_BYTES):
+            byte = self._bits(BYTE, BYTE, False)
+            value |= (byte & 0x7F) << (7 * number)
+            if not byte & 0x80:
+                break
+        else:
+            raise FieldError("an integer of variable length does not end")
+        if field_type.signed and byte & 0x40:
+            value -= 1 << (7 * (number + 1))
+        for role in field_type.roles:
+            self.found[role] = value
+            if role == TIME_ROLE:
+                self.time_bits = 64
+        return value
+
+    def _real(self, field_type: Real) -> float:
+        bits = self._bits(field_type.size, field_type.align, field_type.big_endian)
+        codes = ("<I", "<f") if field_type.size == 32 else ("<Q", "<d")
+        return float(struct.unpack(codes[1], struct.pack(codes[0], bits))[0])
+
+    def _string(self, field_type: String) -> str:
+        begin = self._take(0, field_type.align) // BYTE
+        content = bytes(self._data[begin : self._end // BYTE])
+        length = content.find(b"\0")
+        if length < 0:
+            raise FieldError("a text does not end within the packet")
+        self.position = (begin + length + 1) * BYTE
+        return content[:length].decode("utf-8", "replace")
+
+    def _array(self, field_type: Array) -> Any:
+        return self._elements(field_type, field_type.length)
+
+    def _sequence(self, field_type: Sequence) -> Any:
+        length = self._look_up(field_type.length)
+        if not isinstance(length, int) or length < 0:
+            raise FieldError("the length of a sequence is no length")
+        return self._elements(field_type, length)
+
+    def _elements(self, field_type: Array | Sequence, length: int) -> Any:
+        element = field_type.element
+        begin = self._take(0, field_type.align)
+        smallest = _smallest_size(element)
+        if length > ((self._end - begin) // smallest if smallest else _MOST_EMPTY_ELEMENTS):
+            raise FieldError(f"{length} elements do not fit into the packet")
+        if field_type.is_text:
+            self.position = begin + length * BYTE
+            content = bytes(self._data[begin // BYTE : self.position // BYTE])
+            return content.partition(b"\0")[0].decode("utf-8", "replace")
+        elements = [self._read(element) for _ in range(length)]
+        if isinstance(field_type, Array):
+            for role in field_type.roles:
+                self.found[role] = bytes(elements)
+        return elements
+
+    def _structure(self, field_type: Structure) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        self._fill(field_type, values)
+        return values
+
+    def _fill(self, field_type: Structure, values: dict[str, Any]) -> None:
+        """Read a structure into `values`, which its own members can look up meanwhile."""
+        self._take(0, field_type.align)
+        self._frames.append(values)
+        for member in field_type.members:
+            if isinstance(member.type, Structure):
+                inner: dict[str, Any] = {}
+                values[member.name] = inner
+                self._fill(member.type, inner)
+            else:
+                values[member.name] = self._read(member.type)
+        self._frames.pop()
+
+    def _variant(self, field_type: Variant) -> dict[str, Any]:
+        value = self._look_up(field_type.selector)
+        for choice in field_type.choices:
+            if choice.holds(value):
+                return {choice.name: self._read(choice.type)}
+        raise FieldError(f"a variant has no option for the value {value}")
+
+    def _optional(self, field_type: Optional) -> Any:
+        value = self._look_up(field_type.selector)
+        if any(first <= value <= last for first, last in field_type.ranges):
+            return self._read(field_type.content)
+        return None
+
+    def _look_up(self, reference: Reference) -> int:
+        value = None
+        if reference.scope is not None:
+            value = _follow(self._scopes.get(reference.scope), reference.path)
+        if value is None:
+            path = list(reference.path)
+            level = len(self._frames) - 1
+            while path and path[0] is None:
+                level -= 1
+                path.pop(0)
+            for frame in reversed(self._frames[: level + 1]):
+                # An absolute path through an array ends in the element that is being read.
+                value = _follow(frame, path if reference.scope is None else path[-1:])
+                if value is not None:
+                    break
+        if not isinstance(value, int):
+            raise FieldError(f"there is no field {'.'.join(map(str, reference.path))}")
+        return value
+
+
+def _follow(value: Any, path: Iterable[str | None]) -> Any:
+    for name in path:
+        value = _member_of(value, name)
+    return value
+
+
+def _member_of(value: Any, name: str | None) -> Any:
+    """Return a member of a structure, or of the one that a variant holds."""
+    if not isinstance(value, dict):
+        return None
+    if name in value:
+        return value[name]
+    for inner in value.values():
+        if isinstance(inner, dict) and name in inner:
+            return inner[name]
+    return None
+
+
+def _smallest_size(field_type: Type) -> int:
+    """Return the fewest bits that a field of this type takes."""
+    match field_type:
+        case Integer(size=size) | Real(size=size):
+            return size
+        case String() | VariableInteger():
+            return BYTE
+        case Array(element=element, length=length):
+            return length * _smallest_size(element)
+        case Structure(members=members):
+            return sum(_smallest_size(member.type) for member in members)
+        case _:
+            return 0

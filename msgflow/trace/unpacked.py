@@ -1,0 +1,135 @@
+"""Traces in archives: unpacked to a temporary directory, shown as lying in the archive."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import shutil
+import tempfile
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError
+from msgflow.trace.archive import is_archive
+from msgflow.trace.reader import DEFAULT_BATCH_ROWS, TraceSet
+from msgflow.trace.unpack import unpack
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+
+    import pyarrow as pa
+
+    from msgflow.trace.model import EventBatch, Progress
+
+_PREFIX = "msgflow-"
+
+
+class Unpacked:
+    """Directories in place of archives, in the temporary directory (TMPDIR).
+
+    They are gone after `remove`, or when nobody holds this any more.
+
+    Attributes:
+        paths: the paths given, archives replaced by the directories they were unpacked to.
+    """
+
+    def __init__(self, paths: Sequence[str | Path]) -> None:
+        """Unpack all archives among `paths`.
+
+        Raises:
+            TraceError: an archive cannot be unpacked.
+        """
+        self._archives: dict[Path, Path] = {}
+        try:
+            self._root = Path(tempfile.mkdtemp(prefix=_PREFIX)).resolve()
+        except OSError as error:
+            raise TraceError(
+                f"no temporary directory to unpack the archive to — {error}",
+                hint="TMPDIR=DIRECTORY msgflow … unpacks it elsewhere",
+            ) from error
+        self.remove = weakref.finalize(self, shutil.rmtree, self._root, ignore_errors=True)
+        try:
+            self.paths = [self._unpacked(Path(path)) for path in paths]
+        except BaseException:
+            self.remove()
+            raise
+
+    def shown(self, path: Path) -> Path:
+        """Return the path that a user knows: that of the archive, then that inside."""
+        for directory, archive in self._archives.items():
+            if path.is_relative_to(directory):
+                return archive / path.relative_to(directory)
+        return path
+
+    @contextlib.contextmanager
+    def explained(self) -> Iterator[None]:
+        """Let errors name what the user knows."""
+        try:
+            yield
+        except TraceError as error:
+            hint = None if error.hint is None else self._translated(error.hint)
+            raise TraceError(self._translated(error.message), hint) from error
+
+    def _unpacked(self, path: Path) -> Path:
+        if not is_archive(path):
+            return path
+        archive = path.resolve()
+        for directory, known in self._archives.items():
+            if known == archive:
+                return directory
+        directory = self._root / str(len(self._archives))
+        directory.mkdir()
+        self._archives[directory] = archive
+        unpack(archive, directory)
+        return directory
+
+    def _translated(self, text: str) -> str:
+        for directory, archive in self._archives.items():
+            text = text.replace(str(directory), str(archive))
+        return text
+
+
+class UnpackedTraceSet(TraceSet):
+    """A trace set some of whose traces lie in archives."""
+
+    def __init__(self, traces: TraceSet, unpacked: Unpacked) -> None:
+        """Take over both; closing this set closes the other one and removes what was unpacked."""
+        self._traces = traces
+        self._unpacked = unpacked
+        self.traces = tuple(
+            dataclasses.replace(info, path=unpacked.shown(info.path)) for info in traces.traces
+        )
+        self._take_over()
+
+    def batches(
+        self,
+        wanted: Mapping[str, pa.Schema | None] | None = None,
+        *,
+        progress: Callable[[Progress], None] | None = None,
+        batch_rows: int = DEFAULT_BATCH_ROWS,
+    ) -> Iterator[EventBatch]:
+        """Read everything once; see `TraceSet.batches`."""
+        return self._explained(
+            self._traces.batches(wanted, progress=progress, batch_rows=batch_rows)
+        )
+
+    def close(self) -> None:
+        """Close the set and remove what was unpacked."""
+        self._traces.close()
+        self._unpacked.remove()
+
+    def _explained(self, batches: Iterator[EventBatch]) -> Generator[EventBatch, None, None]:
+        try:
+            with self._unpacked.explained():
+                yield from batches
+        finally:
+            self._take_over()
+
+    def _take_over(self) -> None:
+        self.event_counts = self._traces.event_counts
+        self.duplicate_packet_count = self._traces.duplicate_packet_count
+        self.damages = [
+            dataclasses.replace(damage, file=self._unpacked.shown(damage.file))
+            for damage in self._traces.damages
+        ]

@@ -1,0 +1,118 @@
+"""Items made ahead of their use: the same items, the same errors, no thread left behind."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ctf_writer import Event, Packet, TraceContent, write_trace
+
+import msgflow.trace
+from msgflow.trace.ctf import iteration, order
+from msgflow.trace.ctf.prefetch import Prefetch
+
+
+def reading_threads() -> int:
+    return sum(thread.name == "msgflow-reader" for thread in threading.enumerate())
+
+
+def test_all_items_in_order() -> None:
+    prefetch = Prefetch(lambda: iter(range(1000)), 3)
+    assert list(prefetch.items()) == list(range(1000))
+    prefetch.close()
+    assert reading_threads() == 0
+
+
+def test_error_comes_after_the_items_before_it() -> None:
+    def make() -> Iterator[int]:
+        yield 1
+        raise KeyError("gone")
+
+    prefetch = Prefetch(make, 1)
+    items = prefetch.items()
+    assert next(items) == 1
+    with pytest.raises(KeyError, match="gone"):
+        next(items)
+    prefetch.close()
+
+
+def test_no_more_than_allowed_are_made_ahead() -> None:
+    made = []
+
+    def make() -> Iterator[int]:
+        for n in range(100):
+            made.append(n)
+            yield n
+
+    prefetch = Prefetch(make, 2)
+    items = prefetch.items()
+    next(items)
+    time.sleep(0.3)
+    # One taken, two waiting, one in hand.
+    assert len(made) == 4
+    prefetch.close()
+
+
+def test_closing_ends_the_iterator() -> None:
+    closed = threading.Event()
+
+    def make() -> Iterator[int]:
+        try:
+            while True:
+                yield 0
+        finally:
+            closed.set()
+
+    prefetch = Prefetch(make, 1)
+    next(prefetch.items())
+    prefetch.close()
+    assert closed.is_set()
+    assert reading_threads() == 0
+
+
+class TestReading:
+    @pytest.fixture
+    def trace(self, tmp_path: Path) -> Path:
+        packets = [Packet([Event(t + n, "ros2:x") for n in range(50)]) for t in range(0, 9999, 50)]
+        return write_trace(tmp_path / "trace", TraceContent({"ros2:x": {}}, {0: packets}))
+
+    def test_breaking_off_leaves_no_thread(self, trace: Path) -> None:
+        with msgflow.trace.open([trace]) as traces:
+            for _ in traces.batches(batch_rows=1):
+                break
+        assert reading_threads() == 0
+
+    def test_interrupt_leaves_no_thread(self, trace: Path) -> None:
+        def interrupted() -> None:
+            for _ in traces.batches(batch_rows=1):
+                raise KeyboardInterrupt
+
+        with msgflow.trace.open([trace]) as traces:
+            with pytest.raises(KeyboardInterrupt):
+                interrupted()
+            assert reading_threads() == 0
+            assert sum(1 for _ in traces.batches()) > 0
+
+    def test_memory_of_a_batch_is_left_alone(
+        self, trace: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """While it is in use, the next ones are loaded elsewhere."""
+        monkeypatch.setattr(iteration, "_SMALLEST_BATCH", 1000)
+        in_use: list[tuple[order.Batch, bytes]] = []
+        with msgflow.trace.open([trace]) as traces:
+            events = iteration.Iteration._events
+
+            def slowly(self: Any, batch: order.Batch) -> Iterator[Any]:
+                before = bytes(batch.memory.data)
+                yield from events(self, batch)
+                time.sleep(0.002)
+                in_use.append((batch, before))
+                assert bytes(batch.memory.data) == before
+
+            monkeypatch.setattr(iteration.Iteration, "_events", slowly)
+            list(traces.batches(batch_rows=4))
+        assert len(in_use) > 10

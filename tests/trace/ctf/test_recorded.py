@@ -1,0 +1,53 @@
+"""Recorded traces: the same as through bt2, and the same again as CTF 2."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ctf2_metadata import translate
+from same_batches import differences, read
+
+from msgflow.ingest import catalogue
+from msgflow.trace import discover
+
+RECORDED = (
+    "tracecompass-ros2",
+    "sync_1_1",
+    "sync_1_1_humble",
+    "sync_1_1_jazzy",
+    "pingpong",
+    "periodic_async_jazzy24",
+    "partial_sync",
+    "services",
+)
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_as_bt2(shared_traces: Path, bt2_bindings: Any, name: str) -> None:
+    path = shared_traces / name
+    ours = read(path)
+    assert not ours.damages
+    assert not differences(ours, read(path, reader="bt2"))
+
+
+@pytest.mark.parametrize("name", ["tracecompass-ros2", "pingpong"])
+def test_wanted_columns_as_bt2(shared_traces: Path, bt2_bindings: Any, name: str) -> None:
+    wanted = catalogue.load().arrow_schemas()
+    path = shared_traces / name
+    ours = read(path, wanted=wanted, batch_rows=5000)
+    assert not differences(ours, read(path, reader="bt2", wanted=wanted))
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_as_ctf2(shared_traces: Path, copy_of: Callable[[str], Path], name: str) -> None:
+    copy = copy_of(name)
+    for location in discover([copy]):
+        translate(location.path)
+    original, translated = read(shared_traces / name), read(copy)
+    for one, other in zip(original.traces, translated.traces, strict=True):
+        assert dataclasses.replace(one, path=other.path) == other
+    assert not differences(dataclasses.replace(original, traces=translated.traces), translated)
