@@ -1,6 +1,6 @@
 # `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
-# is installed into .venv, except what only the distribution has (python3-venv, python3-bt2), which
-# apt installs where that is allowed.
+# is installed into .venv, except what only the distribution has: python3-venv, and Babeltrace 2 for
+# the tests that compare with it. apt installs these where that is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -17,25 +17,29 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test bt2 clean
+.PHONY: help demo test bench babeltrace clean
 
 help:
 	@echo 'make demo   simulate a robot, ingest its trace, print end-to-end latency'
 	@echo 'make test   style, types, import contracts, tests'
+	@echo 'make bench  speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make clean  remove what these made'
 
-demo: $(VENV)/.installed bt2
+demo: $(VENV)/.installed
 	rm -rf $(DEMO)
 	$(BIN)/msgflow simulate demo $(DEMO)/trace
 	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb
 	$(BIN)/msgflow query e2e-latency --db $(DEMO)/msgflow.duckdb
 
-test: $(VENV)/.developed bt2
+test: $(VENV)/.developed babeltrace
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n auto
+
+bench: $(VENV)/.installed babeltrace
+	$(BIN)/python benchmarks/run.py
 
 $(VENV)/.made:
 	@$(APT); command -v $(PYTHON) >/dev/null 2>&1 || apt_install python3 python3-venv
@@ -53,9 +57,10 @@ $(VENV)/.developed: pyproject.toml $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable . --group dev
 	@touch $@ $(VENV)/.installed
 
-bt2:
-	@$(APT); $(HAS_BT2) || apt_install python3-bt2 || true
-	@$(HAS_BT2) || echo "note: no bt2 (Debian and Ubuntu: apt install python3-bt2): no trace can be read" >&2
+babeltrace:
+	@$(APT); { $(HAS_BT2) && command -v babeltrace2 >/dev/null; } \
+		|| apt_install python3-bt2 babeltrace2 || true
+	@$(HAS_BT2) || echo "note: no bt2: the tests that compare with Babeltrace 2 are skipped" >&2
 
 clean:
 	rm -rf $(VENV) $(DEMO)

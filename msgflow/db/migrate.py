@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.db import objects
 from msgflow.db.connection import (
@@ -23,7 +25,6 @@ from msgflow.resources import resource_directory
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    import duckdb
     from alembic.config import Config
     from sqlalchemy.engine import Connection
 
@@ -125,7 +126,8 @@ def _bring_to_head(con: duckdb.DuckDBPyConnection) -> None:
         objects.apply(con)
         con.commit()
     except BaseException:
-        con.rollback()
+        with suppress(duckdb.Error):  # an interrupted statement has ended the transaction
+            con.rollback()
         raise
 
 
@@ -141,7 +143,8 @@ def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
             derive(con, run_id)
         con.commit()
     except BaseException:
-        con.rollback()
+        with suppress(duckdb.Error):  # an interrupted statement has ended the transaction
+            con.rollback()
         raise
     return tuple(name for _, name in stale)
 

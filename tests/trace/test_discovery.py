@@ -89,8 +89,9 @@ def test_one_of_two_paths_without_a_trace(tmp_path: Path) -> None:
     [
         ("talk_0.mcap", "a rosbag2 recording", "messages are not traces"),
         ("talk_0.db3", "a rosbag2 recording", "messages are not traces"),
-        ("trace.tar.gz", "a compressed file", "^tar xf .*trace.tar.gz"),
-        ("trace.zip", "an archive", "^unzip .*trace.zip"),
+        ("trace.tar.bz2", "a compressed file", "^tar xf .*trace.tar.bz2"),
+        ("trace.7z", "an archive", "^tar xf .*trace.7z"),
+        ("trace.tar.gz", "a compressed file", "^msgflow ingest .*trace.tar.gz"),
         ("notes.txt", "a file of another kind", "ros2 trace"),
     ],
 )

@@ -106,9 +106,9 @@ class TestReading:
         with msgflow.trace.open([trace]) as traces:
             events = iteration.Iteration._events
 
-            def slowly(self: Any, batch: order.Batch) -> Iterator[Any]:
+            def slowly(self: Any, batch: order.Batch, number: int) -> Iterator[Any]:
                 before = bytes(batch.memory.data)
-                yield from events(self, batch)
+                yield from events(self, batch, number)
                 time.sleep(0.002)
                 in_use.append((batch, before))
                 assert bytes(batch.memory.data) == before
