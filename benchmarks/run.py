@@ -2,10 +2,10 @@
 
     python benchmarks/run.py [--events 10000000] [--memory-limit 640MB] [--bt2] [--markdown FILE]
 
-Simulates a pipeline of nodes, then measures in processes of their own: our reader alone (all columns
-of the catalogue, nothing kept), the whole ingest by stage, the query e2e-latency on the result, and
-`babeltrace2 -o dummy`, which decodes and does nothing; `--bt2` adds Babeltrace's Python bindings.
-Seconds of different machines and days cannot be compared, ratios of one run can.
+Simulates a pipeline of nodes, then measures in processes of their own: our reader alone (all the
+columns of the catalogue, nothing kept), the whole ingest by stage, the query e2e-latency on the
+result, and `babeltrace2 -o dummy`, which decodes and does nothing. `--bt2` adds Babeltrace's Python
+bindings. Seconds of different machines and days cannot be compared, ratios of one run can.
 """
 
 from __future__ import annotations

@@ -18,7 +18,8 @@ import duckdb
 
 from msgflow.errors import UsageError
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Tracepoint, load
-from msgflow.trace import PACKET, Progress, TraceInfo, TraceSet
+from msgflow.ingest.inserter import Inserter
+from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -54,6 +55,9 @@ CREATE TABLE staging.damage (
     trace_index INTEGER, file VARCHAR, position BIGINT, byte_offset BIGINT, message VARCHAR
 )
 """
+
+# Rows that wait for a commit take memory that nothing limits.
+_ROWS_PER_TRANSACTION = 2_000_000
 
 # Packets of the target database that the packets just read are the same as.
 _SAME_PACKETS = """
@@ -146,20 +150,38 @@ def load_traces(
         if progress is not None:
             progress(state, time.monotonic() - started)
 
+    pending = 0
+
+    def insert(item: EventBatch) -> None:
+        nonlocal pending
+        if item.name == PACKET:
+            replaced.update(_same_packets(con, item.batch, replace))
+            _insert(con, "raw.packet", item.batch)
+        else:
+            _insert(con, f"raw.{tracepoints[item.name].table}", item.batch)
+        pending += item.batch.num_rows
+        if pending >= _ROWS_PER_TRANSACTION:
+            con.commit()
+            con.begin()
+            pending = 0
+
+    # What is staged is written once and read a few times: compressing it costs more than it saves.
+    con.execute("SET force_compression = 'uncompressed'")
+    con.execute("SET wal_autocheckpoint = '1TB'")
     con.begin()
     try:
-        for item in traces.batches(wanted, progress=report):
-            interrupts.check()
-            if item.name == PACKET:
-                replaced |= _same_packets(con, item.batch, replace)
-                _insert(con, "raw.packet", item.batch)
-            else:
-                _insert(con, f"raw.{tracepoints[item.name].table}", item.batch)
+        with Inserter(insert) as inserter:
+            for item in traces.batches(wanted, progress=report):
+                interrupts.check()
+                inserter.put(item)
         con.commit()
     except BaseException:
         with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
             con.rollback()
         raise
+    finally:
+        con.execute("RESET force_compression")
+        con.execute("RESET wal_autocheckpoint")
     for (trace_index, name), count in traces.event_counts.items():
         con.execute(
             "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",

@@ -16,7 +16,7 @@ SELECT
     e.handle AS callback_handle,
     e.kind = 'callback_start' AS is_start,
     coalesce(e.value = 1, false) AS is_intra_process,
-    CASE WHEN g.event_id IS DISTINCT FROM e.event_id THEN e.previous.event_id END
+    CASE WHEN g.event_id IS DISTINCT FROM e.event_id THEN e.previous_event_id END
         AS previous_event_id,
     coalesce(g.segment, 0) AS segment
 FROM staging.thread_event AS e

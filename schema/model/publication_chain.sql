@@ -8,37 +8,37 @@
 WITH write_first AS (
     SELECT d.event_id
     FROM staging.thread_event AS d
-    JOIN staging.thread_event AS p ON d.event_id = p.previous.event_id AND d.handle = p.handle
-    WHERE d.kind = 'dds' AND d.message IS NULL AND d.previous.kind = 'rmw'
-        AND p.kind = 'dds_data'
+    JOIN staging.thread_event AS p ON d.event_id = p.previous_event_id
+    WHERE d.kind = 'dds' AND d.is_same_message IS NULL AND d.previous_kind = 'rmw'
+        AND p.kind = 'dds_data' AND p.is_same_handle
 ),
 layer AS (
     SELECT
-        e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.kind, e.handle, e.message, e.value,
-        e.previous.event_id AS previous_event_id,
+        e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.kind, e.handle, e.value,
+        e.previous_event_id,
         coalesce(
-            e.previous.kind IN ('intra', 'enqueue') AND e.kind = 'rclcpp' AND g.event_id IS NULL,
+            e.previous_kind IN ('intra', 'enqueue') AND e.kind = 'rclcpp' AND g.event_id IS NULL,
             false
         ) AS follows_intra,
         coalesce(CASE
             WHEN g.event_id IS NOT NULL THEN false
-            WHEN e.kind = 'enqueue' THEN e.previous.kind IN ('intra', 'enqueue')
-            WHEN e.kind = 'rcl' THEN e.previous.kind = 'rclcpp' AND e.previous.message = e.message
+            WHEN e.kind = 'enqueue' THEN e.previous_kind IN ('intra', 'enqueue')
+            WHEN e.kind = 'rcl' THEN e.previous_kind = 'rclcpp' AND e.is_same_message
             WHEN e.kind = 'rmw' THEN
-                e.previous.kind IN ('rclcpp', 'rcl') AND e.previous.message = e.message
+                e.previous_kind IN ('rclcpp', 'rcl') AND e.is_same_message
             WHEN e.kind = 'dds_data' THEN
-                (e.previous.kind = 'rmw' AND e.previous.message = e.message)
-                OR (e.previous.kind = 'dds' AND e.previous.handle = e.handle)
+                (e.previous_kind = 'rmw' AND e.is_same_message)
+                OR (e.previous_kind = 'dds' AND e.is_same_handle)
             WHEN e.kind = 'dds' THEN
-                (e.previous.kind = 'dds_data' AND e.previous.handle = e.handle)
+                (e.previous_kind = 'dds_data' AND e.is_same_handle)
                 OR (
-                    e.previous.kind = 'rmw'
-                    AND (e.previous.message = e.message OR w.event_id IS NOT NULL)
+                    e.previous_kind = 'rmw'
+                    AND (e.is_same_message OR w.event_id IS NOT NULL)
                 )
             WHEN e.kind = 'caret_write' THEN
-                e.previous.kind IN ('rclcpp', 'rcl', 'rmw') AND e.previous.message = e.message
+                e.previous_kind IN ('rclcpp', 'rcl', 'rmw') AND e.is_same_message
             WHEN e.kind IN ('caret_copy', 'caret_stamp') THEN
-                e.previous.kind IN ('rcl', 'rmw', 'caret_write', 'caret_copy')
+                e.previous_kind IN ('rcl', 'rmw', 'caret_write', 'caret_copy')
             ELSE false
         END, false) AS continues
     FROM staging.thread_event AS e

@@ -11,16 +11,16 @@ WITH layer AS (
         coalesce(CASE
             WHEN g.event_id IS NOT NULL THEN false
             WHEN e.kind IN ('rmw_take', 'rmw_take_failed') THEN
-                e.previous.kind = 'dds_read' AND e.previous.message = e.message
+                e.previous_kind = 'dds_read' AND e.is_same_message
             WHEN e.kind = 'rcl_take' THEN
-                e.previous.kind IN ('rmw_take', 'rmw_take_failed')
-                AND e.previous.message = e.message
+                e.previous_kind IN ('rmw_take', 'rmw_take_failed')
+                AND e.is_same_message
             WHEN e.kind = 'rclcpp_take' THEN
-                e.previous.kind IN ('rmw_take', 'rmw_take_failed', 'rcl_take')
-                AND e.previous.message = e.message
+                e.previous_kind IN ('rmw_take', 'rmw_take_failed', 'rcl_take')
+                AND e.is_same_message
             WHEN e.kind = 'caret_take' THEN
-                e.previous.kind IN ('rmw_take', 'rcl_take', 'rclcpp_take')
-                AND e.previous.message = e.message
+                e.previous_kind IN ('rmw_take', 'rcl_take', 'rclcpp_take')
+                AND e.is_same_message
             ELSE false
         END, false) AS continues
     FROM staging.thread_event AS e

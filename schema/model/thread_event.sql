@@ -1,9 +1,9 @@
 -- name: staging.thread_event
--- description: What threads do at run time, executors apart: each event with `previous`, the one
---     directly before it on its thread. `handle` is the object, `message` the message that a layer
---     was called with, `value` the source stamp (of callback_start: is_intra_process).
---     Initialisation is left out, and so is every provider that may stand between two layers of
---     one call by accident.
+-- description: What threads do at run time, executors apart: each event with the one directly
+--     before it on its thread, and whether both are about the same object (`handle`) and were
+--     given the same message (NULL: not known). `value` is the source stamp (of callback_start:
+--     is_intra_process). Initialisation is left out, and so is every provider that may stand
+--     between two layers of one call by accident. Kept narrow: this is the largest table.
 -- grain: one row per run-time event of a thread
 -- needs: staging.context, raw
 WITH runtime AS (
@@ -171,10 +171,17 @@ SELECT
     thread_id,
     kind,
     handle,
-    message,
     value,
-    lag(
-        struct_pack(event_id := event_id, kind := kind, handle := handle, message := message)
-    ) OVER on_thread AS previous
-FROM located
-WINDOW on_thread AS (PARTITION BY thread_id ORDER BY event_id)
+    previous.event_id AS previous_event_id,
+    previous.kind AS previous_kind,
+    previous.handle = handle AS is_same_handle,
+    previous.message = message AS is_same_message
+FROM (
+    SELECT
+        event_id, ts_ns, trace_index, cpu_id, thread_id, kind, handle, message, value,
+        lag(
+            struct_pack(event_id := event_id, kind := kind, handle := handle, message := message)
+        ) OVER on_thread AS previous
+    FROM located
+    WINDOW on_thread AS (PARTITION BY thread_id ORDER BY event_id)
+)

@@ -1,0 +1,70 @@
+"""Inserts batches in a thread of its own, while the next ones are read."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+    from msgflow.trace import EventBatch
+
+_WAITING = 4
+_SECONDS_BETWEEN_LOOKS = 0.1
+
+
+class Inserter:
+    """A context manager that hands batches to `insert`, one after the other, in order.
+
+    Leaving it waits until all are inserted, or drops them when it is left by an exception. What
+    `insert` raises is raised by the next `put`, or on leaving.
+    """
+
+    def __init__(self, insert: Callable[[EventBatch], None]) -> None:
+        self._insert = insert
+        self._waiting: queue.Queue[EventBatch | None] = queue.Queue(_WAITING)
+        self._error: BaseException | None = None
+        self._is_dropping = False
+        self._thread = threading.Thread(target=self._work, name="insert batches")
+
+    def put(self, batch: EventBatch) -> None:
+        """Hand over a batch; waits while too many are waiting.
+
+        Raises:
+            BaseException: whatever inserting an earlier batch raised.
+        """
+        while True:
+            if self._error is not None:
+                raise self._error
+            try:
+                return self._waiting.put(batch, timeout=_SECONDS_BETWEEN_LOOKS)
+            except queue.Full:
+                continue
+
+    def __enter__(self) -> Inserter:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._is_dropping = kind is not None
+        self._waiting.put(None)
+        self._thread.join()
+        if kind is None and self._error is not None:
+            raise self._error
+
+    def _work(self) -> None:
+        while (batch := self._waiting.get()) is not None:
+            if self._is_dropping or self._error is not None:
+                continue
+            try:
+                self._insert(batch)
+            except BaseException as error:  # for the thread that reads
+                self._error = error
