@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import weakref
 from typing import TYPE_CHECKING
 
-from msgflow.errors import TraceError, UsageError
+from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.describe import describe, undeclared
 from msgflow.trace.ctf.entries import entries_of
@@ -15,11 +14,11 @@ from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.probe import begins_of
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.discovery import stream_files
+from msgflow.trace.exclusive import ExclusiveTraceSet
 from msgflow.trace.model import Damage
-from msgflow.trace.reader import DEFAULT_BATCH_ROWS, TraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Mapping, Sequence
     from pathlib import Path
 
     import pyarrow as pa
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from msgflow.trace.model import EventBatch, Progress, TraceInfo, TraceLocation
 
 
-class CtfTraceSet(TraceSet):
+class CtfTraceSet(ExclusiveTraceSet):
     """Traces read by msgflow itself."""
 
     def __init__(self, locations: Sequence[TraceLocation], *, strict: bool = False) -> None:
@@ -39,6 +38,7 @@ class CtfTraceSet(TraceSet):
         Raises:
             TraceError: a trace's metadata cannot be understood, or `strict` and it is damaged.
         """
+        super().__init__()
         self._strict = strict
         self._layouts: list[StreamLayout] = []
         self._streams: list[Stream] = []
@@ -49,40 +49,6 @@ class CtfTraceSet(TraceSet):
             self._open(location, index) for index, location in enumerate(locations)
         )
         self._found_early = list(self.damages)
-        self.event_counts: Mapping[tuple[int, str], int] = {}
-        self.duplicate_packet_count = 0
-        # Weak, so that an iteration which its consumer has dropped is over.
-        self._running: weakref.ref[Generator[EventBatch, None, None]] | None = None
-        self._closed = False
-
-    def batches(
-        self,
-        wanted: Mapping[str, pa.Schema | None] | None = None,
-        *,
-        progress: Callable[[Progress], None] | None = None,
-        batch_rows: int = DEFAULT_BATCH_ROWS,
-    ) -> Iterator[EventBatch]:
-        """Read everything once; see `TraceSet.batches`."""
-        if self._closed:
-            raise UsageError("the traces have been closed", hint="msgflow.trace.open(paths)")
-        if self._under_way() is not None:
-            raise UsageError(
-                "these traces are being read already", hint="open them a second time to read twice"
-            )
-        iteration = self._batches(wanted, progress, batch_rows)
-        self._running = weakref.ref(iteration)
-        return iteration
-
-    def close(self) -> None:
-        """End an iteration under way."""
-        self._closed = True
-        iteration = self._under_way()
-        if iteration is not None:
-            iteration.close()
-        self._running = None
-
-    def _under_way(self) -> Generator[EventBatch, None, None] | None:
-        return None if self._running is None else self._running()
 
     def _open(self, location: TraceLocation, index: int) -> TraceInfo:
         path = location.path
