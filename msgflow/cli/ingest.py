@@ -55,6 +55,15 @@ def command(
         bool,
         typer.Option("--strict", help="Refuse damaged traces, keep nothing"),
     ] = False,
+    memory_limit: Annotated[
+        str | None,
+        typer.Option(
+            "--memory-limit",
+            metavar="SIZE",
+            help="Most memory for the database, such as 2GB; more makes large traces faster",
+            show_default="grows with need",
+        ),
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only")] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -65,7 +74,10 @@ def command(
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
 
-        with Database(database) as opened, ingest_progress(quiet) as progress:
+        with (
+            Database(database, memory_limit=memory_limit) as opened,
+            ingest_progress(quiet) as progress,
+        ):
             report = opened.ingest(
                 traces,
                 name=name,

@@ -20,6 +20,7 @@ from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
 from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
+from msgflow.ingest.memory import Memory
 from msgflow.ingest.workspace import workspace
 from msgflow.query.interrupt import interruptible, noted_interrupts
 from msgflow.query.window import is_run_name
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 
     from msgflow.query.interrupt import Interrupts
     from msgflow.trace import Progress, TraceInfo
-
-# Enough for a run of any size: what does not fit goes to the workspace on disk.
-DEFAULT_MEMORY_LIMIT = "640MB"
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,8 @@ def ingest(
         reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
         strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
-        memory_limit: most memory that the database takes, such as '4GB'.
+        memory_limit: most memory that the database takes, such as '4GB'; when None it starts small
+            and grows where a statement needs more.
         progress: called every now and then.
 
     Raises:
@@ -140,12 +139,9 @@ def ingest(
             with (
                 workspace(database) as directory,
                 _target(database, directory) as target,
-                contextlib.closing(
-                    connect(
-                        target, read_only=False, memory_limit=memory_limit or DEFAULT_MEMORY_LIMIT
-                    )
-                ) as con,
+                contextlib.closing(connect(target, read_only=False)) as con,
             ):
+                memory = Memory(con, memory_limit)
                 con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET preserve_insertion_order = false")
                 if name is not None and not replace:
@@ -164,7 +160,8 @@ def ingest(
                 judge.require_ros_events(traces.traces, loaded.event_counts)
                 names = (name, _fallback_name(paths))
                 run = interruptible(
-                    con, lambda: _write(con, names, loaded, keep_staging, watch, interrupts)
+                    con,
+                    lambda: _write(con, memory, names, loaded, keep_staging, watch, interrupts),
                 )
                 watch.enter("closing the database")
         return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
@@ -172,6 +169,7 @@ def ingest(
 
 def _write(
     con: duckdb.DuckDBPyConnection,
+    memory: Memory,
     names: tuple[str | None, str],
     loaded: staging.Loaded,
     keep_staging: Path | None,
@@ -179,10 +177,20 @@ def _write(
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
     watch.enter("building the model")
-    model.build(con, keep=keep_staging is not None)
+    model.build(con, memory, keep=keep_staging is not None)
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)
+    return memory.run(lambda: _write_run(con, names, loaded, watch, interrupts))
+
+
+def _write_run(
+    con: duckdb.DuckDBPyConnection,
+    names: tuple[str | None, str],
+    loaded: staging.Loaded,
+    watch: _Watch,
+    interrupts: Interrupts,
+) -> tuple[int, str, tuple[Diagnostic, ...]]:
     con.begin()
     try:
         watch.enter("storing the run")

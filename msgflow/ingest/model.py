@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
@@ -12,11 +13,13 @@ if TYPE_CHECKING:
 
     import duckdb
 
+    from msgflow.ingest.memory import Memory
     from msgflow.query.header import Header
 
 
 def build(
     con: duckdb.DuckDBPyConnection,
+    memory: Memory,
     *,
     keep: bool = False,
     built: Callable[[str], None] | None = None,
@@ -25,15 +28,18 @@ def build(
 
     Args:
         con: connection with `raw` and `staging` attached and filled.
+        memory: the memory limit of `con`.
         keep: keep what only other objects of the model need; else it goes once they are built.
         built: called with the name of each object, after it was built.
     """
     headers = objects.load("model")
     for position, header in enumerate(headers):
-        if header.kind == "macro":
-            con.execute(header.body)
-        else:
-            con.execute(f"CREATE TABLE {header.name} AS\n{header.body}")
+        statement = (
+            header.body
+            if header.kind == "macro"
+            else f"CREATE TABLE {header.name} AS\n{header.body}"
+        )
+        memory.run(functools.partial(con.execute, statement))
         if not keep:
             for name in _finished(headers, position):
                 con.execute(f"DROP TABLE {name}")

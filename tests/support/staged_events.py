@@ -24,6 +24,7 @@ from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
 from msgflow.ingest import model, staging
 from msgflow.ingest.catalogue import load
+from msgflow.ingest.memory import Memory
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
 
 STEP_NS = 10
@@ -210,7 +211,7 @@ class Analysis:
         """Build the model of these events and derive its links."""
         self._clear()
         events.write(self.connection)
-        model.build(self.connection, keep=True)
+        model.build(self.connection, Memory(self.connection, None), keep=True)
         self.connection.begin()
         store(self.connection, 1)
         self.connection.execute(

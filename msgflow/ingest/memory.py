@@ -1,0 +1,80 @@
+"""Memory that grows when it has to: nobody should have to guess it for a trace.
+
+Most of what an ingest does spills to disk, but some statements have to hold all events of a thread.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, TypeVar
+
+import duckdb
+
+from msgflow.errors import DatabaseError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_T = TypeVar("_T")
+
+DEFAULT_LIMIT = "640MB"
+_SHARE_OF_MACHINE = 0.7
+
+
+class Memory:
+    """The memory limit of a connection: fixed by the user, or growing from a modest default."""
+
+    def __init__(self, con: duckdb.DuckDBPyConnection, limit: str | None) -> None:
+        self._con = con
+        self._is_fixed = limit is not None
+        self._limit = limit or DEFAULT_LIMIT
+        self._set(self._limit)
+
+    def run(self, work: Callable[[], _T]) -> _T:
+        """Return what `work` returns; it is run again with twice the memory where that was short.
+
+        Args:
+            work: something that leaves nothing behind when it fails.
+
+        Raises:
+            DatabaseError: the limit that the user gave, or the memory of the machine, is too small.
+        """
+        while True:
+            try:
+                return work()
+            except duckdb.OutOfMemoryException as error:
+                if self._is_fixed or not self._double():
+                    raise DatabaseError(
+                        f"the traces need more memory than {self._limit}",
+                        "give more with --memory-limit, or read a shorter part of the recording",
+                    ) from error
+
+    def _double(self) -> bool:
+        now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
+        wanted = 2 * _bytes(now)
+        if wanted > _SHARE_OF_MACHINE * _machine_bytes():
+            return False
+        self._set(f"{wanted}B")
+        return True
+
+    def _set(self, limit: str) -> None:
+        try:
+            self._con.execute("SET memory_limit = ?", [limit])
+        except duckdb.Error as error:
+            raise DatabaseError(
+                f"not an amount of memory — {limit}", "--memory-limit 2GB"
+            ) from error
+        self._limit = limit
+
+
+def _bytes(text: str) -> int:
+    number, unit = text.split()
+    power = ("bytes", "KiB", "MiB", "GiB", "TiB").index(unit)
+    return round(float(number) * float(1024**power))
+
+
+def _machine_bytes() -> int:
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):  # a system that does not say
+        return 8 * 1024**3

@@ -1,0 +1,37 @@
+"""The memory limit grows where it may, and says so where it may not."""
+
+from __future__ import annotations
+
+import duckdb
+import pytest
+
+from msgflow.errors import DatabaseError
+from msgflow.ingest.memory import Memory
+
+# Holds all its rows in memory at once, whatever may spill.
+HUNGRY = "SELECT len(list(range)) FROM range(20000000)"
+
+
+def limit_of(con: duckdb.DuckDBPyConnection) -> str:
+    return str(con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0])
+
+
+def test_a_statement_that_needs_more_gets_it() -> None:
+    with duckdb.connect() as con:
+        memory = Memory(con, None)
+        con.execute("SET memory_limit = '40MB'")
+        assert memory.run(lambda: con.execute(HUNGRY).fetchall()) == [(20_000_000,)]
+        assert limit_of(con) != "38.1 MiB"
+
+
+def test_a_limit_that_the_user_gave_is_kept() -> None:
+    with duckdb.connect() as con:
+        memory = Memory(con, "40MB")
+        with pytest.raises(DatabaseError, match="need more memory than 40MB"):
+            memory.run(lambda: con.execute(HUNGRY).fetchall())
+        assert limit_of(con) == "38.1 MiB"
+
+
+def test_not_an_amount() -> None:
+    with duckdb.connect() as con, pytest.raises(DatabaseError, match="not an amount of memory"):
+        Memory(con, "much")
