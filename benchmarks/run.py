@@ -1,6 +1,6 @@
 """Speed and memory of reading and ingesting, beside Babeltrace 2 on the same trace in one run.
 
-    python benchmarks/run.py [--events 10000000] [--memory-limit 640MB] [--bt2] [--markdown FILE]
+    python benchmarks/run.py [--events 10000000] [--memory-limit SIZE] [--bt2] [--markdown FILE]
 
 Simulates a pipeline of nodes, then measures in processes of their own: our reader alone (all the
 columns of the catalogue, nothing kept), the whole ingest by stage, the query e2e-latency on the
@@ -44,7 +44,7 @@ print(time.monotonic() - begin)
 
 INGEST = """
 import json, sys; from pathlib import Path; from msgflow.ingest import ingest
-report = ingest([sys.argv[1]], Path(sys.argv[2]), memory_limit=sys.argv[3])
+report = ingest([sys.argv[1]], Path(sys.argv[2]), memory_limit=sys.argv[3] or None)
 print(json.dumps(dict(report.stage_seconds)))
 """
 
@@ -111,7 +111,7 @@ def main() -> None:
     """Simulate, measure, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--events", type=int, default=10_000_000)
-    parser.add_argument("--memory-limit", default="640MB")
+    parser.add_argument("--memory-limit", default="", help="as of `msgflow ingest`")
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
     parser.add_argument("--markdown", type=Path, help="append the table to this file")
     arguments = parser.parse_args()
@@ -126,7 +126,7 @@ def main() -> None:
     lines = [
         f"{datetime.now(UTC):%Y-%m-%d}: {events:,} simulated events, {os.cpu_count()} cores "
         f"({platform.machine()}), Python {platform.python_version()}, memory limit "
-        f"{arguments.memory_limit}, database {size / 1e6:,.0f} MB, load {load:.1f} at the end.",
+        f"{arguments.memory_limit or 'as needed'}, database {size / 1e6:,.0f} MB, load {load:.1f} at the end.",
         "",
         *report(rows, events),
     ]
