@@ -126,7 +126,8 @@ def main() -> None:
     lines = [
         f"{datetime.now(UTC):%Y-%m-%d}: {events:,} simulated events, {os.cpu_count()} cores "
         f"({platform.machine()}), Python {platform.python_version()}, memory limit "
-        f"{arguments.memory_limit or 'as needed'}, database {size / 1e6:,.0f} MB, load {load:.1f} at the end.",
+        f"{arguments.memory_limit or 'as needed'}, database {size / 1e6:,.0f} MB, "
+        f"load {load:.1f} at the end.",
         "",
         *report(rows, events),
     ]
