@@ -9,7 +9,7 @@ from msgflow.trace.bt2_graph import damaged_error, plugin_class, source_paramete
 from msgflow.trace.bt2_streams import Clock
 from msgflow.trace.discovery import stream_files
 from msgflow.trace.metadata import MetadataKind, kind_of
-from msgflow.trace.model import TraceInfo
+from msgflow.trace.model import TraceInfo, undeclared
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,7 +38,7 @@ def describe(library: Bt2Library, location: TraceLocation, index: int) -> TraceI
     try:
         trace = _first_trace(library, location)
         if trace is None:
-            return _undeclared(location, index)
+            return undeclared(location.path, index)
         # Only after the trace could be opened: on a damaged one this query ends the process.
         begin_ns, end_ns = _range(library, location)
         return _info(trace, location, index, begin_ns, end_ns)
@@ -119,25 +119,6 @@ def _info(
         event_names=tuple(
             sorted({event.name or "" for sc in stream_classes for event in sc.values()})
         ),
-    )
-
-
-def _undeclared(location: TraceLocation, index: int) -> TraceInfo:
-    """Describe a trace without streams, of which Babeltrace tells nothing."""
-    return TraceInfo(
-        index=index,
-        path=location.path,
-        uuid=None,
-        domain=None,
-        hostname=None,
-        tracer=None,
-        clock_uuid=None,
-        clock_name=None,
-        clock_offset_ns=0,
-        begin_ns=None,
-        end_ns=None,
-        has_process_context=False,
-        event_names=(),
     )
 
 

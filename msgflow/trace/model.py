@@ -61,6 +61,25 @@ class TraceInfo:
     event_names: tuple[str, ...]
 
 
+def undeclared(path: Path, index: int) -> TraceInfo:
+    """Describe a trace without any event data; see `TraceInfo` for the arguments."""
+    return TraceInfo(
+        index=index,
+        path=path,
+        uuid=None,
+        domain=None,
+        hostname=None,
+        tracer=None,
+        clock_uuid=None,
+        clock_name=None,
+        clock_offset_ns=0,
+        begin_ns=None,
+        end_ns=None,
+        has_process_context=False,
+        event_names=(),
+    )
+
+
 @dataclass(frozen=True)
 class EventBatch:
     """Consecutive events of one name, or packets.

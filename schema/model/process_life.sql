@@ -1,7 +1,7 @@
 -- name: staging.process_life
 -- description: Lives of each pid. A new life starts at an rcl_init from another main thread or
---     process name, or of a context handle initialised before, unless the old life goes on: another
---     thread of the pid was there before and after, or an object made before is used after.
+--     process name, or of a context handle initialised before without any object of the old life
+--     being used after; but never while another thread of the pid goes on.
 -- grain: one row per host, PID namespace, pid and life
 -- needs: staging.thread_presence, staging.trace, raw
 WITH initialisation AS (
@@ -25,7 +25,7 @@ WITH initialisation AS (
         )
 ),
 candidate AS (
-    SELECT host_id, pid_ns, vpid, vtid, event_id
+    SELECT host_id, pid_ns, vpid, vtid, event_id, is_other_main
     FROM initialisation
     WHERE is_repeated AND (is_other_main OR is_same_context)
 ),
@@ -55,6 +55,7 @@ surviving AS (
         AND u.event_id > c.event_id
     ASOF JOIN made AS m
         ON u.trace_index = m.trace_index
+        AND u.pid_ns IS NOT DISTINCT FROM m.pid_ns
         AND u.vpid = m.vpid
         AND u.handle = m.handle
         AND u.event_id >= m.event_id
@@ -63,7 +64,7 @@ surviving AS (
 split AS (
     SELECT i.host_id, i.pid_ns, i.vpid, i.event_id
     FROM candidate AS i
-    WHERE i.event_id NOT IN (SELECT event_id FROM surviving)
+    WHERE (i.is_other_main OR i.event_id NOT IN (SELECT event_id FROM surviving))
         AND NOT EXISTS (
             SELECT 1
             FROM staging.thread_presence AS p

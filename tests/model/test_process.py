@@ -105,6 +105,20 @@ def test_a_pid_used_again_by_another_program(system: RosSystem, analyse: Analyse
     ]
 
 
+def test_another_program_at_the_same_addresses_is_a_new_life(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    system.context(MAIN)
+    system.publisher(MAIN, 0x10, "/a")
+    system.publish(MAIN, 0x10, 1)
+    other = Thread(100, 100, "listener")
+    system.context(other)
+    system.publish(other, 0x10, 2)
+    model = analyse(system)
+    assert [row[:3] for row in model.rows(LIVES)] == [(100, 1, "main"), (100, 2, "listener")]
+    assert model.column("SELECT topic_name FROM publisher ORDER BY publisher_id") == ["/a", None]
+
+
 def test_a_second_context_is_no_new_life(system: RosSystem, analyse: Analyse) -> None:
     system.context(MAIN, 0xC1)
     system.publisher(MAIN, 0x10, "/a")

@@ -56,25 +56,6 @@ def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream
     )
 
 
-def undeclared(path: Path, index: int) -> TraceInfo:
-    """Describe a trace without any event data."""
-    return TraceInfo(
-        index=index,
-        path=path,
-        uuid=None,
-        domain=None,
-        hostname=None,
-        tracer=None,
-        clock_uuid=None,
-        clock_name=None,
-        clock_offset_ns=0,
-        begin_ns=None,
-        end_ns=None,
-        has_process_context=False,
-        event_names=(),
-    )
-
-
 def _range(stream: Stream) -> tuple[int | None, int | None]:
     clock = stream.layout.stream.clock
     assert clock is not None

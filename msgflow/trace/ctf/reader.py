@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
-from msgflow.trace.ctf.describe import describe, undeclared
+from msgflow.trace.ctf.describe import describe
 from msgflow.trace.ctf.entries import entries_of
 from msgflow.trace.ctf.iteration import Iteration
 from msgflow.trace.ctf.layout import StreamLayout
@@ -15,7 +15,7 @@ from msgflow.trace.ctf.probe import begins_of
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.discovery import stream_files
 from msgflow.trace.exclusive import ExclusiveTraceSet
-from msgflow.trace.model import Damage
+from msgflow.trace.model import Damage, undeclared
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence
