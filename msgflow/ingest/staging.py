@@ -57,7 +57,7 @@ CREATE TABLE staging.damage (
 """
 
 # Rows that wait for a commit take memory that nothing limits.
-_ROWS_PER_TRANSACTION = 1_000_000
+_ROWS_PER_TRANSACTION = 2_000_000
 
 # Packets of the target database that the packets just read are the same as.
 _SAME_PACKETS = """
