@@ -285,7 +285,8 @@ CREATE TABLE store.publication (
     dds_ns              BIGINT,                  -- dds:write [epoch ns]
     source_timestamp_ns BIGINT,                  -- Stamp that the middleware sent along, clock of ROS [epoch ns]
     start_event_id      BIGINT,                  -- First layer seen [event order]
-    end_event_id        BIGINT                   -- Last layer seen [event order]
+    end_event_id        BIGINT,                  -- Last layer seen [event order]
+    callback_event_id   BIGINT                   -- Last begin or end of a callback before it; NULL: none [event order]
 );
 
 -- One row per message handed over to a subscription.

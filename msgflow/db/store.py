@@ -14,16 +14,17 @@ if TYPE_CHECKING:
 
 
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Copy every staging table that has the name of a store table, inside the open transaction.
+    """Copy what staging has under the name of a store table, inside the open transaction.
 
-    Ids in staging count from 1; in the store a run has one contiguous block per table, after
-    what is there.
+    Ids in staging are above 0; in the store those of a run come after what is there.
     """
     staged = {
         name
         for (name,) in con.execute(
-            "SELECT table_name FROM duckdb_tables() WHERE database_name = 'staging' "
-            "AND schema_name = 'main'"
+            "SELECT table_name FROM duckdb_tables() "
+            "WHERE database_name = 'staging' AND schema_name = 'main' "
+            "UNION ALL SELECT view_name FROM duckdb_views() "
+            "WHERE database_name = 'staging' AND schema_name = 'main'"
         ).fetchall()
     }
     bases = _bases(con)

@@ -454,6 +454,7 @@ publication = _table(
     _time("source_timestamp_ns", "Stamp that the middleware sent along, clock of ROS"),
     _order("start_event_id", "First layer seen"),
     _order("end_event_id", "Last layer seen"),
+    _order("callback_event_id", "Last begin or end of a callback before it; NULL: none"),
 )
 
 take = _table(

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
+from enum import Enum
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     import pyarrow as pa
 
@@ -21,12 +22,9 @@ COMMON_COLUMNS = (
     ("ts_ns", "BIGINT"),
     ("trace_index", "INTEGER"),
     ("cpu_id", "INTEGER"),
-    ("vpid", "INTEGER"),
-    ("vtid", "INTEGER"),
-    ("procname", "VARCHAR"),
-    ("pid_ns", "BIGINT"),
+    ("thread_index", "INTEGER"),
 )
-"""First columns of every staging table: `msgflow.trace.COMMON_SCHEMA` in SQL."""
+"""First columns of every staging table."""
 
 _FILE = Path(__file__).with_name("tracepoints.toml")
 
@@ -52,6 +50,32 @@ class Field:
     where: str | None = None
 
 
+class Origin(Enum):
+    """What can be told of a predecessor: the column's suffix."""
+
+    EVENT_ID = "event_id"
+    TS_NS = "ts_ns"
+    LABEL = "label"
+
+
+@dataclass(frozen=True)
+class Predecessor:
+    """A column about the latest event of a sequence that is before this one on its thread.
+
+    Attributes:
+        sequence: which events are looked at.
+        origin: what of the predecessor.
+    """
+
+    sequence: str
+    origin: Origin
+
+    @property
+    def column(self) -> str:
+        """Name of the column; NULL in it: there is no such event."""
+        return f"previous_{self.sequence}_{self.origin.value}"
+
+
 @dataclass(frozen=True)
 class Tracepoint:
     """An event.
@@ -60,6 +84,9 @@ class Tracepoint:
         name: provider and event, such as 'ros2:rcl_publish'.
         description: one sentence.
         fields: its payload, over all versions.
+        sequences: kinds of events on one thread that it belongs to.
+        predecessors: what is staged about the events before it.
+        label: what successors call it, None where none asks.
         since: first version of tracetools that has it, None for other providers.
         until: last version of tracetools that has it, None if it is still there.
         where: other places that have it, None if there are no others.
@@ -68,6 +95,9 @@ class Tracepoint:
     name: str
     description: str
     fields: tuple[Field, ...]
+    sequences: tuple[str, ...] = ()
+    predecessors: tuple[Predecessor, ...] = ()
+    label: str | None = None
     since: str | None = None
     until: str | None = None
     where: str | None = None
@@ -102,9 +132,18 @@ class Tracepoint:
             ]
         )
 
-    def create_table_sql(self, catalog: str) -> str:
+    def create_table_sql(self, catalog: str, labels: Iterable[str]) -> str:
         """Return the statement that creates the staging table in this catalog or schema."""
-        columns = [*COMMON_COLUMNS, *((field.name, field.type) for field in self.fields)]
+        types = {
+            Origin.EVENT_ID: "BIGINT",
+            Origin.TS_NS: "BIGINT",
+            Origin.LABEL: f"ENUM({', '.join(repr(label) for label in labels)})",
+        }
+        columns = [
+            *COMMON_COLUMNS,
+            *((before.column, types[before.origin]) for before in self.predecessors),
+            *((field.name, field.type) for field in self.fields),
+        ]
         body = ",\n".join(f'    "{name}" {sql_type}' for name, sql_type in columns)
         return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
 
@@ -118,6 +157,16 @@ class Catalogue:
     """
 
     tracepoints: Mapping[str, Tracepoint]
+
+    @property
+    def sequences(self) -> tuple[str, ...]:
+        """Names of all sequences, in alphabetical order."""
+        return tuple(sorted({name for t in self.tracepoints.values() for name in t.sequences}))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """All labels, in alphabetical order."""
+        return tuple(sorted({t.label for t in self.tracepoints.values() if t.label is not None}))
 
     def arrow_schemas(self) -> dict[str, pa.Schema]:
         """Return the payload columns of all, which is the `wanted` of `TraceSet.batches`."""
@@ -135,7 +184,16 @@ def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
     fields = tuple(
         Field(**{**field, "aliases": tuple(field.get("aliases", ()))}) for field in entry["fields"]
     )
-    return Tracepoint(**{**entry, "fields": fields})
+    predecessors = tuple(_predecessor(text) for text in entry.get("predecessors", ()))
+    sequences = tuple(entry.get("sequences", ()))
+    return Tracepoint(
+        **{**entry, "fields": fields, "sequences": sequences, "predecessors": predecessors}
+    )
+
+
+def _predecessor(text: str) -> Predecessor:
+    sequence, _, origin = text.partition(".")
+    return Predecessor(sequence, Origin(origin))
 
 
 def _arrow_type(sql_type: str) -> pa.DataType:

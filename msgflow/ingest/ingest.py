@@ -20,6 +20,7 @@ from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
 from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
+from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.memory import Memory
 from msgflow.ingest.workspace import workspace
 from msgflow.query.interrupt import interruptible, noted_interrupts
@@ -148,7 +149,7 @@ def ingest(
                     _require_free_name(con, name)
                 staging.attach(con, directory / "raw.duckdb")
                 watch.enter("reading the traces")
-                loaded = staging.load_traces(
+                loaded = load_traces(
                     con,
                     traces,
                     hostnames=hostnames,
@@ -171,7 +172,7 @@ def _write(
     con: duckdb.DuckDBPyConnection,
     memory: Memory,
     names: tuple[str | None, str],
-    loaded: staging.Loaded,
+    loaded: Loaded,
     keep_staging: Path | None,
     watch: _Watch,
     interrupts: Interrupts,
@@ -187,7 +188,7 @@ def _write(
 def _write_run(
     con: duckdb.DuckDBPyConnection,
     names: tuple[str | None, str],
-    loaded: staging.Loaded,
+    loaded: Loaded,
     watch: _Watch,
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
@@ -210,7 +211,7 @@ def _write_run(
 
 
 def _store(
-    con: duckdb.DuckDBPyConnection, name: str | None, fallback: str, loaded: staging.Loaded
+    con: duckdb.DuckDBPyConnection, name: str | None, fallback: str, loaded: Loaded
 ) -> tuple[int, str]:
     run_id = int(con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchall()[0][0])
     replaced = set(loaded.replaced_runs)

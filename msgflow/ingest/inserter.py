@@ -4,33 +4,33 @@ from __future__ import annotations
 
 import queue
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
 
-    from msgflow.trace import EventBatch
+_Item = TypeVar("_Item")
 
-_WAITING = 4
+_WAITING = 16
 _SECONDS_BETWEEN_LOOKS = 0.1
 
 
-class Inserter:
+class Inserter(Generic[_Item]):
     """A context manager that hands batches to `insert`, one after the other, in order.
 
     Leaving it waits until all are inserted, or drops them when it is left by an exception. What
     `insert` raises is raised by the next `put`, or on leaving.
     """
 
-    def __init__(self, insert: Callable[[EventBatch], None]) -> None:
+    def __init__(self, insert: Callable[[_Item], None]) -> None:
         self._insert = insert
-        self._waiting: queue.Queue[EventBatch | None] = queue.Queue(_WAITING)
+        self._waiting: queue.Queue[_Item | None] = queue.Queue(_WAITING)
         self._error: BaseException | None = None
         self._is_dropping = False
         self._thread = threading.Thread(target=self._work, name="insert batches")
 
-    def put(self, batch: EventBatch) -> None:
+    def put(self, batch: _Item) -> None:
         """Hand over a batch; waits while too many are waiting.
 
         Raises:
@@ -44,7 +44,7 @@ class Inserter:
             except queue.Full:
                 continue
 
-    def __enter__(self) -> Inserter:
+    def __enter__(self) -> Inserter[_Item]:
         self._thread.start()
         return self
 

@@ -9,7 +9,7 @@ from msgflow.db import objects
 from msgflow.db.tables import metadata
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     import duckdb
 
@@ -33,31 +33,41 @@ def build(
         built: called with the name of each object, after it was built.
     """
     headers = objects.load("model")
+    dropped: set[str] = set()
     for position, header in enumerate(headers):
-        statement = (
-            header.body
-            if header.kind == "macro"
-            else f"CREATE TABLE {header.name} AS\n{header.body}"
-        )
-        memory.run(functools.partial(con.execute, statement))
+        memory.run(functools.partial(con.execute, _statement(header)))
         if not keep:
-            for name in _finished(headers, position):
+            for name in _finished(headers, position) - dropped:
                 con.execute(f"DROP TABLE {name}")
+                dropped.add(name)
         if built is not None:
             built(header.name)
 
 
-def _finished(headers: tuple[Header, ...], position: int) -> list[str]:
-    """Return the tables that the object at `position` was the last to need."""
+def _statement(header: Header) -> str:
+    if header.kind == "macro":
+        return header.body
+    kind = "VIEW" if header.kind == "inline" else "TABLE"
+    return f"CREATE {kind} {header.name} AS\n{header.body}"
+
+
+def _finished(headers: tuple[Header, ...], position: int) -> set[str]:
+    """Return the tables that nothing after the object at `position` needs."""
     stored = {f"staging.{table.name}" for table in metadata.tables.values()}
-    built = {header.name for header in headers[: position + 1] if header.kind == "view"}
-    by_macro = {header.name: set(header.needs) for header in headers if header.kind == "macro"}
-    later: set[str] = set()
+    unfolded = {header.name: header for header in headers if header.kind != "view"}
+    later = {name for name in stored if name in unfolded}  # evaluated when they are stored
     for header in headers[position + 1 :]:
-        later |= set(header.needs)
-    for macro in later & by_macro.keys():
-        later |= by_macro[macro]
-    used = {headers[position].name, *headers[position].needs}
-    for macro in used & by_macro.keys():
-        used |= by_macro[macro]
-    return sorted((used & built) - later - stored)
+        if header.kind == "view":
+            later |= {header.name, *header.needs}
+    _unfold(later, unfolded)
+    built = {header.name for header in headers[: position + 1] if header.kind == "view"}
+    return built - later - stored
+
+
+def _unfold(names: set[str], unfolded: Mapping[str, Header]) -> None:
+    """Add what the objects among `names` that are not tables need themselves."""
+    waiting = [name for name in names if name in unfolded]
+    while waiting:
+        needs = set(unfolded[waiting.pop()].needs) - names
+        names |= needs
+        waiting += [name for name in needs if name in unfolded]

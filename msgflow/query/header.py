@@ -39,7 +39,7 @@ _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<descrip
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = ("name", "title", "description", "grain", "kind", "severity", "note", "needs")
-_KINDS = ("view", "macro")
+_KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
 
 
@@ -96,7 +96,8 @@ class Header:
         title: a few words for lists; the name where the file has none.
         description: what it means.
         grain: "one row per …"; empty for scalar macros.
-        kind: 'view' (the body is a SELECT) or 'macro' (the body is the whole statement).
+        kind: 'view' (the body is a SELECT; in `schema/model` a table is made of it), 'inline' (the
+            same, but never made a table) or 'macro' (the body is the whole statement).
         params: parameters in the order of the file.
         columns: output columns in the order of the file.
         needs: names of the objects that the body reads.

@@ -1,34 +1,35 @@
 -- name: derive.link_causal_direct
 -- description: Publications inside a run of a callback on its thread, from its start to its
---     effective end; of nested runs the innermost, by depth. Order decides, not time.
+--     effective end; of nested runs the innermost. Order decides, not time. The last begin or end
+--     of a callback before the publication tells which run that is: the one that began, unless it
+--     was over, else the nearest run around it that was not.
 -- grain: one row per publication made inside a run of a callback
 -- needs: store.publication, store.callback_instance
-WITH step AS (
-    SELECT run_id, thread_id, start_event_id AS event_id, 1 AS step, NULL::BIGINT AS publication_id
-    FROM store.callback_instance
+WITH RECURSIVE around AS (
+    SELECT b.run_id, b.publication_id, b.start_event_id AS event_id, i.parent_id
+    FROM store.publication AS b
+    JOIN store.callback_instance AS i
+        ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
+    WHERE i.parent_id IS NOT NULL AND b.start_event_id >= i.effective_end_event_id
     UNION ALL
-    SELECT run_id, thread_id, effective_end_event_id, -1, NULL
-    FROM store.callback_instance
+    SELECT b.run_id, b.publication_id, b.start_event_id, i.parent_id
+    FROM store.publication AS b
+    JOIN store.callback_instance AS i
+        ON b.run_id = i.run_id AND b.callback_event_id = i.end_event_id
+    WHERE i.parent_id IS NOT NULL
     UNION ALL
-    SELECT run_id, thread_id, start_event_id, 0, publication_id
-    FROM store.publication
-),
-level AS (
-    SELECT
-        run_id, thread_id, event_id, publication_id,
-        sum(step) OVER (
-            PARTITION BY run_id, thread_id ORDER BY event_id, step ROWS UNBOUNDED PRECEDING
-        )::INTEGER AS depth
-    FROM step
+    SELECT a.run_id, a.publication_id, a.event_id, i.parent_id
+    FROM around AS a
+    JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
+    WHERE i.parent_id IS NOT NULL AND a.event_id >= i.effective_end_event_id
 )
-SELECT
-    l.run_id,
-    i.callback_instance_id,
-    l.publication_id
-FROM level AS l
-ASOF JOIN store.callback_instance AS i
-    ON l.run_id = i.run_id
-    AND l.thread_id = i.thread_id
-    AND l.depth = i.depth
-    AND l.event_id > i.start_event_id
-WHERE l.publication_id IS NOT NULL AND l.event_id < i.effective_end_event_id
+SELECT b.run_id, i.callback_instance_id, b.publication_id
+FROM store.publication AS b
+JOIN store.callback_instance AS i
+    ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
+WHERE b.start_event_id < i.effective_end_event_id
+UNION ALL
+SELECT a.run_id, i.callback_instance_id, a.publication_id
+FROM around AS a
+JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
+WHERE a.event_id < i.effective_end_event_id

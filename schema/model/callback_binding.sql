@@ -4,15 +4,14 @@
 --     is not for an intra-process run, nor a dequeue for another; the subscriptions agree where
 --     both are known.
 -- grain: one row per callback_start
--- needs: staging.callback_run, staging.callback_dispatch, staging.callback_known,
---     staging.take_chain, staging.take_subscription
+-- needs: staging.callback_run, staging.callback_known, staging.take_chain,
+--     staging.take_subscription
 WITH run AS (
     SELECT
         r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process,
-        r.previous_event_id, d.executor_event_id, k.event_id AS callback_event_id, k.kind,
+        r.previous_event_id, r.executor_event_id, k.event_id AS callback_event_id, k.kind,
         k.subscription_event_id
     FROM staging.callback_run AS r
-    LEFT JOIN staging.callback_dispatch AS d ON r.start_event_id = d.start_event_id
     ASOF LEFT JOIN staging.callback_known AS k
         ON r.process_id = k.process_id
         AND r.callback_handle = k.callback_handle

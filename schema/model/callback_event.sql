@@ -1,24 +1,53 @@
 -- name: staging.callback_event
--- description: Begins and ends of callbacks, with the number of gaps that their thread has seen.
+-- description: Begins and ends of callbacks, with what comes before them on their thread: directly,
+--     of callbacks, and of the executor (not across a gap). `segment` counts the gaps that their
+--     thread has seen.
 -- grain: one row per callback_start or callback_end
--- needs: staging.thread_event, staging.thread_gap
-WITH numbered AS (
+-- needs: staging.behind_gap, staging.callback_gap, staging.context, raw
+WITH event AS (
     SELECT
-        thread_id, event_id, row_number() OVER (PARTITION BY thread_id ORDER BY event_id) AS segment
-    FROM staging.thread_gap
+        event_id, ts_ns, trace_index, cpu_id, thread_index, callback AS callback_handle,
+        true AS is_start, coalesce(is_intra_process = 1, false) AS is_intra_process,
+        previous_call_event_id, previous_callback_event_id, previous_executor_event_id
+    FROM raw.ros2_callback_start
+    UNION ALL
+    SELECT
+        event_id, ts_ns, trace_index, cpu_id, thread_index, callback, false, false,
+        previous_call_event_id, previous_callback_event_id, NULL
+    FROM raw.ros2_callback_end
+),
+located AS (
+    SELECT e.*, c.thread_id, c.process_id
+    FROM event AS e
+    JOIN staging.context AS c
+        ON e.thread_index = c.thread_index
+        AND e.event_id >= c.from_event_id
+        AND e.event_id < c.until_event_id
+),
+interrupted AS (
+    SELECT e.event_id, g.segment
+    FROM located AS e
+    ASOF JOIN staging.callback_gap AS g
+        ON e.thread_id = g.thread_id AND e.event_id >= g.event_id
+    WHERE e.thread_id IN (SELECT thread_id FROM staging.callback_gap)
 )
 SELECT
     e.event_id,
     e.ts_ns,
     e.trace_index,
-    e.cpu_id,
     e.thread_id,
-    e.handle AS callback_handle,
-    e.kind = 'callback_start' AS is_start,
-    coalesce(e.value = 1, false) AS is_intra_process,
-    CASE WHEN g.event_id IS DISTINCT FROM e.event_id THEN e.previous_event_id END
-        AS previous_event_id,
-    coalesce(g.segment, 0) AS segment
-FROM staging.thread_event AS e
-ASOF LEFT JOIN numbered AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id
-WHERE e.kind IN ('callback_start', 'callback_end')
+    e.process_id,
+    e.callback_handle,
+    e.is_start,
+    e.is_intra_process,
+    CASE WHEN c.event_id IS NULL THEN e.previous_call_event_id END AS previous_event_id,
+    e.previous_callback_event_id,
+    e.previous_executor_event_id,
+    CASE WHEN x.event_id IS NULL THEN e.previous_executor_event_id END AS executor_event_id,
+    coalesce(i.segment, 0) AS segment
+FROM located AS e
+LEFT JOIN interrupted AS i ON e.event_id = i.event_id
+LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS c
+    ON e.event_id = c.event_id
+LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS x
+    ON e.event_id = x.event_id

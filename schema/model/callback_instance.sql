@@ -1,6 +1,6 @@
 -- name: staging.callback_instance
--- description: Runs of callbacks in the order in which they began, with the run that each is
---     nested in.
+-- description: Runs of callbacks, numbered in the order in which they began, with the run that
+--     each is nested in.
 -- grain: one row per run of a callback
 -- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take
 WITH callback_of AS (
@@ -18,9 +18,14 @@ WITH callback_of AS (
     ) AS c ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
     WHERE b.callback_event_id IS NULL
 ),
+-- Apart, since what is sorted should be narrow.
+place AS (
+    SELECT start_event_id, row_number() OVER (ORDER BY start_event_id) AS callback_instance_id
+    FROM staging.callback_run
+),
 numbered AS (
     SELECT
-        row_number() OVER (ORDER BY r.start_event_id) AS callback_instance_id,
+        p.callback_instance_id,
         r.trace_index + 1 AS trace_id,
         c.callback_id,
         r.process_id,
@@ -30,17 +35,19 @@ numbered AS (
         t.take_id,
         r.is_intra_process,
         r.depth,
+        r.is_plain,
         r.start_event_id,
         r.end_event_id,
         r.effective_end_event_id
     FROM staging.callback_run AS r
+    JOIN place AS p ON r.start_event_id = p.start_event_id
     JOIN callback_of AS c ON r.start_event_id = c.start_event_id
     LEFT JOIN staging.take AS t ON r.start_event_id = t.callback_start_event_id
 ),
 nested AS (
     SELECT n.callback_instance_id, p.callback_instance_id AS parent_id
     FROM (SELECT * FROM numbered WHERE depth > 1) AS n
-    ASOF JOIN numbered AS p
+    ASOF JOIN (SELECT * FROM numbered WHERE NOT is_plain) AS p
         ON n.thread_id = p.thread_id
         AND n.depth - 1 = p.depth
         AND n.start_event_id > p.start_event_id

@@ -1,12 +1,9 @@
 -- name: staging.context
--- description: Which thread and process the contexts of an event name, in each trace of the host.
--- grain: one row per trace, thread and process life
--- needs: staging.thread_life, staging.process, staging.thread, staging.trace
+-- description: Which thread and process an event is of, by where it says that it happened.
+-- grain: one row per thread of a process life
+-- needs: staging.thread_life, staging.process, staging.thread
 SELECT
-    (r.trace_id - 1)::INTEGER AS trace_index,
-    l.pid_ns,
-    l.vpid,
-    l.vtid,
+    l.thread_index,
     l.from_event_id,
     l.until_event_id,
     t.thread_id,
@@ -18,4 +15,3 @@ JOIN staging.process AS p
     AND l.vpid = p.pid
     AND l.life = p.life
 JOIN staging.thread AS t ON p.process_id = t.process_id AND l.vtid = t.tid
-JOIN staging.trace AS r ON l.host_id = r.host_id

@@ -1,30 +1,37 @@
 -- name: staging.executor_event
--- description: What executors say of themselves. These are most of the events of many traces, which
---     is why they are kept apart from what threads do besides.
+-- kind: inline
+-- description: What executors say of themselves, with what they said before on the same thread.
+--     These are most of the events of many traces, which is why they are not copied.
 -- grain: one row per executor event
 -- needs: staging.context, raw
-WITH executor AS (
-    SELECT event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid, 'process' AS kind
+WITH event AS (
+    SELECT
+        event_id, ts_ns, thread_index, 'process' AS kind, previous_executor_event_id,
+        previous_executor_ts_ns, previous_executor_label
     FROM raw.ros2_rclcpp_executor_get_next_ready
     UNION ALL
-    SELECT event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid, 'wait'
+    SELECT
+        event_id, ts_ns, thread_index, 'wait', previous_executor_event_id,
+        previous_executor_ts_ns, previous_executor_label
     FROM raw.ros2_rclcpp_executor_wait_for_work
     UNION ALL
-    SELECT event_id, ts_ns, trace_index, cpu_id, pid_ns, vpid, vtid, 'execute'
+    SELECT
+        event_id, ts_ns, thread_index, 'execute', previous_executor_event_id,
+        previous_executor_ts_ns, previous_executor_label
     FROM raw.ros2_rclcpp_executor_execute
 )
 SELECT
-    x.event_id,
-    x.ts_ns,
-    x.trace_index,
-    x.cpu_id,
+    e.event_id,
+    e.ts_ns,
     c.thread_id,
-    x.kind::ENUM('process', 'wait', 'execute') AS kind
-FROM executor AS x
+    e.kind,
+    -- What an earlier life of the process did is not what this one did before.
+    CASE WHEN e.previous_executor_event_id >= c.from_event_id THEN e.previous_executor_event_id END
+        AS previous_event_id,
+    e.previous_executor_ts_ns AS previous_ns,
+    e.previous_executor_label AS previous_kind
+FROM event AS e
 JOIN staging.context AS c
-    ON x.trace_index = c.trace_index
-    AND x.vpid = c.vpid
-    AND x.vtid = c.vtid
-    AND x.pid_ns IS NOT DISTINCT FROM c.pid_ns
-    AND x.event_id >= c.from_event_id
-    AND x.event_id < c.until_event_id
+    ON e.thread_index = c.thread_index
+    AND e.event_id >= c.from_event_id
+    AND e.event_id < c.until_event_id

@@ -1,38 +1,41 @@
 -- name: staging.executor_state
+-- kind: inline
 -- description: The literal reading of the executor's three events: a state lasts until the next
 --     such event of the thread; the last one of a thread, or before a gap, has no end.
 -- grain: one row per executor event
--- needs: staging.executor_event, staging.executor_gap, staging.executor_thread,
---     staging.callback_instance, staging.callback_dispatch
-WITH lasting AS (
+-- needs: staging.executor_event, staging.behind_gap, staging.executor_thread,
+--     staging.callback_instance, staging.callback_pair
+WITH state AS (
     SELECT
-        event_id, ts_ns, thread_id, kind,
-        lead(ts_ns) OVER on_thread AS next_ns,
-        lead(event_id) OVER on_thread AS next_event_id
+        e.thread_id,
+        e.previous_kind AS state,
+        e.previous_ns AS start_ns,
+        CASE WHEN g.event_id IS NULL THEN e.ts_ns END AS end_ns,
+        e.previous_event_id AS start_event_id
+    FROM staging.executor_event AS e
+    LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS g
+        ON e.event_id = g.event_id
+    WHERE e.previous_event_id IS NOT NULL
+    UNION ALL
+    SELECT thread_id, arg_max(kind, event_id), arg_max(ts_ns, event_id), NULL, max(event_id)
     FROM staging.executor_event
-    WINDOW on_thread AS (PARTITION BY thread_id ORDER BY event_id)
-),
-state AS (
-    SELECT
-        l.event_id, l.ts_ns, l.thread_id, l.kind::VARCHAR AS state,
-        CASE WHEN g.event_id IS NULL THEN l.next_ns END AS end_ns
-    FROM lasting AS l
-    LEFT JOIN staging.executor_gap AS g ON l.next_event_id = g.event_id
+    GROUP BY thread_id
 ),
 first_run AS (
-    SELECT d.executor_event_id, min(c.callback_instance_id) AS callback_instance_id
-    FROM staging.callback_instance AS c
-    JOIN staging.callback_dispatch AS d ON c.start_event_id = d.start_event_id
-    GROUP BY d.executor_event_id
+    SELECT p.executor_event_id, min(c.callback_instance_id) AS callback_instance_id
+    FROM staging.callback_pair AS p
+    JOIN staging.callback_instance AS c ON p.start_event_id = c.start_event_id
+    WHERE p.executor_event_id IS NOT NULL
+    GROUP BY p.executor_event_id
 )
 SELECT
     t.executor_id,
     s.thread_id,
     s.state,
-    s.ts_ns AS start_ns,
+    s.start_ns,
     s.end_ns,
     r.callback_instance_id,
-    s.event_id AS start_event_id
+    s.start_event_id
 FROM state AS s
 LEFT JOIN staging.executor_thread AS t ON s.thread_id = t.thread_id
-LEFT JOIN first_run AS r ON s.event_id = r.executor_event_id
+LEFT JOIN first_run AS r ON s.start_event_id = r.executor_event_id

@@ -7,9 +7,6 @@ CREATE OR REPLACE MACRO staging.located(tracepoint) AS TABLE
 SELECT e.*, c.thread_id, c.process_id
 FROM query_table('raw.' || tracepoint) AS e
 JOIN staging.context AS c
-    ON e.trace_index = c.trace_index
-    AND e.vpid = c.vpid
-    AND e.vtid = c.vtid
-    AND e.pid_ns IS NOT DISTINCT FROM c.pid_ns
+    ON e.thread_index = c.thread_index
     AND e.event_id >= c.from_event_id
     AND e.event_id < c.until_event_id

@@ -2,7 +2,7 @@
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
 --     thread seen; the version is what rcl_init stated, for display only.
 -- grain: one row per process life
--- needs: staging.thread_life, staging.trace, raw
+-- needs: staging.thread_life, raw
 WITH life AS (
     SELECT
         host_id,
@@ -23,17 +23,14 @@ WITH life AS (
 ),
 version AS (
     SELECT
-        t.host_id,
-        i.pid_ns,
-        i.vpid,
+        l.host_id,
+        l.pid_ns,
+        l.vpid,
         l.life,
         arg_min(i.version, i.event_id) AS tracetools_version
     FROM raw.ros2_rcl_init AS i
-    JOIN staging.trace AS t ON i.trace_index + 1 = t.trace_id
-    JOIN life AS l
-        ON t.host_id = l.host_id
-        AND i.pid_ns IS NOT DISTINCT FROM l.pid_ns
-        AND i.vpid = l.vpid
+    JOIN staging.thread_life AS l
+        ON i.thread_index = l.thread_index
         AND i.event_id >= l.from_event_id
         AND i.event_id < l.until_event_id
     GROUP BY ALL

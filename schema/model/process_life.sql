@@ -3,25 +3,26 @@
 --     process name, or of a context handle initialised before without any object of the old life
 --     being used after; but never while another thread of the pid goes on.
 -- grain: one row per host, PID namespace, pid and life
--- needs: staging.thread_presence, staging.trace, raw
+-- needs: staging.thread_presence, staging.thread_seen, raw
 WITH initialisation AS (
     SELECT
-        t.host_id,
-        i.pid_ns,
-        i.vpid,
-        i.vtid,
+        p.host_id,
+        p.pid_ns,
+        p.vpid,
+        p.vtid,
         i.event_id,
         i.ts_ns,
-        lag(i.vtid) OVER process IS DISTINCT FROM i.vtid
-        OR lag(i.procname) OVER process IS DISTINCT FROM i.procname AS is_other_main,
+        lag(p.vtid) OVER process IS DISTINCT FROM p.vtid
+        OR lag(p.procname) OVER process IS DISTINCT FROM p.procname AS is_other_main,
         row_number() OVER context > 1 AS is_same_context,
         row_number() OVER process > 1 AS is_repeated
     FROM raw.ros2_rcl_init AS i
-    JOIN staging.trace AS t ON i.trace_index + 1 = t.trace_id
+    ASOF JOIN staging.thread_presence AS p
+        ON i.thread_index = p.thread_index AND i.event_id >= p.first_event_id
     WINDOW
-        process AS (PARTITION BY t.host_id, i.pid_ns, i.vpid ORDER BY i.event_id),
+        process AS (PARTITION BY p.host_id, p.pid_ns, p.vpid ORDER BY i.event_id),
         context AS (
-            PARTITION BY t.host_id, i.pid_ns, i.vpid, i.context_handle ORDER BY i.event_id
+            PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
         )
 ),
 candidate AS (
@@ -30,33 +31,34 @@ candidate AS (
     WHERE is_repeated AND (is_other_main OR is_same_context)
 ),
 made AS (
-    SELECT trace_index, pid_ns, vpid, event_id, publisher_handle AS handle
+    SELECT thread_index, event_id, publisher_handle AS handle
     FROM raw.ros2_rcl_publisher_init
     UNION ALL
-    SELECT trace_index, pid_ns, vpid, event_id, callback
+    SELECT thread_index, event_id, callback
     FROM raw.ros2_rclcpp_callback_register
 ),
 used AS (
-    SELECT trace_index, pid_ns, vpid, event_id, publisher_handle AS handle
+    SELECT thread_index, event_id, publisher_handle AS handle
     FROM raw.ros2_rcl_publish
     UNION ALL
-    SELECT trace_index, pid_ns, vpid, event_id, callback
+    SELECT thread_index, event_id, callback
     FROM raw.ros2_callback_start
 ),
 -- An object made before and used afterwards, without being made again: the life goes on.
 surviving AS (
     SELECT DISTINCT c.event_id
     FROM candidate AS c
-    JOIN staging.trace AS t ON c.host_id = t.host_id
-    JOIN used AS u
-        ON t.trace_id - 1 = u.trace_index
-        AND c.pid_ns IS NOT DISTINCT FROM u.pid_ns
-        AND c.vpid = u.vpid
-        AND u.event_id > c.event_id
-    ASOF JOIN made AS m
-        ON u.trace_index = m.trace_index
-        AND u.pid_ns IS NOT DISTINCT FROM m.pid_ns
-        AND u.vpid = m.vpid
+    JOIN staging.thread_seen AS s
+        ON c.host_id = s.host_id AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns AND c.vpid = s.vpid
+    JOIN used AS u ON s.thread_index = u.thread_index AND u.event_id > c.event_id
+    ASOF JOIN (
+        SELECT t.host_id, t.pid_ns, t.vpid, m.handle, m.event_id
+        FROM made AS m
+        JOIN staging.thread_seen AS t ON m.thread_index = t.thread_index
+    ) AS m
+        ON s.host_id = m.host_id
+        AND s.pid_ns IS NOT DISTINCT FROM m.pid_ns
+        AND s.vpid = m.vpid
         AND u.handle = m.handle
         AND u.event_id >= m.event_id
     WHERE m.event_id < c.event_id

@@ -1,7 +1,8 @@
 -- name: staging.publication
--- description: Publications in the order of their calls.
+-- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
--- needs: staging.publication_call, staging.publication_origin, staging.publisher, staging.thread
+-- needs: staging.publication_call, staging.publication_origin, staging.publisher,
+--     staging.callback_event, staging.callback_pair
 WITH publisher_of AS (
     SELECT o.start_event_id, p.publisher_id
     FROM staging.publication_origin AS o
@@ -12,12 +13,38 @@ WITH publisher_of AS (
     JOIN staging.publisher AS p
         ON o.process_id = p.process_id AND o.unknown_handle = p.publisher_handle
     WHERE p.is_inferred
+),
+-- Apart, since what is sorted should be narrow.
+numbered AS (
+    SELECT start_event_id, row_number() OVER (ORDER BY start_event_id) AS publication_id
+    FROM staging.publication_call
+),
+-- An end without a begin says nothing of where its thread is; what came before it does.
+stray AS (
+    SELECT c.start_event_id, c.thread_id
+    FROM staging.publication_call AS c
+    JOIN staging.callback_event AS e ON c.callback_event_id = e.event_id
+    ANTI JOIN staging.callback_pair AS p ON e.event_id = p.end_event_id
+    WHERE NOT e.is_start
+),
+placed AS (
+    SELECT s.start_event_id, e.event_id AS callback_event_id
+    FROM stray AS s
+    ASOF LEFT JOIN (
+        SELECT thread_id, start_event_id AS event_id
+        FROM staging.callback_pair
+        WHERE thread_id IN (SELECT thread_id FROM stray)
+        UNION ALL
+        SELECT thread_id, end_event_id
+        FROM staging.callback_pair
+        WHERE end_event_id IS NOT NULL AND thread_id IN (SELECT thread_id FROM stray)
+    ) AS e ON s.thread_id = e.thread_id AND s.start_event_id > e.event_id
 )
 SELECT
-    row_number() OVER (ORDER BY c.start_event_id) AS publication_id,
+    n.publication_id,
     c.trace_index + 1 AS trace_id,
     p.publisher_id,
-    t.process_id,
+    c.process_id,
     c.thread_id,
     c.start_ns,
     c.end_ns,
@@ -28,7 +55,10 @@ SELECT
     c.dds_ns,
     c.source_timestamp_ns,
     c.start_event_id,
-    c.end_event_id
+    c.end_event_id,
+    CASE WHEN q.start_event_id IS NULL THEN c.callback_event_id ELSE q.callback_event_id END
+        AS callback_event_id
 FROM staging.publication_call AS c
-JOIN staging.thread AS t ON c.thread_id = t.thread_id
+JOIN numbered AS n ON c.start_event_id = n.start_event_id
 LEFT JOIN publisher_of AS p ON c.start_event_id = p.start_event_id
+LEFT JOIN placed AS q ON c.start_event_id = q.start_event_id

@@ -5,14 +5,13 @@
 --     identifies, belongs to the process's only /rosout publisher. What only the middleware
 --     publishes has none.
 -- grain: one row per publish() call
--- needs: staging.publication_call, staging.publisher_known, staging.thread
+-- needs: staging.publication_call, staging.publisher_known
 WITH call AS (
     SELECT
-        c.start_event_id, t.process_id, c.publisher_handle, c.rmw_handle, c.writer,
+        c.start_event_id, c.process_id, c.publisher_handle, c.rmw_handle, c.writer,
         c.rclcpp_ns IS NULL AND c.intra_ns IS NULL AND c.publisher_handle IS NOT NULL
         AND c.rmw_handle IS NULL AND c.writer IS NULL AS may_be_rosout
     FROM staging.publication_call AS c
-    JOIN staging.thread AS t ON c.thread_id = t.thread_id
 ),
 by_rcl AS (
     SELECT c.start_event_id, p.event_id AS publisher_event_id

@@ -1,5 +1,5 @@
 -- name: staging.take
--- description: Takes in the order in which they began.
+-- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
 -- needs: staging.take_origin, staging.subscription
 WITH subscription_of AS (
@@ -12,9 +12,14 @@ WITH subscription_of AS (
     JOIN staging.subscription AS s
         ON o.process_id = s.process_id AND o.rmw_handle = s.rmw_handle
     WHERE o.subscription_event_id IS NULL AND s.is_inferred
+),
+-- Apart, since what is sorted should be narrow.
+numbered AS (
+    SELECT start_event_id, row_number() OVER (ORDER BY start_event_id) AS take_id
+    FROM staging.take_origin
 )
 SELECT
-    row_number() OVER (ORDER BY o.start_event_id) AS take_id,
+    n.take_id,
     o.trace_index + 1 AS trace_id,
     s.subscription_id,
     o.process_id,
@@ -26,4 +31,5 @@ SELECT
     o.end_event_id,
     o.callback_start_event_id
 FROM staging.take_origin AS o
+JOIN numbered AS n ON o.start_event_id = n.start_event_id
 LEFT JOIN subscription_of AS s ON o.start_event_id = s.start_event_id

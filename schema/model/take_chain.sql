@@ -1,96 +1,109 @@
 -- name: staging.take_chain
--- description: Layers of one take stitched together, as for publications. A chain whose rmw take
---     failed is none, although upper layers may report it. One without rcl take is the
+-- description: Layers of one take stitched together, as for publications. A take whose rmw layer
+--     failed is none, although upper layers may report it. One without rcl layer is the
 --     middleware's own, where its reader belongs to no rcl subscription although rcl takes are
 --     traced.
 -- grain: one row per successful take or dequeue
--- needs: staging.thread_event, staging.thread_gap, staging.thread, staging.subscription_known
-WITH layer AS (
+-- needs: staging.call, staging.context, staging.located, staging.subscription_known
+WITH middleware AS (
     SELECT
-        e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.kind, e.handle, e.value,
-        coalesce(CASE
-            WHEN g.event_id IS NOT NULL THEN false
-            WHEN e.kind IN ('rmw_take', 'rmw_take_failed') THEN
-                e.previous_kind = 'dds_read' AND e.is_same_message
-            WHEN e.kind = 'rcl_take' THEN
-                e.previous_kind IN ('rmw_take', 'rmw_take_failed')
-                AND e.is_same_message
-            WHEN e.kind = 'rclcpp_take' THEN
-                e.previous_kind IN ('rmw_take', 'rmw_take_failed', 'rcl_take')
-                AND e.is_same_message
-            WHEN e.kind = 'caret_take' THEN
-                e.previous_kind IN ('rmw_take', 'rcl_take', 'rclcpp_take')
-                AND e.is_same_message
-            ELSE false
-        END, false) AS continues
-    FROM staging.thread_event AS e
-    LEFT JOIN staging.thread_gap AS g ON e.event_id = g.event_id
-    WHERE e.kind IN (
-        'dds_read', 'rmw_take', 'rmw_take_failed', 'rcl_take', 'rclcpp_take', 'caret_take',
-        'dequeue'
-    )
+        coalesce(d.event_id, m.event_id) AS start_event_id,
+        coalesce(m.event_id, d.event_id) AS end_event_id,
+        coalesce(d.trace_index, m.trace_index) AS trace_index,
+        coalesce(d.thread_index, m.thread_index) AS thread_index,
+        coalesce(m.message, d.buffer) AS message,
+        m.taken,
+        m.ts_ns AS rmw_ns,
+        m.rmw_subscription_handle AS rmw_handle,
+        nullif(m.source_timestamp, 0) AS stamp
+    FROM staging.call('dds_read') AS d
+    FULL JOIN staging.call('ros2_rmw_take') AS m
+        ON d.event_id = m.previous_event_id AND d.buffer = m.message
 ),
-chained AS (
+rcl AS (
     SELECT
-        event_id, ts_ns, trace_index, thread_id, kind, handle, value,
-        max(CASE WHEN NOT continues THEN event_id END) OVER (
-            PARTITION BY thread_id ORDER BY event_id ROWS UNBOUNDED PRECEDING
-        ) AS chain_id
-    FROM layer
+        coalesce(m.start_event_id, r.event_id) AS start_event_id,
+        coalesce(r.event_id, m.end_event_id) AS end_event_id,
+        coalesce(m.trace_index, r.trace_index) AS trace_index,
+        coalesce(m.thread_index, r.thread_index) AS thread_index,
+        coalesce(m.message, r.message) AS message,
+        m.taken, m.rmw_ns, r.ts_ns AS rcl_ns, m.rmw_handle, m.stamp
+    FROM middleware AS m
+    FULL JOIN staging.call('ros2_rcl_take') AS r
+        ON m.end_event_id = r.previous_event_id
+        AND m.message = r.message
+        AND m.rmw_ns IS NOT NULL
+),
+rclcpp AS (
+    SELECT
+        coalesce(r.start_event_id, u.event_id) AS start_event_id,
+        coalesce(u.event_id, r.end_event_id) AS end_event_id,
+        coalesce(r.trace_index, u.trace_index) AS trace_index,
+        coalesce(r.thread_index, u.thread_index) AS thread_index,
+        coalesce(r.message, u.message) AS message,
+        r.taken, r.rmw_ns, r.rcl_ns, r.rmw_handle, r.stamp
+    FROM rcl AS r
+    FULL JOIN staging.call('ros2_rclcpp_take') AS u
+        ON r.end_event_id = u.previous_event_id
+        AND r.message = u.message
+        AND coalesce(r.rcl_ns, r.rmw_ns) IS NOT NULL
 ),
 chain AS (
     SELECT
-        chain_id AS start_event_id,
-        max(event_id) AS end_event_id,
-        any_value(trace_index) AS trace_index,
-        any_value(thread_id) AS thread_id,
-        max(CASE WHEN kind = 'rmw_take' THEN ts_ns END) AS rmw_ns,
-        max(CASE WHEN kind = 'rcl_take' THEN ts_ns END) AS rcl_ns,
-        max(CASE WHEN kind = 'caret_take' THEN ts_ns END) AS caret_ns,
-        max(CASE WHEN kind = 'dequeue' THEN ts_ns END) AS dequeue_ns,
-        max(CASE WHEN kind = 'rmw_take' THEN handle END) AS rmw_handle,
-        max(CASE WHEN kind = 'caret_take' THEN handle END) AS callback_handle,
-        max(CASE WHEN kind = 'dequeue' THEN handle END) AS buffer_handle,
-        max(CASE WHEN kind IN ('rmw_take', 'caret_take') AND value <> 0 THEN value END)
-            AS source_timestamp_ns
-    FROM chained
-    GROUP BY chain_id
-    HAVING bool_and(kind <> 'rmw_take_failed')
+        coalesce(r.start_event_id, c.event_id) AS start_event_id,
+        coalesce(c.event_id, r.end_event_id) AS end_event_id,
+        coalesce(r.trace_index, c.trace_index) AS trace_index,
+        coalesce(r.thread_index, c.thread_index) AS thread_index,
+        r.taken, r.rmw_ns, r.rcl_ns,
+        c.ts_ns AS caret_ns,
+        r.rmw_handle,
+        c.callback AS callback_handle,
+        coalesce(r.stamp, nullif(c.source_stamp, 0)::BIGINT) AS stamp
+    FROM rclcpp AS r
+    FULL JOIN staging.call('ros2_dispatch_subscription_callback') AS c
+        ON r.end_event_id = c.previous_event_id AND r.message = c.message
+),
+located AS (
+    SELECT
+        h.start_event_id, h.end_event_id, h.trace_index, c.thread_id, c.process_id, h.rmw_ns,
+        h.rcl_ns, h.caret_ns, h.rmw_handle, h.callback_handle, h.stamp
+    FROM chain AS h
+    JOIN staging.context AS c
+        ON h.thread_index = c.thread_index
+        AND h.start_event_id >= c.from_event_id
+        AND h.start_event_id < c.until_event_id
+    WHERE h.taken IS DISTINCT FROM 0
 ),
 known_reader AS (
     SELECT DISTINCT process_id, rmw_handle FROM staging.subscription_known
 ),
 rcl_traced AS (
-    SELECT DISTINCT t.process_id
-    FROM chain AS c
-    JOIN staging.thread AS t ON c.thread_id = t.thread_id
-    WHERE c.rcl_ns IS NOT NULL
+    SELECT DISTINCT process_id FROM located WHERE rcl_ns IS NOT NULL
 )
 SELECT
-    c.start_event_id,
-    c.end_event_id,
-    c.trace_index,
-    c.thread_id,
+    t.start_event_id,
+    t.end_event_id,
+    t.trace_index,
+    t.thread_id,
     t.process_id,
-    coalesce(c.dequeue_ns, c.rmw_ns, c.rcl_ns, c.caret_ns) AS taken_ns,
-    CASE
-        WHEN c.dequeue_ns IS NOT NULL THEN 'ring_buffer'
-        WHEN c.rmw_ns IS NULL AND c.rcl_ns IS NULL THEN 'caret'
-        ELSE 'rmw'
-    END AS method,
-    c.rmw_handle,
-    c.callback_handle,
-    c.buffer_handle,
-    c.source_timestamp_ns
-FROM chain AS c
-JOIN staging.thread AS t ON c.thread_id = t.thread_id
+    coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
+    CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
+    t.rmw_handle,
+    t.callback_handle,
+    NULL::UBIGINT AS buffer_handle,
+    t.stamp AS source_timestamp_ns
+FROM located AS t
 LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
-LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND c.rmw_handle = k.rmw_handle
-WHERE c.dequeue_ns IS NOT NULL
-    OR c.rcl_ns IS NOT NULL
-    OR c.caret_ns IS NOT NULL
+LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND t.rmw_handle = k.rmw_handle
+WHERE t.rcl_ns IS NOT NULL
+    OR t.caret_ns IS NOT NULL
     OR (
-        c.rmw_ns IS NOT NULL
-        AND c.source_timestamp_ns IS NOT NULL
+        t.rmw_ns IS NOT NULL
+        AND t.stamp IS NOT NULL
         AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
     )
+UNION ALL
+SELECT
+    event_id, event_id, trace_index, thread_id, process_id, ts_ns, 'ring_buffer', NULL, NULL,
+    buffer, NULL
+FROM staging.located('ros2_rclcpp_ring_buffer_dequeue')

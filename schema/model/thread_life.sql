@@ -2,72 +2,51 @@
 -- description: Threads within the life of their process: what turns the contexts of an event into
 --     its thread and process.
 -- grain: one row per thread of a process life
--- needs: staging.thread_presence, staging.process_life, staging.event, staging.trace
-WITH whole AS (
+-- needs: staging.thread_presence, staging.process_life, staging.event
+WITH lived AS (
     SELECT
-        l.host_id,
-        l.pid_ns,
-        l.vpid,
-        l.life,
-        l.from_event_id,
-        l.until_event_id,
-        p.vtid,
-        arg_max(p.procname, p.last_event_id) AS name,
-        min(p.first_event_id) AS first_event_id,
-        max(p.last_event_id) AS last_event_id,
-        min(p.first_seen_ns) AS first_seen_ns,
-        max(p.last_seen_ns) AS last_seen_ns
-    FROM staging.process_life AS l
-    JOIN staging.thread_presence AS p
-        ON l.host_id = p.host_id
-        AND l.pid_ns IS NOT DISTINCT FROM p.pid_ns
-        AND l.vpid = p.vpid
-    GROUP BY ALL
+        p.thread_index, l.host_id, l.pid_ns, l.vpid, p.vtid, l.life, l.from_event_id,
+        l.until_event_id, p.procname, p.first_event_id, p.last_event_id, p.first_seen_ns,
+        p.last_seen_ns
+    FROM staging.thread_presence AS p
+    JOIN staging.process_life AS l
+        ON p.host_id = l.host_id
+        AND p.pid_ns IS NOT DISTINCT FROM l.pid_ns
+        AND p.vpid = l.vpid
+        AND p.last_event_id >= l.from_event_id
+        AND p.first_event_id < l.until_event_id
 ),
-is_split AS (
-    SELECT host_id, pid_ns, vpid
-    FROM staging.process_life
-    WHERE life > 1
-    GROUP BY ALL
-),
+-- A stretch that two lives share has to be looked at event by event.
 divided AS (
     SELECT
-        l.host_id,
-        l.pid_ns,
-        l.vpid,
-        l.life,
-        l.from_event_id,
-        l.until_event_id,
-        e.vtid,
-        arg_max(e.procname, e.event_id) AS name,
+        v.thread_index,
+        v.life,
         min(e.event_id) AS first_event_id,
         max(e.event_id) AS last_event_id,
         min(e.ts_ns) AS first_seen_ns,
         max(e.ts_ns) AS last_seen_ns
-    FROM staging.event AS e
-    JOIN staging.trace AS t ON e.trace_index + 1 = t.trace_id
-    JOIN is_split AS s
-        ON t.host_id = s.host_id
-        AND e.pid_ns IS NOT DISTINCT FROM s.pid_ns
-        AND e.vpid = s.vpid
-    JOIN staging.process_life AS l
-        ON t.host_id = l.host_id
-        AND e.pid_ns IS NOT DISTINCT FROM l.pid_ns
-        AND e.vpid = l.vpid
-        AND e.event_id >= l.from_event_id
-        AND e.event_id < l.until_event_id
+    FROM lived AS v
+    JOIN staging.event AS e
+        ON v.thread_index = e.thread_index
+        AND e.event_id >= v.first_event_id
+        AND e.event_id <= v.last_event_id
+        AND e.event_id >= v.from_event_id
+        AND e.event_id < v.until_event_id
+    WHERE v.first_event_id < v.from_event_id OR v.last_event_id >= v.until_event_id
     GROUP BY ALL
 )
 SELECT
-    w.host_id, w.pid_ns, w.vpid, w.life, w.from_event_id, w.until_event_id, w.vtid, w.name,
-    w.first_event_id, w.last_event_id, w.first_seen_ns, w.last_seen_ns
-FROM whole AS w
-ANTI JOIN is_split AS s
-    ON w.host_id = s.host_id
-    AND w.pid_ns IS NOT DISTINCT FROM s.pid_ns
-    AND w.vpid = s.vpid
-UNION ALL
-SELECT
-    host_id, pid_ns, vpid, life, from_event_id, until_event_id, vtid, name,
-    first_event_id, last_event_id, first_seen_ns, last_seen_ns
-FROM divided
+    v.thread_index, v.host_id, v.pid_ns, v.vpid, v.life, v.from_event_id, v.until_event_id, v.vtid,
+    arg_max(v.procname, v.last_event_id) AS name,
+    min(coalesce(d.first_event_id, v.first_event_id)) AS first_event_id,
+    max(coalesce(d.last_event_id, v.last_event_id)) AS last_event_id,
+    min(coalesce(d.first_seen_ns, v.first_seen_ns)) AS first_seen_ns,
+    max(coalesce(d.last_seen_ns, v.last_seen_ns)) AS last_seen_ns
+FROM lived AS v
+LEFT JOIN divided AS d
+    ON v.thread_index = d.thread_index
+    AND v.life = d.life
+    AND (v.first_event_id < v.from_event_id OR v.last_event_id >= v.until_event_id)
+WHERE d.life IS NOT NULL
+    OR (v.first_event_id >= v.from_event_id AND v.last_event_id < v.until_event_id)
+GROUP BY ALL

@@ -1,30 +1,17 @@
 -- name: staging.thread_presence
--- description: When each thread was seen, by the name that it had then.
--- grain: one row per host, PID namespace, pid, tid and thread name
--- needs: staging.event, staging.trace
+-- description: When each thread was seen, by the name that it had then. A name may come again.
+-- grain: one row per stretch of events of a thread under one name
+-- needs: raw, staging.thread_seen
 SELECT
-    t.host_id,
-    e.pid_ns,
-    e.vpid,
-    e.vtid,
-    e.procname,
-    min(e.first_event_id) AS first_event_id,
-    max(e.last_event_id) AS last_event_id,
-    min(e.first_seen_ns) AS first_seen_ns,
-    max(e.last_seen_ns) AS last_seen_ns
-FROM (
-    SELECT
-        trace_index,
-        pid_ns,
-        vpid,
-        vtid,
-        procname,
-        min(event_id) AS first_event_id,
-        max(event_id) AS last_event_id,
-        min(ts_ns) AS first_seen_ns,
-        max(ts_ns) AS last_seen_ns
-    FROM staging.event
-    GROUP BY ALL
-) AS e
-JOIN staging.trace AS t ON e.trace_index + 1 = t.trace_id
-GROUP BY ALL
+    s.thread_index,
+    s.host_id,
+    s.pid_ns,
+    s.vpid,
+    s.vtid,
+    n.procname,
+    n.first_event_id,
+    n.last_event_id,
+    n.first_seen_ns,
+    n.last_seen_ns
+FROM raw.thread_name AS n
+JOIN staging.thread_seen AS s ON n.thread_index = s.thread_index

@@ -14,10 +14,21 @@ import pytest
 import msgflow.trace
 from msgflow.errors import TraceError
 from msgflow.ingest import catalogue
+from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, bt2_library
 
 TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]"}
-TRACEPOINT_KEYS = {"name", "description", "fields", "since", "until", "where"}
+TRACEPOINT_KEYS = {
+    "name",
+    "description",
+    "fields",
+    "since",
+    "until",
+    "where",
+    "label",
+    "sequences",
+    "predecessors",
+}
 FIELD_KEYS = {"name", "type", "aliases", "since", "until", "where"}
 VERSION = re.compile(r"\d+\.\d+\.\d+")
 PROVIDERS = {"ros2", "dds", "ros2_caret", "agnocast"}
@@ -90,29 +101,35 @@ def test_parts_of_a_name() -> None:
     assert [field.name for field in tracepoint.fields] == ["message"]
 
 
-def test_common_columns_are_those_of_the_reader() -> None:
-    names = {pa.int64(): "BIGINT", pa.int32(): "INTEGER"}
-    names[pa.dictionary(pa.int32(), pa.string())] = "VARCHAR"
-    assert (
-        tuple((field.name, names[field.type]) for field in COMMON_SCHEMA)
-        == catalogue.COMMON_COLUMNS
-    )
+def test_predecessors_are_of_sequences_that_exist() -> None:
+    known = catalogue.load()
+    for tracepoint in known.tracepoints.values():
+        for before in tracepoint.predecessors:
+            members = [t for t in known.tracepoints.values() if before.sequence in t.sequences]
+            assert members, tracepoint.name
+            if before.origin is catalogue.Origin.LABEL:
+                assert all(member.label for member in members), tracepoint.name
 
 
 def test_tables_take_the_readers_batches() -> None:
+    """Once `Sequences` has put thread and predecessors in the place of the contexts."""
     con = duckdb.connect()
     con.execute("ATTACH ':memory:' AS staging")
-    for tracepoint in catalogue.load().tracepoints.values():
-        con.execute(tracepoint.create_table_sql("staging"))
+    known = catalogue.load()
+    sequences = Sequences(known, [0])
+    for tracepoint in known.tracepoints.values():
+        con.execute(tracepoint.create_table_sql("staging", known.labels))
         schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
-        batch = pa.Table.from_batches([], schema)
-        con.register("batch", batch)
+        row = {"event_id": 1, "ts_ns": 2, "trace_index": 0, "vpid": 3, "vtid": 4}
+        batch = pa.RecordBatch.from_pylist([row], schema)
+        ((_, placed),) = sequences.place([(tracepoint.name, batch)]).batches
+        con.register("batch", placed)
         con.execute(f'INSERT INTO staging."{tracepoint.table}" SELECT * FROM batch')
         table = con.execute(f'DESCRIBE staging."{tracepoint.table}"').fetchall()
         given = con.execute("DESCRIBE SELECT * FROM batch").fetchall()
-        assert [row[0] for row in table] == schema.names
-        types = dict(zip(schema.names, (row[1] for row in given), strict=True))
-        assert {row[0]: row[1] for row in table} == types | {"procname": "VARCHAR"}
+        assert [row[0] for row in table] == placed.schema.names
+        types = {row[0]: row[1] for row in table if not row[1].startswith("ENUM")}
+        assert types.items() <= {row[0]: row[1] for row in given}.items()
 
 
 def test_the_alias_of_8_0_0() -> None:

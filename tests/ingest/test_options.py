@@ -62,7 +62,7 @@ def test_staging_can_be_kept(trace: Path, new_database: Path, tmp_path: Path) ->
     report = ingest([trace], new_database, keep_staging=kept)
     files = {path.name for path in kept.iterdir()}
     assert {"raw.ros2_rcl_publish.parquet", "raw.packet.parquet"} <= files
-    assert {"staging.publication.parquet", "staging.thread_event.parquet"} <= files
+    assert {"staging.publication.parquet", "staging.take_chain.parquet"} <= files
     with duckdb.connect() as connection:
         (count,) = connection.execute(
             f"SELECT count(*) FROM '{kept}/raw.ros2_rcl_publish.parquet'"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from ingested import contents
 
-from msgflow.ingest import ingest, staging
+from msgflow.ingest import ingest, load
 from msgflow.ingest import ingest as ingest_function
 from msgflow.ingest.workspace import workspace
 
@@ -27,15 +27,15 @@ def fail(*_: object, **__: object) -> Any:
 
 def fail_while_reading(monkeypatch: pytest.MonkeyPatch) -> None:
     """After some batches, so that there is something to undo."""
-    insert = staging._insert
+    add = load._Tables.add
     left = iter(range(4))
 
-    def insert_some(*arguments: Any) -> None:
+    def add_some(*arguments: Any) -> None:
         if next(left, None) is None:
             raise Interruption
-        insert(*arguments)
+        add(*arguments)
 
-    monkeypatch.setattr(staging, "_insert", insert_some)
+    monkeypatch.setattr(load._Tables, "add", add_some)
 
 
 def fail_at(monkeypatch: pytest.MonkeyPatch, name: str) -> None:

@@ -25,6 +25,7 @@ from msgflow.db.store import delete, store
 from msgflow.ingest import model, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.memory import Memory
+from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
 
 STEP_NS = 10
@@ -164,11 +165,21 @@ class StagedEvents:
         rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
         for name, row in self.ordered():
             rows[name].append(row)
+        batches = []
         for name, events in rows.items():
-            tracepoint = load().tracepoints[name]
-            schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
-            _insert(con, f"raw.{tracepoint.table}", events, schema)
-        _insert(con, "raw.packet", self._all_packets(), PACKET_SCHEMA)
+            schema = pa.schema([*COMMON_SCHEMA, *load().tracepoints[name].arrow_schema()])
+            batches.append((name, pa.RecordBatch.from_pylist(events, schema=schema)))
+        if batches:
+            hosts: dict[Source, int] = {}
+            sources = [self.sources.get(n, Source()) for n in range(max(self.sources) + 1)]
+            numbers = [hosts.setdefault(source, len(hosts)) for source in sources]
+            placed = Sequences(load(), numbers).place(batches)
+            _insert(con, "raw.thread", placed.threads)
+            _insert(con, "raw.thread_name", placed.thread_names)
+            for name, batch in placed.batches:
+                _insert(con, f"raw.{load().tracepoints[name].table}", batch)
+        packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
+        _insert(con, "raw.packet", packets)
 
     def _all_packets(self) -> list[dict[str, Any]]:
         whole = StagedEvents()
@@ -184,10 +195,8 @@ class StagedEvents:
         return [packet for trace in sorted(packets) for packet in packets[trace]]
 
 
-def _insert(
-    con: duckdb.DuckDBPyConnection, table: str, rows: list[dict[str, Any]], schema: pa.Schema
-) -> None:
-    con.register("staged_rows", pa.Table.from_pylist(rows, schema=schema))
+def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: pa.RecordBatch) -> None:
+    con.register("staged_rows", rows)
     con.execute(f"INSERT INTO {table} SELECT * FROM staged_rows")
     con.unregister("staged_rows")
 
@@ -206,6 +215,7 @@ class Analysis:
         self.connection.execute("SET threads = 1")
         staging.attach(self.connection, Path(":memory:"))
         self._tables = self._tables_of("raw"), self._tables_of("staging")
+        self._views = self._views_of_staging()
 
     def build(self, events: StagedEvents) -> Analysis:
         """Build the model of these events and derive its links."""
@@ -246,10 +256,20 @@ class Analysis:
             )
         )
 
+    def _views_of_staging(self) -> set[str]:
+        return set(
+            self.column(
+                "SELECT view_name FROM duckdb_views() "
+                "WHERE database_name = 'staging' AND schema_name = 'main'"
+            )
+        )
+
     def _clear(self) -> None:
         raw, given = self._tables
         for table in self._tables_of("staging") - given:
             self.connection.execute(f"DROP TABLE staging.{table}")
+        for view in self._views_of_staging() - self._views:
+            self.connection.execute(f"DROP VIEW staging.{view}")
         for database, tables in (("raw", raw), ("staging", given)):
             self.connection.begin()
             for table in tables:

@@ -1,0 +1,233 @@
+"""Loads traces into `raw` and `staging`."""
+
+from __future__ import annotations
+
+import contextlib
+import fnmatch
+import itertools
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.errors import UsageError
+from msgflow.ingest.catalogue import load
+from msgflow.ingest.inserter import Inserter
+from msgflow.ingest.sequences import Sequences
+from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    import pyarrow as pa
+
+    from msgflow.query.interrupt import Interrupts
+
+# Rows that wait for a commit take memory that nothing limits.
+_ROWS_PER_TRANSACTION = 2_000_000
+
+# Packets of the target database that the packets just read are the same as.
+_SAME_PACKETS = """
+SELECT DISTINCT r.run_id, r.name
+FROM packet_batch AS b
+JOIN staging.source AS s ON b.trace_index = s.trace_index
+JOIN store.trace AS t ON s.uuid = t.uuid
+JOIN store.packet AS p
+    ON t.trace_id = p.trace_id
+    AND b.stream_class_id = p.stream_class_id
+    AND b.stream_instance_id IS NOT DISTINCT FROM p.stream_instance_id
+    AND b.begin_ns = p.begin_ns
+JOIN store.run AS r ON p.run_id = r.run_id
+ORDER BY r.run_id
+"""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What was loaded.
+
+    Attributes:
+        event_counts: (trace index, event name) -> events read, wanted or not.
+        duplicate_packet_count: packets that another trace of the input held already.
+        replaced_runs: ids of the runs that hold some of these packets already.
+    """
+
+    event_counts: Mapping[tuple[int, str], int]
+    duplicate_packet_count: int
+    replaced_runs: frozenset[int]
+
+
+def load_traces(
+    con: duckdb.DuckDBPyConnection,
+    traces: TraceSet,
+    *,
+    hostnames: Mapping[int, str],
+    ignore: Sequence[str],
+    replace: bool,
+    interrupts: Interrupts,
+    progress: Callable[[Progress, float], None] | None,
+) -> Loaded:
+    """Load all wanted events and all packets of `traces`.
+
+    Args:
+        con: connection with the target database as current and `staging` attached.
+        traces: what to read.
+        hostnames: trace index -> name of the host, where the user gave one.
+        ignore: patterns of event names to leave out, such as 'dds:*'.
+        replace: packets that the database holds already are no error.
+        interrupts: asked at every batch.
+        progress: called with the reader's progress and the seconds since the begin.
+
+    Raises:
+        TraceError: a trace is damaged.
+        UsageError: the database holds these packets already, and `replace` is false.
+        KeyboardInterrupt: Ctrl-C came.
+    """
+    catalogue = load()
+    wanted = {
+        name: tracepoint.arrow_schema()
+        for name, tracepoint in catalogue.tracepoints.items()
+        if not any(fnmatch.fnmatchcase(name, pattern) for pattern in ignore)
+    }
+    sources = _sources(traces.traces, hostnames)
+    for source in sources:
+        con.execute(f"INSERT INTO staging.source VALUES ({', '.join('?' * len(source))})", source)
+    sequences = Sequences(catalogue, _hosts(sources))
+    started = time.monotonic()
+
+    def report(state: Progress) -> None:
+        interrupts.check()
+        if progress is not None:
+            progress(state, time.monotonic() - started)
+
+    tables = _Tables(con, replace)
+    # What is staged is written once and read a few times: compressing it costs more than it saves.
+    con.execute("SET force_compression = 'uncompressed'")
+    con.execute("SET wal_autocheckpoint = '1TB'")
+    con.begin()
+    try:
+        with Inserter(tables.add) as inserter:
+            for batch in _placed(traces.batches(wanted, progress=report), sequences):
+                interrupts.check()
+                inserter.put(batch)
+        con.commit()
+    except BaseException:
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
+        raise
+    finally:
+        con.execute("RESET force_compression")
+        con.execute("RESET wal_autocheckpoint")
+    for (trace_index, name), count in traces.event_counts.items():
+        con.execute(
+            "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",
+            [trace_index, name, name in catalogue.tracepoints, count],
+        )
+    for damage in traces.damages:
+        con.execute(
+            "INSERT INTO staging.damage VALUES (?, ?, ?, ?, ?)",
+            [
+                damage.trace_index,
+                str(damage.file),
+                damage.position,
+                damage.offset,
+                damage.message,
+            ],
+        )
+    return Loaded(
+        dict(traces.event_counts), traces.duplicate_packet_count, frozenset(tables.replaced)
+    )
+
+
+def _placed(
+    batches: Iterable[EventBatch], sequences: Sequences
+) -> Iterator[tuple[str, pa.RecordBatch]]:
+    """Yield (table, rows) of all batches, round by round."""
+    tracepoints = load().tracepoints
+    for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
+        events = []
+        for batch in of_round:
+            if batch.name == PACKET:
+                yield PACKET, batch.batch
+            else:
+                events.append((batch.name, batch.batch))
+        if events:
+            placed = sequences.place(events)
+            yield "thread", placed.threads
+            yield "thread_name", placed.thread_names
+            for name, rows in placed.batches:
+                yield tracepoints[name].table, rows
+
+
+class _Tables:
+    """The tables of `raw`, filled inside a transaction that is committed now and then.
+
+    Attributes:
+        replaced: ids of the runs that hold some of the packets added already.
+    """
+
+    def __init__(self, con: duckdb.DuckDBPyConnection, replace: bool) -> None:
+        self._con = con
+        self._may_replace = replace
+        self._uncommitted = 0
+        self.replaced: set[int] = set()
+
+    def add(self, item: tuple[str, pa.RecordBatch]) -> None:
+        """Add (table, rows).
+
+        Raises:
+            UsageError: the database holds these packets already, and must not replace them.
+        """
+        table, rows = item
+        if table == PACKET:
+            self.replaced |= self._same_packets(rows)
+        self._con.register("rows_read", rows)
+        self._con.execute(f"INSERT INTO raw.{table} SELECT * FROM rows_read")
+        self._con.unregister("rows_read")
+        self._uncommitted += rows.num_rows
+        if self._uncommitted >= _ROWS_PER_TRANSACTION:
+            self._con.commit()
+            self._con.begin()
+            self._uncommitted = 0
+
+    def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
+        self._con.register("packet_batch", rows)
+        try:
+            runs = self._con.execute(_SAME_PACKETS).fetchall()
+        finally:
+            self._con.unregister("packet_batch")
+        if runs and not self._may_replace:
+            raise UsageError(
+                f"these packets are in the database already — run {runs[0][1]} ({runs[0][0]})",
+                "give --replace to read them again in place of that run",
+            )
+        return {run_id for run_id, _ in runs}
+
+
+def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[list[object]]:
+    """Return the rows of `staging.source`."""
+    rows = []
+    for trace in traces:
+        hostname = hostnames.get(trace.index) or trace.hostname or "unknown"
+        rows.append(
+            [
+                trace.index,
+                str(trace.path),
+                trace.uuid,
+                trace.domain,
+                hostname,
+                trace.tracer,
+                trace.clock_uuid,
+                trace.clock_uuid or f"host {hostname}",
+                trace.begin_ns,
+                trace.end_ns,
+            ]
+        )
+    return rows
+
+
+def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
+    """Number the hosts of traces: (clock, hostname), see `schema/model/host.sql`."""
+    numbers: dict[tuple[object, object], int] = {}
+    return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]

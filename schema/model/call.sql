@@ -1,0 +1,13 @@
+-- name: staging.call
+-- kind: macro
+-- description: The events of one tracepoint that is a stage of calls, with what directly precedes
+--     each on its thread, unless a gap lies between the two.
+-- grain: one row per event of the tracepoint
+-- needs: staging.behind_gap, raw
+CREATE OR REPLACE MACRO staging.call(tracepoint) AS TABLE
+SELECT
+    e.*,
+    CASE WHEN g.event_id IS NULL THEN e.previous_call_event_id END AS previous_event_id
+FROM query_table('raw.' || tracepoint) AS e
+LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS g
+    ON e.event_id = g.event_id
