@@ -2,13 +2,12 @@
 -- description: What was found in the input while the model was built.
 -- grain: one row per finding
 -- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
---     staging.callback_instance, staging.callback_event, staging.callback_pair,
+--     staging.callback_instance, staging.callback_left_over,
 --     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host
 WITH unmatched_end AS (
-    SELECT e.trace_index
-    FROM staging.callback_event AS e
-    ANTI JOIN staging.callback_pair AS p ON e.event_id = p.end_event_id
-    WHERE NOT e.is_start
+    SELECT trace_index
+    FROM staging.callback_left_over
+    WHERE NOT is_start AND partner_event_id IS NULL
 ),
 process_label AS (
     SELECT p.process_id, p.life, printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname)

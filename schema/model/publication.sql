@@ -2,7 +2,7 @@
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
 -- needs: staging.publication_call, staging.publication_origin, staging.publisher,
---     staging.callback_event, staging.callback_pair
+--     staging.callback_left_over, staging.callback_pair
 WITH publisher_of AS (
     SELECT o.start_event_id, p.publisher_id
     FROM staging.publication_origin AS o
@@ -23,9 +23,8 @@ numbered AS (
 stray AS (
     SELECT c.start_event_id, c.thread_id
     FROM staging.publication_call AS c
-    JOIN staging.callback_event AS e ON c.callback_event_id = e.event_id
-    ANTI JOIN staging.callback_pair AS p ON e.event_id = p.end_event_id
-    WHERE NOT e.is_start
+    JOIN staging.callback_left_over AS e ON c.callback_event_id = e.event_id
+    WHERE NOT e.is_start AND e.partner_event_id IS NULL
 ),
 placed AS (
     SELECT s.start_event_id, e.event_id AS callback_event_id

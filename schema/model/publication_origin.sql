@@ -13,10 +13,29 @@ WITH call AS (
         AND c.rmw_handle IS NULL AND c.writer IS NULL AS may_be_rosout
     FROM staging.publication_call AS c
 ),
+known AS (
+    SELECT
+        event_id, process_id, publisher_handle,
+        count(*) OVER (PARTITION BY process_id, publisher_handle) > 1 AS is_repeated
+    FROM staging.publisher_known
+),
+-- Nearly every handle is used once: only the others need an order.
 by_rcl AS (
     SELECT c.start_event_id, p.event_id AS publisher_event_id
     FROM call AS c
-    ASOF JOIN staging.publisher_known AS p
+    JOIN known AS p
+        ON c.process_id = p.process_id
+        AND c.publisher_handle = p.publisher_handle
+        AND c.start_event_id >= p.event_id
+    WHERE NOT p.is_repeated
+    UNION ALL
+    SELECT c.start_event_id, p.event_id
+    FROM (
+        SELECT * FROM call
+        SEMI JOIN (SELECT * FROM known WHERE is_repeated) AS r
+            ON call.process_id = r.process_id AND call.publisher_handle = r.publisher_handle
+    ) AS c
+    ASOF JOIN (SELECT * FROM known WHERE is_repeated) AS p
         ON c.process_id = p.process_id
         AND c.publisher_handle = p.publisher_handle
         AND c.start_event_id >= p.event_id
