@@ -1,0 +1,21 @@
+-- name: staging.callback_depth
+-- description: How deep runs of callbacks are nested on their thread, from 1. Where no run can have
+--     others inside, none is nested.
+-- grain: one row per run of a callback on a thread with a run that others may be nested in
+-- needs: staging.callback_pair, staging.callback_outer
+WITH edge AS (
+    SELECT thread_id, start_event_id AS event_id, 1 AS step FROM staging.callback_outer
+    UNION ALL
+    SELECT thread_id, effective_end_event_id, -1 FROM staging.callback_outer
+),
+level AS (
+    SELECT
+        thread_id, event_id,
+        (sum(sum(step)) OVER (PARTITION BY thread_id ORDER BY event_id))::INTEGER AS depth
+    FROM edge
+    GROUP BY thread_id, event_id
+)
+SELECT p.start_event_id, coalesce(l.depth, 0) + p.is_plain::INTEGER AS depth
+FROM staging.callback_pair AS p
+ASOF LEFT JOIN level AS l ON p.thread_id = l.thread_id AND p.start_event_id >= l.event_id
+WHERE p.thread_id IN (SELECT thread_id FROM staging.callback_outer)
