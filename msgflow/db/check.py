@@ -63,13 +63,12 @@ def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[C
         for column in table.columns
         if (reference := column.info.get("references")) not in (None, f"{table.name}.{column.name}")
     ]
+    blocks = _blocks(con, {reference for _, _, reference in relations})
     of_run = "" if run_id is None else f"AND child.run_id = {run_id:d}"
     counts = con.execute(
         " UNION ALL ".join(
             f"SELECT {number}, count(*) FROM {table.fullname} AS child "
-            f"ANTI JOIN {SCHEMA}.{reference.partition('.')[0]} AS parent "
-            f"ON child.{column.name} = parent.{reference.partition('.')[2]} "
-            f"WHERE child.{column.name} IS NOT NULL {of_run}"
+            f"{_is_broken(column.name, reference, blocks[reference])} {of_run}"
             for number, (table, column, reference) in enumerate(relations)
         )
     ).fetchall()
@@ -81,6 +80,39 @@ def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[C
             row_count,
             f"Every {column.name} of {table.name} is a row of {reference.partition('.')[0]}.",
         )
+
+
+def _blocks(
+    con: duckdb.DuckDBPyConnection, references: set[str]
+) -> dict[str, tuple[int, int] | None]:
+    """Return the first and last of the ids that each column holds, None where some are missing."""
+    rows = con.execute(
+        " UNION ALL ".join(
+            f"SELECT '{reference}', min({column}), max({column}), count({column}) "
+            f"FROM {SCHEMA}.{table}"
+            for reference in sorted(references)
+            for table, _, column in [reference.partition(".")]
+        )
+    ).fetchall()
+    return {
+        reference: (first or 1, last or 0) if count == (last or 0) - (first or 1) + 1 else None
+        for reference, first, last, count in rows
+    }
+
+
+def _is_broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
+    """Return the clauses that keep the children without a parent.
+
+    A whole block of ids, which is what ingests write, makes that a comparison; an id used twice
+    would pass it, and fails `identity_is_unique`.
+    """
+    if block is not None:
+        return f"WHERE (child.{column} < {block[0]} OR child.{column} > {block[1]})"
+    table, _, key = reference.partition(".")
+    return (
+        f"ANTI JOIN {SCHEMA}.{table} AS parent ON child.{column} = parent.{key} "
+        f"WHERE child.{column} IS NOT NULL"
+    )
 
 
 def _count(con: duckdb.DuckDBPyConnection, query: str) -> int:

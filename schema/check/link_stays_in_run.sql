@@ -1,17 +1,34 @@
 -- name: check.link_stays_in_run
--- description: Nothing is linked across runs.
+-- description: Nothing is linked across runs: the ids of a run are one block.
 -- grain: one row per link between two runs
 -- severity: error
 -- needs: store.link_transport, store.link_causal, store.publication, store.take,
 --     store.callback_instance
+WITH publication AS (
+    SELECT run_id, min(publication_id) AS first_id, max(publication_id) AS last_id
+    FROM store.publication
+    GROUP BY run_id
+),
+take AS (
+    SELECT run_id, min(take_id) AS first_id, max(take_id) AS last_id
+    FROM store.take
+    GROUP BY run_id
+),
+callback_instance AS (
+    SELECT run_id, min(callback_instance_id) AS first_id, max(callback_instance_id) AS last_id
+    FROM store.callback_instance
+    GROUP BY run_id
+)
 SELECT l.run_id, 'transport' AS kind, l.publication_id
 FROM store.link_transport AS l
-JOIN store.publication AS b ON l.publication_id = b.publication_id
-JOIN store.take AS t ON l.take_id = t.take_id
-WHERE b.run_id <> l.run_id OR t.run_id <> l.run_id
+LEFT JOIN publication AS b ON l.run_id = b.run_id
+LEFT JOIN take AS t ON l.run_id = t.run_id
+WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
+    OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, true)
 UNION ALL
 SELECT l.run_id, 'causal', l.publication_id
 FROM store.link_causal AS l
-JOIN store.publication AS b ON l.publication_id = b.publication_id
-JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
-WHERE b.run_id <> l.run_id OR i.run_id <> l.run_id
+LEFT JOIN publication AS b ON l.run_id = b.run_id
+LEFT JOIN callback_instance AS i ON l.run_id = i.run_id
+WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
+    OR coalesce(l.callback_instance_id NOT BETWEEN i.first_id AND i.last_id, true)
