@@ -20,6 +20,7 @@ from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
 from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
+from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.memory import Memory
 from msgflow.ingest.workspace import workspace
@@ -130,6 +131,7 @@ def ingest(
     _require_usable(paths, name)
     if database.is_symlink():
         database = Path(os.path.realpath(database))
+    keep_freed_memory()
     with noted_interrupts() as interrupts:
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
@@ -149,15 +151,16 @@ def ingest(
                     _require_free_name(con, name)
                 staging.attach(con, directory / "raw.duckdb")
                 watch.enter("reading the traces")
-                loaded = load_traces(
-                    con,
-                    traces,
-                    hostnames=hostnames,
-                    ignore=ignore,
-                    replace=replace,
-                    interrupts=interrupts,
-                    progress=watch.reading,
-                )
+                with memory.loading():
+                    loaded = load_traces(
+                        con,
+                        traces,
+                        hostnames=hostnames,
+                        ignore=ignore,
+                        replace=replace,
+                        interrupts=interrupts,
+                        progress=watch.reading,
+                    )
                 judge.require_ros_events(traces.traces, loaded.event_counts)
                 names = (name, _fallback_name(paths))
                 run = interruptible(

@@ -5,6 +5,7 @@ Most of what an ingest does spills to disk, but some statements have to hold all
 
 from __future__ import annotations
 
+import contextlib
 import os
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,11 +14,12 @@ import duckdb
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 _T = TypeVar("_T")
 
 DEFAULT_LIMIT = "640MB"
+_LOADING_LIMIT = "320MB"
 _SHARE_OF_MACHINE = 0.7
 
 
@@ -29,6 +31,16 @@ class Memory:
         self._is_fixed = limit is not None
         self._limit = limit or DEFAULT_LIMIT
         self._set(self._limit)
+
+    @contextlib.contextmanager
+    def loading(self) -> Iterator[None]:
+        """Take less while rows are only written: the reader needs memory, too."""
+        if self._is_fixed:
+            yield
+            return
+        self._con.execute("SET memory_limit = ?", [_LOADING_LIMIT])
+        yield
+        self._con.execute("SET memory_limit = ?", [self._limit])
 
     def run(self, work: Callable[[], _T]) -> _T:
         """Return what `work` returns; it is run again with twice the memory where that was short.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+import re
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.tables import metadata
+from msgflow.ingest.catalogue import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
 
     from msgflow.ingest.memory import Memory
     from msgflow.query.header import Header
+
+
+# Views of all tables of `raw`.
+_WHOLE_RAW = {"staging.event", "staging.predecessor"}
 
 
 def build(
@@ -29,7 +35,8 @@ def build(
     Args:
         con: connection with `raw` and `staging` attached and filled.
         memory: the memory limit of `con`.
-        keep: keep what only other objects of the model need; else it goes once they are built.
+        keep: keep what was read and what only other objects of the model need; else it goes once
+            they are built.
         built: called with the name of each object, after it was built.
     """
     headers = objects.load("model")
@@ -52,22 +59,38 @@ def _statement(header: Header) -> str:
 
 
 def _finished(headers: tuple[Header, ...], position: int) -> set[str]:
-    """Return the tables that nothing after the object at `position` needs."""
+    """Return the tables, built or read, that nothing after the object at `position` needs."""
     stored = {f"staging.{table.name}" for table in metadata.tables.values()}
     unfolded = {header.name: header for header in headers if header.kind != "view"}
     later = {name for name in stored if name in unfolded}  # evaluated when they are stored
     for header in headers[position + 1 :]:
         if header.kind == "view":
-            later |= {header.name, *header.needs}
+            later |= {header.name} | _needs(header)
     _unfold(later, unfolded)
     built = {header.name for header in headers[: position + 1] if header.kind == "view"}
-    return built - later - stored
+    return (built | _raw_tables()) - later - stored
 
 
 def _unfold(names: set[str], unfolded: Mapping[str, Header]) -> None:
     """Add what the objects among `names` that are not tables need themselves."""
     waiting = [name for name in names if name in unfolded]
     while waiting:
-        needs = set(unfolded[waiting.pop()].needs) - names
+        needs = _needs(unfolded[waiting.pop()]) - names
         names |= needs
         waiting += [name for name in needs if name in unfolded]
+
+
+@functools.cache
+def _needs(header: Header) -> frozenset[str]:
+    """Return what an object needs, with the tables of `raw` one by one."""
+    if _WHOLE_RAW & set(header.needs):
+        return frozenset(header.needs) | _raw_tables()
+    words = set(re.findall(r"\w+", header.body))
+    return frozenset(header.needs) | {
+        name for name in _raw_tables() if name.removeprefix("raw.") in words
+    }
+
+
+@functools.cache
+def _raw_tables() -> frozenset[str]:
+    return frozenset(f"raw.{tracepoint.table}" for tracepoint in load().tracepoints.values())

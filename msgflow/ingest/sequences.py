@@ -8,7 +8,7 @@ looking for predecessors later would sort the largest tables there are.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from msgflow.ingest.catalogue import Catalogue, Predecessor
+    from msgflow.ingest.catalogue import Catalogue
 
 THREAD_SCHEMA = pa.schema(
     [
@@ -82,11 +82,8 @@ class Sequences:
             name: _NONE if t.label is None else self._labels.index(t.label)
             for name, t in catalogue.tracepoints.items()
         }
-
-        self._hosts = np.asarray(hosts, np.int64)
-        self._threads = _Numbers()
-        self._processes = _Numbers()
-        self._namespaces = _Numbers()
+        self._bits = {name: 1 << bit for bit, name in enumerate(catalogue.sequences)}
+        self._threads = _Threads(hosts)
         asked = {
             (before.sequence, before.origin)
             for tracepoint in catalogue.tracepoints.values()
@@ -106,124 +103,120 @@ class Sequences:
         """
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])
-        ids = _gathered(batches, "event_id", np.int64)
         known = self._threads.count
-        threads = self._threads_of(batches)
-        order = np.argsort(ids, kind="stable")
-        # Numbers of 16 bits are sorted in linear time.
-        is_short = self._threads.count < 1 << 16
-        keys = threads[order].astype(np.uint16 if is_short else np.uint32)
-        groups = _Groups(order[np.argsort(keys, kind="stable")], threads)
-        times = _gathered(batches, "ts_ns", np.int64)
+        ids = _gathered(batches, "event_id")
+        threads = self._threads.of(batches)
+        groups = _Groups(ids, threads)
+        members = np.repeat([self._memberships(name) for name, _ in batches], sizes)[groups.rows]
         events = {
-            Origin.EVENT_ID: ids,
-            Origin.TS_NS: times,
-            Origin.LABEL: np.repeat([self._label_of[name] for name, _ in batches], sizes),
+            Origin.EVENT_ID: ids[groups.rows],
+            Origin.TS_NS: _gathered(batches, "ts_ns")[groups.rows],
+            Origin.LABEL: np.repeat(
+                np.array([self._label_of[name] for name, _ in batches], np.int8), sizes
+            )[groups.rows],
         }
-        origins: dict[str, dict[Origin, NDArray[np.int64]]] = {}
+        origins = {}
         for sequence, latest in self._latest.items():
-            is_member = np.repeat(
-                [sequence in self._tracepoints[name].sequences for name, _ in batches], sizes
-            )
             latest.grow(self._threads.count)
-            origins[sequence] = latest.before(groups, is_member, events)
+            origins[sequence] = latest.before(groups, members & self._bits[sequence], events)
         placed = tuple(
-            (name, self._extended(name, batch, threads, origins, slice(begin, end)))
+            (
+                name,
+                self._extended(name, batch, threads[begin:end], origins, groups.place[begin:end]),
+            )
             for (name, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True)
         )
         return Placed(
-            placed,
-            self._new_threads(batches, threads, known),
-            _names(batches, groups, ids, times),
+            placed, _new_threads(batches, threads, known), _names(batches, groups, events)
         )
 
-    def _threads_of(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> NDArray[np.int32]:
-        pids = _gathered(batches, "vpid", np.int64)
-        tids = _gathered(batches, "vtid", np.int64)
-        processes = self._processes.of((pids << 32) | (tids & 0xFFFFFFFF))
-        hosts = self._hosts[_gathered(batches, "trace_index", np.int64)]
-        if all(batch["pid_ns"].null_count == batch.num_rows for _, batch in batches):
-            namespaces = np.zeros(pids.size, np.int64)
-        else:
-            values = [batch["pid_ns"] for _, batch in batches]
-            numbers = np.concatenate([_filled(value) for value in values])
-            has = np.concatenate([np.asarray(value.is_valid()) for value in values])
-            namespaces = np.where(has, self._namespaces.of(numbers).astype(np.int64) + 1, 0)
-        return self._threads.of(
-            (processes.astype(np.int64) << 32) | (namespaces << 16) | hosts
-        ).astype(np.int32)
-
-    def _new_threads(
-        self,
-        batches: Sequence[tuple[str, pa.RecordBatch]],
-        threads: NDArray[np.int32],
-        known: int,
-    ) -> pa.RecordBatch:
-        found, first = np.unique(threads, return_index=True)
-        first = first[found >= known]
-        whole = {
-            name: pa.chunked_array([batch[name] for _, batch in batches])
-            for name in THREAD_SCHEMA.names[1:]
-        }
-        columns = [column.take(pa.array(first)).combine_chunks() for column in whole.values()]
-        return pa.RecordBatch.from_arrays(
-            [pa.array(found[found >= known], pa.int32()), *columns], schema=THREAD_SCHEMA
-        )
+    def _memberships(self, name: str) -> np.uint8:
+        return np.uint8(sum(self._bits[sequence] for sequence in self._tracepoints[name].sequences))
 
     def _extended(
         self,
         name: str,
         batch: pa.RecordBatch,
         threads: NDArray[np.int32],
-        origins: Mapping[str, Mapping[Origin, NDArray[np.int64]]],
-        rows: slice,
+        origins: Mapping[str, Mapping[Origin, NDArray[Any]]],
+        places: NDArray[np.int32],
     ) -> pa.RecordBatch:
-        tracepoint = self._tracepoints[name]
         columns = {column: batch[column] for column in _LEADING}
-        columns["thread_index"] = pa.array(threads[rows])
-        for predecessor in tracepoint.predecessors:
-            values = origins[predecessor.sequence]
-            columns[predecessor.column] = self._column(predecessor, values, rows)
+        columns["thread_index"] = pa.array(threads)
+        for predecessor in self._tracepoints[name].predecessors:
+            values = origins[predecessor.sequence][predecessor.origin][places]
+            is_missing = values == _NONE
+            column = pa.array(values, mask=is_missing if is_missing.any() else None)
+            if predecessor.origin is Origin.LABEL:
+                column = pa.DictionaryArray.from_arrays(column, pa.array(self._labels))
+            columns[predecessor.column] = column
         for field in batch.schema.names[_CONTEXTS:]:
             columns[field] = batch[field]
         return pa.RecordBatch.from_pydict(columns)
 
-    def _column(
-        self, predecessor: Predecessor, values: Mapping[Origin, NDArray[np.int64]], rows: slice
-    ) -> pa.Array:
-        column = values[predecessor.origin][rows]
-        is_missing = column == _NONE
-        if predecessor.origin is not Origin.LABEL:
-            return pa.array(column, mask=is_missing)
-        codes = pa.array(column.astype(np.int8), mask=is_missing)
-        return pa.DictionaryArray.from_arrays(codes, pa.array(self._labels))
+
+class _Threads:
+    """Numbers threads, which are (host, PID namespace, pid, tid), from 0 as they are first seen."""
+
+    def __init__(self, hosts: Sequence[int]) -> None:
+        self._hosts = np.asarray(hosts, np.int64)
+        self._names = _Numbers()
+        self._spaces = _Numbers()
+        self._namespaces = _Numbers()
+        self._threads = _Numbers()
+
+    @property
+    def count(self) -> int:
+        return self._threads.count
+
+    def of(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> NDArray[np.int32]:
+        """Return the thread of each event, batch after batch."""
+        pairs = np.concatenate(
+            [np.column_stack((batch["vpid"], batch["vtid"])) for _, batch in batches]
+        )
+        names = self._names.of(pairs.view(np.int64).reshape(-1))
+        has_namespaces = any(batch["pid_ns"].null_count < batch.num_rows for _, batch in batches)
+        if self._hosts.max() == 0 and not has_namespaces and self._namespaces.count == 0:
+            return self._threads.of(names)
+        spaces = self._hosts[_gathered(batches, "trace_index")] << 32
+        if has_namespaces:
+            given = [batch["pid_ns"] for _, batch in batches]
+            values = np.concatenate([np.asarray(column.fill_null(0)) for column in given])
+            is_given = np.concatenate([np.asarray(column.is_valid()) for column in given])
+            spaces |= np.where(is_given, self._namespaces.of(values) + 1, 0)
+        return self._threads.of(names | (self._spaces.of(spaces).astype(np.int64) << 32))
 
 
 class _Numbers:
-    """Numbers values from 0 in the order in which they are first seen."""
+    """Numbers values from 0 as they are first seen."""
 
     def __init__(self) -> None:
         self._values = np.empty(0, np.int64)
-        self._numbers = np.empty(0, np.int64)
+        self._numbers = np.empty(0, np.int32)
 
     @property
     def count(self) -> int:
         return self._values.size
 
-    def of(self, values: NDArray[np.int64]) -> NDArray[np.int64]:
-        places = np.searchsorted(self._values, values)
-        is_known = places < self._values.size
-        is_known[is_known] = self._values[places[is_known]] == values[is_known]
-        if not is_known.all():
-            fresh, first = np.unique(values[~is_known], return_index=True)
-            rank = np.empty(fresh.size, np.int64)
-            rank[np.argsort(first)] = np.arange(fresh.size)
-            merged = np.concatenate([self._values, fresh])
-            numbers = np.concatenate([self._numbers, self._values.size + rank])
-            sort = np.argsort(merged)
-            self._values, self._numbers = merged[sort], numbers[sort]
-            places = np.searchsorted(self._values, values)
+    def of(self, given: NDArray[Any]) -> NDArray[np.int32]:
+        values: NDArray[np.int64] = given.astype(np.int64, copy=False)
+        if self.count == 0:
+            self._add(values)
+        places = np.searchsorted(self._values[1:], values, side="right")
+        is_new = self._values[places] != values
+        if is_new.any():
+            self._add(values[is_new])
+            places = np.searchsorted(self._values[1:], values, side="right")
         return self._numbers[places]
+
+    def _add(self, values: NDArray[np.int64]) -> None:
+        fresh, first = np.unique(values, return_index=True)
+        numbers = np.empty(fresh.size, np.int32)
+        numbers[np.argsort(first)] = np.arange(self.count, self.count + fresh.size)
+        merged = np.concatenate([self._values, fresh])
+        order = np.argsort(merged)
+        self._values = merged[order]
+        self._numbers = np.concatenate([self._numbers, numbers])[order]
 
 
 class _Groups:
@@ -231,20 +224,31 @@ class _Groups:
 
     Attributes:
         rows: the events, as rows of the batches one after the other.
+        place: where each row went.
         threads: the thread of each.
         starts: where each thread begins.
+        ends: where each thread's last event is.
         start_of: where the thread of each begins.
     """
 
-    def __init__(self, rows: NDArray[np.int64], threads: NDArray[np.int32]) -> None:
-        self.rows = rows
-        self.threads = threads[rows]
-        is_start = np.empty(rows.size, np.bool_)
-        is_start[:1] = True
-        is_start[1:] = self.threads[1:] != self.threads[:-1]
-        self.starts = np.flatnonzero(is_start)
-        sizes = np.diff(np.append(self.starts, rows.size))
-        self.start_of = np.repeat(self.starts, sizes)
+    def __init__(self, ids: NDArray[np.int64], threads: NDArray[np.int32]) -> None:
+        count = ids.size
+        numbers = np.arange(count, dtype=np.int32)
+        first = ids.min()
+        by_id = np.full(ids.max() - first + 1, _NONE, np.int32)
+        by_id[ids - first] = numbers
+        order = by_id if by_id.size == count else by_id[by_id != _NONE]
+        # Numbers of 16 bits are sorted in linear time.
+        is_short = threads.max() < 1 << 16
+        keys = threads[order].astype(np.uint16 if is_short else np.uint32)
+        self.rows = order[np.argsort(keys, kind="stable")]
+        self.place = np.empty(count, np.int32)
+        self.place[self.rows] = numbers
+        self.threads = threads[self.rows]
+        is_start = np.append(True, self.threads[1:] != self.threads[:-1])
+        self.starts = np.flatnonzero(is_start).astype(np.int32)
+        self.ends = np.append(self.starts[1:], count).astype(np.int32) - 1
+        self.start_of = np.repeat(self.starts, self.ends + 1 - self.starts)
 
 
 class _Latest:
@@ -261,62 +265,64 @@ class _Latest:
     def before(
         self,
         groups: _Groups,
-        is_member: NDArray[np.bool_],
-        events: Mapping[Origin, NDArray[np.int64]],
-    ) -> dict[Origin, NDArray[np.int64]]:
-        """Return what is latest before each event, and go on to the end of the round."""
-        count = groups.rows.size
-        until = np.maximum.accumulate(np.where(is_member[groups.rows], np.arange(count), _NONE))
-        before = np.append(_NONE, until[:-1])
-        is_earlier = before < groups.start_of
-        earlier = groups.threads[is_earlier]
-        ends = np.append(groups.starts[1:], count) - 1
-        is_new = until[ends] >= groups.starts
-        latest, threads = until[ends][is_new], groups.threads[groups.starts[is_new]]
+        is_member: NDArray[Any],
+        events: Mapping[Origin, NDArray[Any]],
+    ) -> dict[Origin, NDArray[Any]]:
+        """Return what is latest before each event of `groups`, and go on to the round's end."""
+        places = np.arange(is_member.size, dtype=np.int32)
+        places[is_member == 0] = _NONE
+        until = np.maximum.accumulate(places, out=places)
+        before = np.empty_like(until)
+        before[:1] = _NONE
+        before[1:] = until[:-1]
+        earlier = np.flatnonzero(before < groups.start_of)
+        last = until[groups.ends]
+        is_new = last >= groups.starts
+        latest, threads = last[is_new], groups.threads[groups.starts[is_new]]
         result = {}
         for origin, carried in self._values.items():
-            values = events[origin][groups.rows]
-            column = values[before]
-            column[is_earlier] = carried[earlier]
-            result[origin] = np.empty_like(column)
-            result[origin][groups.rows] = column
-            carried[threads] = values[latest]
+            values = events[origin][before]
+            values[earlier] = carried[groups.threads[earlier]]
+            result[origin] = values
+            carried[threads] = events[origin][latest]
         return result
+
+
+def _new_threads(
+    batches: Sequence[tuple[str, pa.RecordBatch]], threads: NDArray[np.int32], known: int
+) -> pa.RecordBatch:
+    fresh = np.flatnonzero(threads >= known)
+    found, first = np.unique(threads[fresh], return_index=True)
+    rows = pa.array(fresh[first])
+    columns = [
+        pa.chunked_array([batch[name] for _, batch in batches]).take(rows).combine_chunks()
+        for name in THREAD_SCHEMA.names[1:]
+    ]
+    return pa.RecordBatch.from_arrays([pa.array(found), *columns], schema=THREAD_SCHEMA)
 
 
 def _names(
     batches: Sequence[tuple[str, pa.RecordBatch]],
     groups: _Groups,
-    ids: NDArray[np.int64],
-    times: NDArray[np.int64],
+    events: Mapping[Origin, NDArray[Any]],
 ) -> pa.RecordBatch:
     encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
     codes = np.concatenate(
         [np.asarray(chunk.indices.fill_null(_NONE)) for chunk in encoded.chunks]
     )[groups.rows]
-    is_start = np.empty(codes.size, np.bool_)
-    is_start[:1] = True
-    is_start[1:] = codes[1:] != codes[:-1]
+    is_start = np.append(True, codes[1:] != codes[:-1])
     is_start[groups.starts] = True
     starts = np.flatnonzero(is_start)
     ends = np.append(starts[1:], codes.size) - 1
     names = encoded.chunks[0].dictionary.take(pa.array(codes[starts], mask=codes[starts] == _NONE))
-    first, last = groups.rows[starts], groups.rows[ends]
+    extents = [
+        events[origin][at] for origin in (Origin.EVENT_ID, Origin.TS_NS) for at in (starts, ends)
+    ]
     return pa.RecordBatch.from_arrays(
-        [
-            pa.array(groups.threads[starts], pa.int32()),
-            names.cast(pa.string()),
-            *(pa.array(column) for column in (ids[first], ids[last], times[first], times[last])),
-        ],
+        [pa.array(groups.threads[starts]), names.cast(pa.string()), *map(pa.array, extents)],
         schema=THREAD_NAME_SCHEMA,
     )
 
 
-def _gathered(
-    batches: Sequence[tuple[str, pa.RecordBatch]], name: str, data_type: type[np.int64]
-) -> NDArray[np.int64]:
-    return np.concatenate([np.asarray(batch[name]) for _, batch in batches]).astype(data_type)
-
-
-def _filled(values: pa.Array) -> NDArray[np.int64]:
-    return np.asarray(values.fill_null(0))
+def _gathered(batches: Sequence[tuple[str, pa.RecordBatch]], name: str) -> NDArray[Any]:
+    return np.concatenate([np.asarray(batch[name]) for _, batch in batches])

@@ -3,7 +3,7 @@
 --     of callbacks, and of the executor (not across a gap). `segment` counts the gaps that their
 --     thread has seen.
 -- grain: one row per callback_start or callback_end
--- needs: staging.behind_gap, staging.callback_gap, staging.context, raw
+-- needs: staging.behind_gap, staging.callback_segment, staging.context, raw
 WITH event AS (
     SELECT
         event_id, ts_ns, trace_index, cpu_id, thread_index, callback AS callback_handle,
@@ -23,13 +23,6 @@ located AS (
         ON e.thread_index = c.thread_index
         AND e.event_id >= c.from_event_id
         AND e.event_id < c.until_event_id
-),
-interrupted AS (
-    SELECT e.event_id, g.segment
-    FROM located AS e
-    ASOF JOIN staging.callback_gap AS g
-        ON e.thread_id = g.thread_id AND e.event_id >= g.event_id
-    WHERE e.thread_id IN (SELECT thread_id FROM staging.callback_gap)
 )
 SELECT
     e.event_id,
@@ -46,7 +39,7 @@ SELECT
     CASE WHEN x.event_id IS NULL THEN e.previous_executor_event_id END AS executor_event_id,
     coalesce(i.segment, 0) AS segment
 FROM located AS e
-LEFT JOIN interrupted AS i ON e.event_id = i.event_id
+LEFT JOIN staging.callback_segment AS i ON e.event_id = i.event_id
 LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'call') AS c
     ON e.event_id = c.event_id
 LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS x

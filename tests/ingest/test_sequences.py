@@ -6,7 +6,7 @@ import itertools
 from typing import Any
 
 import pyarrow as pa
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from msgflow.ingest.catalogue import Origin, load
@@ -64,6 +64,7 @@ def place(sequences: Sequences, of_round: list[Event]) -> tuple[list[Event], Pla
     return sorted(found, key=lambda row: row["event_id"]), placed
 
 
+@settings(deadline=None)
 @given(st.lists(st.lists(events, max_size=12), max_size=4))
 def test_predecessors_are_the_latest_of_their_sequence(rounds: list[list[Event]]) -> None:
     sequences = Sequences(load(), HOSTS)

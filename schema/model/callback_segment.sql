@@ -1,0 +1,22 @@
+-- name: staging.callback_segment
+-- description: How many gaps threads had seen at each begin and end of a callback, where they saw
+--     any at all.
+-- grain: one row per callback_start or callback_end behind the first gap of its thread
+-- needs: staging.callback_gap, staging.context, raw
+WITH event AS (
+    SELECT event_id, thread_index FROM raw.ros2_callback_start
+    UNION ALL
+    SELECT event_id, thread_index FROM raw.ros2_callback_end
+),
+located AS (
+    SELECT e.event_id, c.thread_id
+    FROM event AS e
+    JOIN staging.context AS c
+        ON e.thread_index = c.thread_index
+        AND e.event_id >= c.from_event_id
+        AND e.event_id < c.until_event_id
+    WHERE c.thread_id IN (SELECT thread_id FROM staging.callback_gap)
+)
+SELECT e.event_id, g.segment
+FROM located AS e
+ASOF JOIN staging.callback_gap AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id
