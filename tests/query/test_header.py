@@ -93,7 +93,7 @@ def test_a_macro_keeps_its_whole_statement() -> None:
         ("-- colour: red", "example.sql:3: unknown field 'colour'"),
         ("-- name: again", "example.sql:3: 'name' stands twice"),
         ("--param: a BIGINT  x", "example.sql:3: expected '-- field: value'"),
-        ("-- kind: table", "kind 'table' is not one of view, macro"),
+        ("-- kind: table", "kind 'table' is not one of view, inline, macro"),
         ("-- param: a", "example.sql:3: expected '-- param: name TYPE"),
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
