@@ -1,6 +1,7 @@
 """Speed and memory of reading and ingesting, beside Babeltrace 2 on the same trace in one run.
 
-    python benchmarks/run.py [--events 10000000] [--memory-limit SIZE] [--bt2] [--markdown FILE]
+    python benchmarks/run.py [--events 10000000 | --trace DIRECTORY] [--memory-limit SIZE] [--bt2]
+                             [--markdown FILE]
 
 Simulates a pipeline of nodes, then measures in processes of their own: our reader alone (all the
 columns of the catalogue, nothing kept), the whole ingest by stage, the query e2e-latency on the
@@ -45,7 +46,7 @@ print(time.monotonic() - begin)
 INGEST = """
 import json, sys; from pathlib import Path; from msgflow.ingest import ingest
 report = ingest([sys.argv[1]], Path(sys.argv[2]), memory_limit=sys.argv[3] or None)
-print(json.dumps(dict(report.stage_seconds)))
+print(json.dumps([report.event_count, dict(report.stage_seconds)]))
 """
 
 
@@ -71,8 +72,8 @@ def run(*command: str) -> tuple[str, float, int]:
         return output.read(), seconds, usage.ru_maxrss * 1024
 
 
-def measure(trace: str, database: str, memory_limit: str, with_bt2: bool) -> list[Row]:
-    """Measure everything on one trace."""
+def measure(trace: str, database: str, memory_limit: str, with_bt2: bool) -> tuple[int, list[Row]]:
+    """Measure everything on one trace; return its number of events and the measurements."""
     rows = []
     if shutil.which("babeltrace2"):
         _, seconds, peak = run("babeltrace2", "-o", "dummy", trace)
@@ -83,13 +84,13 @@ def measure(trace: str, database: str, memory_limit: str, with_bt2: bool) -> lis
         output, _, peak = run(sys.executable, "-c", READ, trace, "bt2")
         rows.append(Row("reader bt2 (Python bindings)", float(output), peak))
     output, _, peak = run(sys.executable, "-c", INGEST, trace, database, memory_limit)
-    stages = json.loads(output)
+    events, stages = json.loads(output)
     rows += [Row(f"ingest: {name}", seconds) for name, seconds in stages.items()]
     rows.append(Row("ingest, whole", sum(stages.values()), peak))
     query = (sys.executable, "-m", "msgflow", "query", "e2e-latency", "--db", database)
     _, seconds, peak = run(*query)
     rows.append(Row("query e2e-latency", seconds, peak))
-    return rows
+    return events, rows
 
 
 def report(rows: list[Row], events: int) -> list[str]:
@@ -111,20 +112,22 @@ def main() -> None:
     """Simulate, measure, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--events", type=int, default=10_000_000)
+    parser.add_argument("--trace", help="measure on this trace instead of a simulated one")
     parser.add_argument("--memory-limit", default="", help="as of `msgflow ingest`")
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
     parser.add_argument("--markdown", type=Path, help="append the table to this file")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as directory:
-        trace, database = str(Path(directory) / "trace"), str(Path(directory) / "bench.duckdb")
-        factor = arguments.events / EVENTS_PER_FACTOR
-        output, _, _ = run(sys.executable, "-c", SIMULATE, trace, str(factor))
-        events = int(output)
-        rows = measure(trace, database, arguments.memory_limit, arguments.bt2)
+        trace, database = arguments.trace, str(Path(directory) / "bench.duckdb")
+        if trace is None:
+            trace = str(Path(directory) / "trace")
+            factor = arguments.events / EVENTS_PER_FACTOR
+            run(sys.executable, "-c", SIMULATE, trace, str(factor))
+        events, rows = measure(trace, database, arguments.memory_limit, arguments.bt2)
         size = Path(database).stat().st_size
     load = os.getloadavg()[0]
     lines = [
-        f"{datetime.now(UTC):%Y-%m-%d}: {events:,} simulated events, {os.cpu_count()} cores "
+        f"{datetime.now(UTC):%Y-%m-%d}: {events:,} events, {os.cpu_count()} cores "
         f"({platform.machine()}), Python {platform.python_version()}, memory limit "
         f"{arguments.memory_limit or 'as needed'}, database {size / 1e6:,.0f} MB, "
         f"load {load:.1f} at the end.",
