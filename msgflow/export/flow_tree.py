@@ -6,11 +6,12 @@ import io
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
 from msgflow.export.flow_layout import lay_out_flow, walk
-from msgflow.export.human import format_duration, format_cell
+from msgflow.export.human import format_cell, format_duration
 from msgflow.query.window import format_epoch
 
 if TYPE_CHECKING:
@@ -83,9 +84,7 @@ class _Painter:
         self.zero_ns: int = branches[0].lines[0].item.node["start_ns"]
         self.has_hosts = len({node["host"] for node in flow.nodes.values()}) > 1
         self.time_width = max(
-            len(self._time(line.item.node))
-            for branch in walk(branches)
-            for line in branch.lines
+            len(self._time(line.item.node)) for branch in walk(branches) for line in branch.lines
         )
 
     def title(self) -> Text:
@@ -95,19 +94,26 @@ class _Painter:
             text += f"; times count from {format_epoch(self.zero_ns)}"
         return Text(text, style="bold")
 
-    def label(self, branch: Branch) -> Text:
-        return Text("\n").join(self._line(line) for line in branch.lines)
+    def label(self, branch: Branch) -> Table:
+        # Two columns, so that what is wrapped stays right of the times.
+        grid = Table.grid(padding=(0, 2))
+        grid.add_column(justify="right", min_width=self.time_width, no_wrap=True, style="cyan")
+        grid.add_column(overflow="fold")
+        for line in branch.lines:
+            grid.add_row(self._time(line.item.node), self._text(line))
+        return grid
 
-    def _line(self, line: Line) -> Text:
+    def _text(self, line: Line) -> Text:
         item = line.item
-        text = Text.assemble((f"{self._time(item.node):>{self.time_width}}  ", "cyan"))
+        text = Text()
         if line.is_reference:
-            return text.append(f"see [{item.number}]  {self._name(item)}", style="dim")
+            return text.append(f"see [{item.number}]  {self._name(item, line.link)}", style="dim")
         if item.number is not None:
             text.append(f"[{item.number}] ")
-        text.append(self._name(item), style="bold")
+        is_absent = item.node["kind"] == "subscription"
+        text.append(self._name(item, line.link), style="yellow" if is_absent else "bold")
         for detail in self._details(item, line.link):
-            text.append("  ").append(detail, style="yellow" if "NA" in detail else "")
+            text.append("  ").append(detail)
         if self.flow.direction == "both" and self._is_start(item):
             text.append("  ◀", style="bold green")
         return text
@@ -124,12 +130,13 @@ class _Painter:
         offset_ns = start_ns - self.zero_ns
         return f"{'+' if offset_ns >= 0 else ''}{format_duration(offset_ns)}"
 
-    def _name(self, item: Item) -> str:
+    def _name(self, item: Item, link: Row | None) -> str:
         node = item.node
         label, place = _printable(node["label"]), _printable(node["node"])
         if node["kind"] == "publication":
-            # Who published it stands on the line of the callback run.
-            return f"publishes {label}" if item.causes else f"{place}  publishes {label}"
+            # Else who published it stands on the line of the callback run.
+            is_alone = link is None or not item.causes
+            return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
         if node["kind"] == "callback_instance":
             return f"{place}  {label}"
         return f"{place}  Subscription({label})"
@@ -137,7 +144,7 @@ class _Painter:
     def _details(self, item: Item, link: Row | None) -> list[str]:
         node = item.node
         if node["kind"] == "subscription":
-            return [f"NA: not taken, {_reason(link)}"]
+            return [f"not taken: {_reason(link)}"]
         details = [_waits(edge) for _, edge in item.causes if edge["link_kind"] == "transport"]
         if link is not None and link["link_kind"] not in ("transport", "direct"):
             details.append(_waits(link))
@@ -151,7 +158,8 @@ class _Painter:
             details.append(f"in {format_duration(node['end_ns'] - node['start_ns'])}")
         for vertex in (item.take, node):
             if vertex is not None and vertex["missing"] in _NOT_SEEN:
-                details.append(f"NA: {_NOT_SEEN[vertex['missing']]}, {_reason(vertex)}")
+                why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
+                details.append(f"NA: {_NOT_SEEN[vertex['missing']]}{why}")
         if node["kind"] != "publication" or not item.causes:
             host = f" on {_printable(node['host'])}" if self.has_hosts else ""
             details.append(f"thread {_printable(node['thread'])}{host}")

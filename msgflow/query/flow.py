@@ -168,4 +168,5 @@ def read_steps(
 def _place(time_ns: int, run: Run) -> str:
     if run.start_ns is None:
         return f"--at {time_ns}"
-    return f"--at {time_ns - run.start_ns}ns ({format_epoch(time_ns)})"
+    seconds, nanoseconds = divmod(time_ns - run.start_ns, 1_000_000_000)
+    return f"--at +{seconds}.{nanoseconds:09d} ({format_epoch(time_ns)})"

@@ -181,6 +181,7 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
     [
         "info",
         "query info-runs",
+        "flow --topic /chatter",
         "sql FROM\u00a0run",
         "db check",
         "db schema",

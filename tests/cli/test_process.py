@@ -49,6 +49,7 @@ def imported(*arguments: object) -> set[str]:
         ("query", "info-topics", "--help"),
         ("query", "info-topics", "--show"),
         ("sql", "--help"),
+        ("flow", "--help"),
         ("info", "--help"),
         ("events", "--help"),
         ("export", "parquet", "--help"),
