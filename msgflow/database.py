@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from msgflow.db.check import CheckResult
     from msgflow.export.flow import Flow
-    from msgflow.export.parquet import ExportedView
+    from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.query.header import Header
     from msgflow.query.value import Value
@@ -294,26 +294,81 @@ class Database:
         views: Sequence[str] = (),
         *,
         run: str | int | None = "all",
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
         force: bool = False,
     ) -> tuple[ExportedView, ...]:
-        """Write public views to `directory`, one Parquet file each.
+        """Write public views to `directory/VIEW/run_id=ID/data.parquet`, all of them or none.
 
         Args:
             directory: created if missing.
             views: names of views; all when empty.
             run: 'all', a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time. Links belong to the time of their cause; objects, runs and
+                traces are always written.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+            force: replace views that an export has written there.
+
+        Raises:
+            UsageError: a view, run or time that does not exist, or a file that does.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.parquet import export_parquet
+        from msgflow.export.views import select_views
+
+        connection = self.connection
+
+        def export() -> tuple[ExportedView, ...]:
+            selection = select_views(
+                connection, views, run=run, start=start, end=end, skip_first=skip_first
+            )
+            return export_parquet(connection, Path(directory), selection, force=force)
+
+        return interruptible(connection, export)
+
+    def export_csv(
+        self,
+        directory: str | Path,
+        views: Sequence[str] = (),
+        *,
+        run: str | int | None = "all",
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+        force: bool = False,
+    ) -> tuple[ExportedView, ...]:
+        """Write public views to `directory/VIEW.csv`, all of them or none.
+
+        Args:
+            directory: created if missing.
+            views: names of views; all when empty.
+            run: 'all', a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time. Links belong to the time of their cause; objects, runs and
+                traces are always written.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
             force: replace files that exist.
 
         Raises:
-            UsageError: a view or run that does not exist, a file that does.
+            UsageError: a view, run or time that does not exist, or a file that does.
+            DatabaseError: the file cannot be opened.
         """
-        from msgflow.export.parquet import export_parquet
+        from msgflow.export.csv_files import export_csv
+        from msgflow.export.views import select_views
 
         connection = self.connection
-        return interruptible(
-            connection,
-            lambda: export_parquet(connection, Path(directory), views=views, run=run, force=force),
-        )
+
+        def export() -> tuple[ExportedView, ...]:
+            selection = select_views(
+                connection, views, run=run, start=start, end=end, skip_first=skip_first
+            )
+            return export_csv(connection, Path(directory), selection, force=force)
+
+        return interruptible(connection, export)
 
 
 def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:

@@ -3,8 +3,8 @@
 -- description: The picture of one message: what a publication, take or callback run causes, what it
 --     is caused by, or both, with times, names, and what is missing where a branch ends. Vertices
 --     nearest to the start come first where a limit cuts the flow.
--- grain: one row per vertex of the flow and link that leads to it, without link where there is none,
---     and one per subscription that did not get a message
+-- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
+--     does), and one per subscription that did not get a message
 -- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
 -- param: start_id BIGINT  Identity of the vertex to start from
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
