@@ -15,8 +15,8 @@
 -- column: depth INTEGER  Steps from the start; negative: backward
 -- column: from_kind VARCHAR  Cause that the link comes from, as kind
 -- column: from_id BIGINT  Identity of the cause
--- column: link_kind VARCHAR  'transport', 'callback', or the kind of the causal link; 'not_taken' to
---     a subscription that did not get the message
+-- column: link_kind VARCHAR  'transport', 'callback', the kind of the causal link, or 'not_taken'
+--     to a subscription that did not get the message
 -- column: wait_ns BIGINT [ns]  Time between cause and effect; NULL where the effect is part of the
 --     cause
 -- column: candidate_count BIGINT  Causes that it could have been
@@ -39,7 +39,7 @@
 -- column: internal_count BIGINT  Effects on ROS's own topics that are left out
 -- needs: store.publication, store.take, store.callback_instance, store.link_causal,
 --     store.link_transport, store.publisher, store.subscription, store.node, store.process,
---     store.thread, store.host, store.callback, derive.flow_link, derive.flow_not_taken, derive.node_label,
+--     store.thread, store.host, store.callback, derive.flow_link, derive.flow_end, derive.node_label,
 --     main.publication, main.take, main.callback_instance, main.callback_label
 CREATE OR REPLACE MACRO main.flow_step(
     start_kind, start_id, direction := 'both', max_depth := 96, max_vertices := 1000,
@@ -131,7 +131,8 @@ described AS MATERIALIZED (
         coalesce(p.topic_name, '?') AS label,
         p.topic_name,
         NULL::VARCHAR AS symbol,
-        NULL::VARCHAR AS missing
+        NULL::VARCHAR AS missing,
+        NULL::VARCHAR AS reason
     FROM vertex AS v
     JOIN main.publication AS b ON v.id = b.publication_id
     JOIN store.process AS o ON b.process_id = o.process_id
@@ -147,15 +148,16 @@ described AS MATERIALIZED (
         s.topic_name,
         NULL,
         CASE
-            WHEN l.take_id IS NULL THEN 'publication'
+            WHEN x.id IS NOT NULL THEN 'publication'
             WHEN i.take_id IS NULL THEN 'callback'
-        END
+        END,
+        x.reason
     FROM vertex AS v
     JOIN main.take AS t ON v.id = t.take_id
     JOIN store.process AS o ON t.process_id = o.process_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN store.node AS n ON s.node_id = n.node_id
-    LEFT JOIN store.link_transport AS l ON t.take_id = l.take_id
+    LEFT JOIN derive.flow_end AS x ON x.kind = 'take' AND t.take_id = x.id
     LEFT JOIN store.callback_instance AS i ON t.take_id = i.take_id
     WHERE v.kind = 'take'
     UNION ALL
@@ -165,7 +167,8 @@ described AS MATERIALIZED (
         CASE
             WHEN k.kind = 'subscription' AND i.take_id IS NULL THEN 'take'
             WHEN i.end_ns IS NULL THEN 'end'
-        END
+        END,
+        NULL
     FROM vertex AS v
     JOIN main.callback_instance AS i ON v.id = i.callback_instance_id
     JOIN store.callback AS k ON i.callback_id = k.callback_id
@@ -202,7 +205,7 @@ SELECT
     printf('%s %d', coalesce(h.name, '?'), h.tid) AS thread,
     m.hostname AS host,
     d.missing,
-    NULL::VARCHAR AS reason,
+    d.reason,
     coalesce(c.cut_count, 0) AS cut_count,
     coalesce(o.internal_count, 0) AS internal_count
 FROM described AS d
@@ -246,7 +249,7 @@ SELECT
     0
 FROM shown AS v
 JOIN described AS d ON v.kind = d.kind AND v.id = d.id
-JOIN derive.flow_not_taken AS x ON v.id = x.publication_id
+JOIN derive.flow_end AS x ON x.kind = 'publication' AND v.id = x.id
 JOIN store.subscription AS s ON x.subscription_id = s.subscription_id
 JOIN store.process AS o ON s.process_id = o.process_id
 JOIN store.host AS m ON o.host_id = m.host_id

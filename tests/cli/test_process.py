@@ -53,6 +53,7 @@ def imported(*arguments: object) -> set[str]:
         ("info", "--help"),
         ("events", "--help"),
         ("export", "parquet", "--help"),
+        ("export", "csv", "--help"),
         ("db", "upgrade", "--help"),
         ("simulate", "--help"),
     ],
