@@ -39,7 +39,8 @@
 -- column: internal_count BIGINT  Effects on ROS's own topics that are left out
 -- needs: store.publication, store.take, store.callback_instance, store.link_causal,
 --     store.link_transport, store.publisher, store.subscription, store.node, store.process,
---     store.thread, store.host, store.callback, derive.flow_link, derive.flow_end, derive.node_label,
+--     store.thread, store.host, store.callback, derive.vertex_key, derive.vertex_kind,
+--     derive.flow_link, derive.flow_end, derive.node_label,
 --     main.publication, main.take, main.callback_instance, main.callback_label
 CREATE OR REPLACE MACRO main.flow_step(
     start_kind, start_id, direction := 'both', max_depth := 96, max_vertices := 1000,
@@ -55,77 +56,78 @@ WITH RECURSIVE origin AS MATERIALIZED (
     SELECT run_id FROM store.callback_instance
     WHERE start_kind = 'callback_instance' AND callback_instance_id = start_id
 ),
-link AS MATERIALIZED (
-    SELECT l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind
-    FROM derive.flow_link AS l
-    WHERE l.run_id IN (SELECT run_id FROM origin)
-),
 -- Effects on ROS's own topics: no branches of the picture.
 aside AS MATERIALIZED (
-    SELECT l.callback_instance_id, l.publication_id
+    SELECT l.callback_instance_id, derive.vertex_key('publication', l.publication_id) AS key
     FROM store.link_causal AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE p.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
 ),
+link AS (
+    SELECT
+        derive.vertex_key(from_kind, from_id) AS from_key,
+        derive.vertex_key(to_kind, to_id) AS to_key
+    FROM derive.flow_link
+    WHERE run_id IN (SELECT run_id FROM origin)
+),
 edge AS MATERIALIZED (
-    SELECT false AS is_backward, l.from_kind, l.from_id, l.to_kind, l.to_id
+    SELECT false AS is_backward, l.from_key, l.to_key
     FROM link AS l
-    ANTI JOIN aside AS a ON l.to_kind = 'publication' AND l.to_id = a.publication_id
+    ANTI JOIN aside AS a ON l.to_key = a.key
     WHERE direction <> 'backward'
     UNION ALL
-    SELECT true, to_kind, to_id, from_kind, from_id
+    SELECT true, to_key, from_key
     FROM link
     WHERE direction <> 'forward'
 ),
-near (is_backward, kind, id, depth) USING KEY (is_backward, kind, id) AS (
-    SELECT s.is_backward, start_kind::VARCHAR, start_id::BIGINT, 0
+near (is_backward, key, depth) USING KEY (is_backward, key) AS (
+    SELECT s.is_backward, derive.vertex_key(start_kind, start_id)::BIGINT, 0
     FROM (VALUES (false), (true)) AS s (is_backward)
     CROSS JOIN origin AS o
     UNION
-    SELECT n.is_backward, e.to_kind, e.to_id, min(n.depth) + 1
+    SELECT n.is_backward, e.to_key, min(n.depth) + 1
     FROM near AS n
-    JOIN edge AS e
-        ON n.is_backward = e.is_backward AND n.kind = e.from_kind AND n.id = e.from_id
-    ANTI JOIN recurring.near AS k
-        ON n.is_backward = k.is_backward AND e.to_kind = k.kind AND e.to_id = k.id
+    JOIN edge AS e ON n.is_backward = e.is_backward AND n.key = e.from_key
+    ANTI JOIN recurring.near AS k ON n.is_backward = k.is_backward AND e.to_key = k.key
     WHERE n.depth < max_depth AND (SELECT count(*) FROM recurring.near) <= max_vertices
-    GROUP BY n.is_backward, e.to_kind, e.to_id
+    GROUP BY n.is_backward, e.to_key
 ),
 -- The same vertex may come twice, as effect and as cause: the start, and in rings others.
 vertex AS MATERIALIZED (
     SELECT
-        kind,
-        id,
+        key,
+        derive.vertex_kind(key) AS kind,
+        key // 8 AS id,
         CASE WHEN bool_and(is_backward) THEN -min(depth) ELSE min(depth) END::INTEGER AS depth
     FROM near
-    GROUP BY kind, id
+    GROUP BY key
     ORDER BY min(depth), bool_and(is_backward), kind, id
     LIMIT max_vertices::BIGINT
 ),
 shown AS MATERIALIZED (
-    SELECT n.is_backward, n.kind, n.id
+    SELECT n.is_backward, v.key, v.kind, v.id
     FROM near AS n
-    SEMI JOIN vertex AS v ON n.kind = v.kind AND n.id = v.id
+    JOIN vertex AS v ON n.key = v.key
     WHERE direction = 'both' OR n.is_backward = (direction = 'backward')
 ),
 cut AS (
-    SELECT s.kind, s.id, count(*) AS cut_count
+    SELECT s.key, count(*) AS cut_count
     FROM shown AS s
-    JOIN edge AS e ON s.is_backward = e.is_backward AND s.kind = e.from_kind AND s.id = e.from_id
-    ANTI JOIN vertex AS v ON e.to_kind = v.kind AND e.to_id = v.id
-    GROUP BY s.kind, s.id
+    JOIN edge AS e ON s.is_backward = e.is_backward AND s.key = e.from_key
+    ANTI JOIN vertex AS v ON e.to_key = v.key
+    GROUP BY s.key
 ),
 left_out AS (
-    SELECT a.callback_instance_id, count(*) AS internal_count
+    SELECT s.key, count(*) AS internal_count
     FROM aside AS a
-    SEMI JOIN shown AS s
-        ON s.kind = 'callback_instance' AND a.callback_instance_id = s.id AND NOT s.is_backward
-    ANTI JOIN vertex AS v ON v.kind = 'publication' AND a.publication_id = v.id
-    GROUP BY a.callback_instance_id
+    JOIN shown AS s ON s.kind = 'callback_instance' AND a.callback_instance_id = s.id
+    ANTI JOIN vertex AS v ON a.key = v.key
+    WHERE NOT s.is_backward
+    GROUP BY s.key
 ),
 described AS MATERIALIZED (
     SELECT
-        v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
+        v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
         b.process_id,
         derive.node_label(n.full_name, o.name, o.pid) AS node,
         coalesce(p.topic_name, '?') AS label,
@@ -141,7 +143,7 @@ described AS MATERIALIZED (
     WHERE v.kind = 'publication'
     UNION ALL
     SELECT
-        v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
+        v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
         t.process_id,
         derive.node_label(n.full_name, o.name, o.pid),
         coalesce(s.topic_name, '?'),
@@ -162,7 +164,7 @@ described AS MATERIALIZED (
     WHERE v.kind = 'take'
     UNION ALL
     SELECT
-        v.kind, v.id, v.depth, i.run_id, i.start_ns, i.end_ns, i.thread_id,
+        v.key, v.kind, v.id, v.depth, i.run_id, i.start_ns, i.end_ns, i.thread_id,
         i.process_id, c.node, c.label, s.topic_name, k.symbol,
         CASE
             WHEN k.kind = 'subscription' AND i.take_id IS NULL THEN 'take'
@@ -177,8 +179,11 @@ described AS MATERIALIZED (
     WHERE v.kind = 'callback_instance'
 ),
 arrow AS MATERIALIZED (
-    SELECT l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind
-    FROM link AS l
+    SELECT
+        l.from_kind, l.from_id, l.link_kind, l.to_id,
+        derive.vertex_key(l.from_kind, l.from_id) AS from_key,
+        derive.vertex_key(l.to_kind, l.to_id) AS to_key
+    FROM derive.flow_link AS l
     JOIN vertex AS f ON l.from_kind = f.kind AND l.from_id = f.id
     JOIN vertex AS t ON l.to_kind = t.kind AND l.to_id = t.id
 )
@@ -209,8 +214,8 @@ SELECT
     coalesce(c.cut_count, 0) AS cut_count,
     coalesce(o.internal_count, 0) AS internal_count
 FROM described AS d
-LEFT JOIN arrow AS a ON d.kind = a.to_kind AND d.id = a.to_id
-LEFT JOIN described AS f ON a.from_kind = f.kind AND a.from_id = f.id
+LEFT JOIN arrow AS a ON d.key = a.to_key
+LEFT JOIN described AS f ON a.from_key = f.key
 LEFT JOIN store.link_transport AS lt
     ON a.link_kind = 'transport' AND a.to_id = lt.take_id AND a.from_id = lt.publication_id
 LEFT JOIN store.link_causal AS lc
@@ -221,8 +226,8 @@ LEFT JOIN store.link_causal AS lc
 LEFT JOIN store.thread AS h ON d.thread_id = h.thread_id
 JOIN store.process AS q ON d.process_id = q.process_id
 JOIN store.host AS m ON q.host_id = m.host_id
-LEFT JOIN cut AS c ON d.kind = c.kind AND d.id = c.id
-LEFT JOIN left_out AS o ON d.kind = 'callback_instance' AND d.id = o.callback_instance_id
+LEFT JOIN cut AS c ON d.key = c.key
+LEFT JOIN left_out AS o ON d.key = o.key
 UNION ALL
 SELECT
     x.run_id,
@@ -248,7 +253,7 @@ SELECT
     0,
     0
 FROM shown AS v
-JOIN described AS d ON v.kind = d.kind AND v.id = d.id
+JOIN described AS d ON v.key = d.key
 JOIN derive.flow_end AS x ON x.kind = 'publication' AND v.id = x.id
 JOIN store.subscription AS s ON x.subscription_id = s.subscription_id
 JOIN store.process AS o ON s.process_id = o.process_id
