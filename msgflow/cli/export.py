@@ -26,7 +26,7 @@ app = typer.Typer(help="Write the content of a database to files.")
 _DirectoryArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing")]
 _ViewsArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[VIEW]...", help="All public views if none (msgflow db schema)"),
+    typer.Argument(metavar="VIEW", help="All public views if none (msgflow db schema)"),
 ]
 _RunOption = Annotated[
     str,
@@ -53,8 +53,9 @@ def parquet(
 ) -> None:
     """Write public views to DIR/VIEW/run_id=ID/data.parquet, all of them or none.
 
-    Each file tells view, schema revision and version of msgflow in its metadata. A time window
-    cuts what happened (publications, takes, callback runs, links by their cause); objects stay.
+    Each file tells view, schema revision and version of msgflow in its metadata.
+
+    A time window cuts what happened (a link, where its cause did); objects stay.
     """
     from msgflow.database import Database
 
@@ -84,8 +85,9 @@ def csv(
 ) -> None:
     """Write public views to DIR/VIEW.csv, all of them or none.
 
-    Text stands in quotes, a missing value is an empty field without. A time window cuts what
-    happened (publications, takes, callback runs, links by their cause); objects stay.
+    Text stands in quotes, a missing value is an empty field without.
+
+    A time window cuts what happened (a link, where its cause did); objects stay.
     """
     from msgflow.database import Database
 

@@ -121,8 +121,9 @@ def command(
 ) -> None:
     """Print the flow of one message: what it was caused by, and what it caused.
 
-    A line is a publication, or a message that was taken, with the run of the callback it was for.
-    Times count from the first line. NA stands for what the trace does not show.
+    A line is a publication, or a message taken with the callback run it was for.
+
+    Times count from the first line. NA is what the trace does not show.
     """
     from msgflow.cli.output import print_note, print_runs, print_text
     from msgflow.database import Database

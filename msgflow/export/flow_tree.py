@@ -11,7 +11,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from msgflow.export.flow_layout import lay_out_flow, walk
-from msgflow.export.human import format_cell, format_duration
+from msgflow.export.human import format_cell, format_duration, short_symbol
 from msgflow.query.window import format_epoch
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 60
 _INDENT = 4
-_LONGEST_SYMBOL = 60
 _NOT_SEEN = {
     "publication": "its publication was not seen",
     "take": "its message was not seen",
@@ -164,7 +163,7 @@ class _Painter:
             host = f" on {_printable(node['host'])}" if self.has_hosts else ""
             details.append(f"thread {_printable(node['thread'])}{host}")
         if node["symbol"]:
-            details.append(_short(_printable(node["symbol"])))
+            details.append(_printable(short_symbol(node["symbol"])))
         number = node["cut_count"] + (item.take["cut_count"] if item.take else 0)
         if number:
             details.append(f"… {number} more")
@@ -186,10 +185,6 @@ def _waits(edge: Row) -> str:
 def _reason(row: Row | None) -> str:
     reason = None if row is None else row["reason"]
     return "reason unknown" if reason is None else str(reason)
-
-
-def _short(symbol: str) -> str:
-    return symbol if len(symbol) <= _LONGEST_SYMBOL else f"{symbol[: _LONGEST_SYMBOL - 1]}…"
 
 
 def _printable(value: object) -> str:
