@@ -161,7 +161,7 @@ def read_flow(
     table = read_steps(
         connection, start, direction=direction, depth=depth, limit=limit, internal=internal
     )
-    flow = Flow(start, direction, depth, limit, run, table)
+    flow = Flow(start, direction, depth, limit, run, table, list(start.notes))
     flow.notes.extend(_notes(flow))
     if len({node["host"] for node in flow.nodes.values()}) > 1:
         flow.notes.extend(clock_notes(connection, [run]))

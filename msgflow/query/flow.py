@@ -53,10 +53,12 @@ class Start:
     Attributes:
         kind: one of `KINDS`.
         id: its identity.
+        notes: what to say about the choice, a sentence each.
     """
 
     kind: str
     id: int
+    notes: tuple[str, ...] = ()
 
 
 def find_start(
@@ -98,7 +100,10 @@ def find_start(
             f"no message was published on {topic} at or after that time — {at}",
             f"the last one was at {_place(last_ns, runs[0])}",
         )
-    return Start("publication", found[0][0])
+    start_ns = runs[0].start_ns
+    is_early = at is not None and start_ns is not None and at_ns < start_ns
+    note = "the time of --at is before the run: this is the first message on the topic"
+    return Start("publication", found[0][0], (note,) if is_early else ())
 
 
 def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:

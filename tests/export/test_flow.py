@@ -157,6 +157,10 @@ def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> No
         assert database.flow("/chatter", run="morning").start.id == 1
         for at in (None, "0.5s", "500ms", 1_700_000_010_500_000_000, "2023-11-14T22:13:30.5Z"):
             assert database.flow("/chatter", at=at).start.id == 2
+        # A number without unit is epoch ns, which who wrote it may not have meant.
+        early = database.flow("/chatter", at="2")
+        assert (early.start.id, len(early.notes)) == (2, 1)
+        assert "before the run" in early.notes[0]
         with pytest.raises(UsageError) as raised:
             database.flow("/chatter", at="0.500000001s")
         assert raised.value.hint is not None
