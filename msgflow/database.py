@@ -19,13 +19,17 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from msgflow.db.check import CheckResult
-    from msgflow.export.parquet import ExportedView
+    from msgflow.export.flow import Flow
+    from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
 
 DEFAULT_LIMIT = 10_000
+# Of flows: messages in a row, and vertices.
+DEFAULT_DEPTH = 32
+DEFAULT_VERTICES = 1_000
 
 _SCHEMA = """
 SELECT columns.table_name AS view, columns.column_name AS column, columns.data_type AS type,
@@ -179,6 +183,73 @@ class Database:
             ),
         )
 
+    def flow(
+        self,
+        topic: str | None = None,
+        *,
+        at: str | int | None = None,
+        publication_id: int | None = None,
+        take_id: int | None = None,
+        callback_instance_id: int | None = None,
+        run: str | int | None = None,
+        direction: str = "both",
+        depth: int = DEFAULT_DEPTH,
+        limit: int = DEFAULT_VERTICES,
+        internal: bool = False,
+    ) -> Flow:
+        """Return what one message caused and was caused by; `print` draws it as a tree.
+
+        Args:
+            topic: the first message published on it at or after `at`; else give an identity.
+            at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; the begin of
+                the run when None.
+            publication_id: identity of a publication.
+            take_id: identity of a take.
+            callback_instance_id: identity of a run of a callback.
+            run: a name or an id, for `topic` only; the latest run when None.
+            direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
+            depth: most messages in a row, each way.
+            limit: most publications, takes and callback runs.
+            internal: follow what is published on ROS's own topics too.
+
+        Raises:
+            UsageError: not exactly one thing to start from, or one that does not exist.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.flow import read_flow
+        from msgflow.query.flow import Start, find_start
+
+        given = {
+            "publication": publication_id,
+            "take": take_id,
+            "callback_instance": callback_instance_id,
+        }
+        starts = [Start(kind, number) for kind, number in given.items() if number is not None]
+        if len(starts) + (topic is not None) != 1:
+            raise UsageError(
+                "a flow starts from one thing: a topic, a publication, a take or a callback run",
+                "msgflow flow --topic /chatter --at 2.5s, or msgflow flow --publication 1",
+            )
+        if starts and not at is run is None:
+            raise UsageError(
+                "an identity tells run and time already", "leave out --run and --at, or use --topic"
+            )
+        connection = self.connection
+
+        def read() -> Flow:
+            start = starts[0] if topic is None else find_start(connection, topic, at, run)
+            return read_flow(
+                connection,
+                start,
+                direction=direction,
+                depth=depth,
+                limit=limit,
+                internal=internal,
+            )
+
+        return interruptible(connection, read)
+
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
         """Run SQL, read-only, without access to other files, and return the last result.
 
@@ -223,26 +294,81 @@ class Database:
         views: Sequence[str] = (),
         *,
         run: str | int | None = "all",
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
         force: bool = False,
     ) -> tuple[ExportedView, ...]:
-        """Write public views to `directory`, one Parquet file each.
+        """Write public views to `directory/VIEW/run_id=ID/data.parquet`, all of them or none.
 
         Args:
             directory: created if missing.
             views: names of views; all when empty.
             run: 'all', a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time. Links belong to the time of their cause; objects, runs and
+                traces are always written.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+            force: replace views that an export has written there.
+
+        Raises:
+            UsageError: a view, run or time that does not exist, or a file that does.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.parquet import export_parquet
+        from msgflow.export.views import select_views
+
+        connection = self.connection
+
+        def export() -> tuple[ExportedView, ...]:
+            selection = select_views(
+                connection, views, run=run, start=start, end=end, skip_first=skip_first
+            )
+            return export_parquet(connection, Path(directory), selection, force=force)
+
+        return interruptible(connection, export)
+
+    def export_csv(
+        self,
+        directory: str | Path,
+        views: Sequence[str] = (),
+        *,
+        run: str | int | None = "all",
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+        force: bool = False,
+    ) -> tuple[ExportedView, ...]:
+        """Write public views to `directory/VIEW.csv`, all of them or none.
+
+        Args:
+            directory: created if missing.
+            views: names of views; all when empty.
+            run: 'all', a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time. Links belong to the time of their cause; objects, runs and
+                traces are always written.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
             force: replace files that exist.
 
         Raises:
-            UsageError: a view or run that does not exist, a file that does.
+            UsageError: a view, run or time that does not exist, or a file that does.
+            DatabaseError: the file cannot be opened.
         """
-        from msgflow.export.parquet import export_parquet
+        from msgflow.export.csv_files import export_csv
+        from msgflow.export.views import select_views
 
         connection = self.connection
-        return interruptible(
-            connection,
-            lambda: export_parquet(connection, Path(directory), views=views, run=run, force=force),
-        )
+
+        def export() -> tuple[ExportedView, ...]:
+            selection = select_views(
+                connection, views, run=run, start=start, end=end, skip_first=skip_first
+            )
+            return export_csv(connection, Path(directory), selection, force=force)
+
+        return interruptible(connection, export)
 
 
 def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli import db, events, export, info, ingest, query, simulate, sql
+from msgflow.cli import db, events, export, flow, info, ingest, query, simulate, sql
 from msgflow.cli.root import RootGroup
 from msgflow.version import __version__
 
@@ -21,6 +21,7 @@ app = typer.Typer(
 )
 app.command("ingest")(ingest.command)
 app.add_typer(query.app, name="query")
+app.command("flow")(flow.command)
 app.command("events")(events.command)
 app.command("sql")(sql.command)
 app.command("info")(info.command)

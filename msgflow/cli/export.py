@@ -3,13 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    SELECTION,
+    DatabaseOption,
+    EndOption,
+    SkipFirstOption,
+    StartOption,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from msgflow.export.views import ExportedView
 
 app = typer.Typer(help="Write the content of a database to files.")
+
+_DirectoryArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing")]
+_ViewsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="VIEW", help="All public views if none (msgflow db schema)"),
+]
+_RunOption = Annotated[
+    str,
+    typer.Option("--run", metavar="NAME|ID|all", help="Run to export", rich_help_panel=SELECTION),
+]
+_ForceOption = Annotated[bool, typer.Option("--force", help="Replace an earlier export")]
 
 
 @app.callback()
@@ -19,19 +42,70 @@ def group() -> None:
 
 @app.command("parquet")
 def parquet(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing")],
-    views: Annotated[
-        list[str] | None, typer.Argument(metavar="[VIEW]...", help="All public views if none")
-    ] = None,
-    run: Annotated[str, typer.Option("--run", metavar="NAME|ID|all", help="Run to export")] = "all",
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist")] = False,
+    directory: _DirectoryArgument,
+    views: _ViewsArgument = None,
+    run: _RunOption = "all",
+    start: StartOption = None,
+    end: EndOption = None,
+    skip_first: SkipFirstOption = None,
+    force: _ForceOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write each public view to DIR/VIEW.parquet, with the schema revision in its metadata."""
-    from msgflow.cli.output import count, print_status
+    """Write public views to DIR/VIEW/run_id=ID/data.parquet, all of them or none.
+
+    Each file tells view, schema revision and version of msgflow in its metadata.
+
+    A time window cuts what happened (a link, where its cause did); objects stay.
+    """
     from msgflow.database import Database
 
     with Database(database) as opened:
-        exported = opened.export_parquet(directory, views or (), run=run, force=force)
+        exported = opened.export_parquet(
+            directory,
+            views or (),
+            run=run,
+            start=start,
+            end=end,
+            skip_first=skip_first,
+            force=force,
+        )
+    _report(exported, directory)
+
+
+@app.command("csv")
+def csv(
+    directory: _DirectoryArgument,
+    views: _ViewsArgument = None,
+    run: _RunOption = "all",
+    start: StartOption = None,
+    end: EndOption = None,
+    skip_first: SkipFirstOption = None,
+    force: _ForceOption = False,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write public views to DIR/VIEW.csv, all of them or none.
+
+    Text stands in quotes, a missing value is an empty field without.
+
+    A time window cuts what happened (a link, where its cause did); objects stay.
+    """
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        exported = opened.export_csv(
+            directory,
+            views or (),
+            run=run,
+            start=start,
+            end=end,
+            skip_first=skip_first,
+            force=force,
+        )
+    _report(exported, directory)
+
+
+def _report(exported: Sequence[ExportedView], directory: Path) -> None:
+    from msgflow.cli.output import count, print_status
+
     rows = sum(view.row_count for view in exported)
     print_status(f"{count(len(exported), 'view')}, {count(rows, 'row')} written to {directory}")

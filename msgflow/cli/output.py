@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -13,9 +14,10 @@ from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from msgflow.query.result import QueryResult
+    from msgflow.query.window import Run
 
 
 def print_error(message: str, hint: str | None = None) -> None:
@@ -50,10 +52,7 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
     from msgflow.atomic import replacing
 
     form = form or format_of(path)
-    if result.runs:
-        label = "run" if len(result.runs) == 1 else "runs"
-        names = ", ".join(f"{run.name} ({run.run_id})" for run in result.runs)
-        _labelled(label, typer.colors.CYAN, names)
+    print_runs(result.runs)
     if path is not None:
         with replacing(path) as temporary, temporary.open("wb") as stream:
             write_result(result, form, stream)
@@ -67,6 +66,39 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
         print_note("no rows")
     for note in result.notes:
         print_note(note)
+
+
+def print_runs(runs: Sequence[Run]) -> None:
+    """Print which runs were read, if any."""
+    if runs:
+        names = ", ".join(f"{run.name} ({run.run_id})" for run in runs)
+        _labelled("run" if len(runs) == 1 else "runs", typer.colors.CYAN, names)
+
+
+def print_text(draw: Callable[[int | None, bool], str], path: Path | None) -> None:
+    """Write text to a file or stdout.
+
+    Args:
+        draw: returns the text for a width (of the terminal; None elsewhere), with colours or not.
+        path: file to write, replaced when it exists; stdout when None.
+
+    Raises:
+        UsageError: a closed stdout, or a file that cannot be written.
+    """
+    from msgflow.atomic import replacing
+
+    if path is not None:
+        with replacing(path) as temporary:
+            temporary.write_text(f"{draw(None, False)}\n", encoding="utf-8")
+        print_status(f"written to {path}")
+        return
+    stream = data_stream()
+    if stream.isatty():
+        color = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+        text = draw(shutil.get_terminal_size().columns, color)
+    else:
+        text = draw(None, False)
+    stream.write(f"{text}\n".encode())
 
 
 def print_lines(lines: Iterable[str]) -> None:

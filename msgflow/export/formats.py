@@ -88,16 +88,28 @@ def _json_array(result: QueryResult) -> Iterator[str]:
     yield f"{before}{row}]"
 
 
+def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
+    """Return a batch as CSV has it: integers, floats and truth values as they are, else text.
+
+    Text gets quotes, NULL does not: so an empty text and a missing one stay apart.
+    """
+    import pyarrow
+
+    columns = [_csv_column(column) for column in batch.columns]
+    return pyarrow.RecordBatch.from_arrays(columns, names=batch.schema.names)
+
+
 def _write_csv(table: pa.Table, stream: IO[bytes]) -> None:
-    # Text in quotes, NULL without: so an empty text and a missing one stay apart.
     import pyarrow
     import pyarrow.csv
 
-    columns = [_csv_column(column) for column in table.columns]
-    pyarrow.csv.write_csv(pyarrow.table(columns, names=table.column_names), stream)
+    empty = pyarrow.RecordBatch.from_pylist([], schema=table.schema)
+    with pyarrow.csv.CSVWriter(stream, csv_batch(empty).schema) as writer:
+        for batch in table.to_batches(max_chunksize=_ROWS_AT_ONCE):
+            writer.write_batch(csv_batch(batch))
 
 
-def _csv_column(column: pa.ChunkedArray) -> pa.ChunkedArray:
+def _csv_column(column: pa.Array) -> pa.Array:
     import pyarrow
     import pyarrow.types as types
 
@@ -111,7 +123,7 @@ def _csv_column(column: pa.ChunkedArray) -> pa.ChunkedArray:
         return column
     if types.is_decimal(kind) and kind.scale == 0:
         return column
-    return pyarrow.chunked_array([pyarrow.array(map(_csv_text, column.to_pylist()), "string")])
+    return pyarrow.array(map(_csv_text, column.to_pylist()), "string")
 
 
 def _csv_text(value: object) -> str | None:

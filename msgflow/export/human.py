@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from msgflow.export.plain import plain
 from msgflow.query.window import format_epoch
+
+_BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")
 
 NULL = "-"
 DURATION = "ns"
@@ -45,6 +48,22 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
     if isinstance(value, list):
         return ", ".join(format_cell(item, unit, is_handle=is_handle) for item in value)
     return _printable(str(value))
+
+
+def short_symbol(symbol: str) -> str:
+    """Return the name of a function without arguments and template parameters.
+
+    Of a bound method C++ tells the class alone: `Camera::*`.
+    """
+    if bound := _BOUND.match(symbol):
+        return f"{bound['owner']}::*"
+    depth = 0
+    name = ""
+    for character in symbol:
+        depth += character in "(<"
+        name += "" if depth else character
+        depth -= character in ")>" and depth > 0
+    return name.strip() or symbol
 
 
 def shown_name(name: str, unit: str | None, names: tuple[str, ...]) -> str:

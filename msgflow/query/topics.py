@@ -38,15 +38,27 @@ def require_topics(
     Raises:
         UsageError: it names similar topics, else the first few.
     """
-    wanted = [name for key in TOPIC_PARAMETERS if isinstance(name := bound.get(key), str)]
-    if not wanted or not runs:
-        return
+    for key in TOPIC_PARAMETERS:
+        if isinstance(name := bound.get(key), str) and runs:
+            require_topic(connection, runs, name)
+
+
+def require_topic(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], name: str) -> None:
+    """Raise unless the chosen runs have a topic.
+
+    Args:
+        connection: to a database with the public views.
+        runs: the chosen runs, at least one.
+        name: of the topic.
+
+    Raises:
+        UsageError: it names similar topics, else the first few.
+    """
     rows = connection.execute(_TOPICS, {"runs": [run.run_id for run in runs]}).fetchall()
-    known = sorted(name for (name,) in rows if name is not None)
-    for name in wanted:
-        if name not in known:
-            where = "the run" if len(runs) == 1 else "these runs"
-            raise UsageError(f"there is no such topic in {where} — {name}", _hint(name, known))
+    known = sorted(known_name for (known_name,) in rows if known_name is not None)
+    if name not in known:
+        where = "the run" if len(runs) == 1 else "these runs"
+        raise UsageError(f"there is no such topic in {where} — {name}", _hint(name, known))
 
 
 def _hint(name: str, known: list[str]) -> str:

@@ -105,14 +105,24 @@ def time_window(
             "--skip-first",
         )
     else:
-        start_ns = MINIMUM_NS if start is None else _point(start, runs, "--start")
-    end_ns = MAXIMUM_NS if end is None else _point(end, runs, "--end")
+        start_ns = MINIMUM_NS if start is None else time_point(start, runs, "--start")
+    end_ns = MAXIMUM_NS if end is None else time_point(end, runs, "--end")
     if start_ns > end_ns:
         raise UsageError(f"the window ends before it starts — {start_ns} to {end_ns} ns")
     return start_ns, end_ns
 
 
-def _point(text: str | int, runs: Sequence[Run], option: str) -> int:
+def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
+    """Return the point in time, in epoch ns, that `text` means.
+
+    Args:
+        text: epoch ns, an offset from the run's start ('2.5s', '+2.5', '100ms'), or ISO time.
+        runs: the chosen runs; an offset needs exactly one.
+        option: what errors call it, such as '--start'.
+
+    Raises:
+        UsageError: it cannot be read or is out of range.
+    """
     return _in_range(_read(text, runs, option), text, option)
 
 

@@ -20,6 +20,8 @@ COMMANDS = (
     "events",
     "export",
     "export parquet",
+    "export csv",
+    "flow",
     "db",
     "db upgrade",
     "db check",
@@ -136,16 +138,18 @@ def test_info_as_markdown(msgflow: Msgflow, small_database: Path) -> None:
 
 
 def test_export(msgflow: Msgflow, small_database: Path) -> None:
-    arguments = ("export", "parquet", "out", "publisher", "node", "--db", small_database)
-    result = msgflow(*arguments)
-    assert result.exit_code == 0
-    assert result.stdout == ""
-    assert result.stderr == "2 views, 5 rows written to out\n"
-    assert pq.read_table("out/node.parquet").num_rows == 2
-    again = msgflow(*arguments)
-    assert again.exit_code == 2
-    assert "--force" in again.stderr
-    assert msgflow(*arguments, "--force").exit_code == 0
+    for kind in ("parquet", "csv"):
+        arguments = ("export", kind, kind, "publisher", "node", "--db", small_database)
+        result = msgflow(*arguments)
+        assert result.exit_code == 0
+        assert result.stdout == ""
+        assert result.stderr == f"2 views, 5 rows written to {kind}\n"
+        again = msgflow(*arguments)
+        assert again.exit_code == 2
+        assert "--force" in again.stderr
+        assert msgflow(*arguments, "--force", "--run", "noon", "--end", "1s").exit_code == 0
+    assert pq.read_table("parquet/node").to_pylist()[0]["node_id"] == 2
+    assert Path("csv/node.csv").read_text().count("\n") == 2
 
 
 def test_db_schema_lists_the_views(msgflow: Msgflow, small_database: Path) -> None:
@@ -181,11 +185,13 @@ def test_db_upgrade_of_old_views(msgflow: Msgflow, small_database: Path) -> None
     [
         "info",
         "query info-runs",
+        "flow --topic /chatter",
         "sql FROM\u00a0run",
         "db check",
         "db schema",
         "db upgrade",
         "export parquet out",
+        "export csv out",
     ],
 )
 def test_a_missing_database_has_code_4(msgflow: Msgflow, command: str) -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from msgflow.export.human import format_cell, format_duration, shown_name
+from msgflow.export.human import format_cell, format_duration, short_symbol, shown_name
 
 
 @pytest.mark.parametrize(
@@ -69,3 +69,23 @@ def test_the_suffix_goes_where_the_unit_stands_in_the_cells() -> None:
     assert shown_name("start_ns", "epoch ns", ("start_ns",)) == "start"
     assert shown_name("median_ns", None, ("median_ns",)) == "median_ns"
     assert shown_name("delay_ns", "ns", ("delay", "delay_ns")) == "delay_ns"
+
+
+@pytest.mark.parametrize(
+    ("symbol", "shown"),
+    [
+        ("Camera::tick", "Camera::tick"),
+        ("void Foo::bar(std::shared_ptr<int>) const", "void Foo::bar const"),
+        ("std::_Bind<void (SourceNode::*(SourceNode*))()>", "SourceNode::*"),
+        (
+            "std::_Bind<void (robot::Base::*(robot::Base*, std::_Placeholder<1>))(int)>",
+            "robot::Base::*",
+        ),
+        ("Sink::Sink(std::vector<char>)::{lambda(A<B>)#1}", "Sink::Sink::{lambda#1}"),
+        ("(anonymous)", "(anonymous)"),
+        (">odd)", ">odd)"),
+        ("", ""),
+    ],
+)
+def test_symbols_without_arguments(symbol: str, shown: str) -> None:
+    assert short_symbol(symbol) == shown

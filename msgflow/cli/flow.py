@@ -1,0 +1,158 @@
+"""`msgflow flow`: where one message came from and where it went, as a tree."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    OUTPUT,
+    SELECTION,
+    DatabaseOption,
+    InternalOption,
+    OutputOption,
+    RunOption,
+)
+
+_START = "Which message"
+
+
+class FlowFormat(StrEnum):
+    """How a flow is written: a tree for people, nodes and edges for programs."""
+
+    TABLE = "table"
+    JSON = "json"
+
+
+class Direction(StrEnum):
+    """Which way a flow is followed."""
+
+    FORWARD = "forward"
+    BACKWARD = "backward"
+    BOTH = "both"
+
+
+def command(
+    topic: Annotated[
+        str | None,
+        typer.Option("--topic", metavar="NAME", help="Topic", rich_help_panel=_START),
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            "--at",
+            metavar="TIME",
+            help="First message on the topic at or after: 2.5s from the start of the run, epoch ns,"
+            " or ISO time",
+            show_default="its first message",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    publication: Annotated[
+        int | None,
+        typer.Option("--publication", metavar="ID", help="publication_id", rich_help_panel=_START),
+    ] = None,
+    take: Annotated[
+        int | None,
+        typer.Option("--take", metavar="ID", help="take_id", rich_help_panel=_START),
+    ] = None,
+    callback_instance: Annotated[
+        int | None,
+        typer.Option(
+            "--callback-instance",
+            metavar="ID",
+            help="callback_instance_id",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    run: RunOption = None,
+    direction: Annotated[
+        Direction,
+        typer.Option(
+            "--direction",
+            help="What it caused, what it was caused by, or both",
+            rich_help_panel=SELECTION,
+        ),
+    ] = Direction.BOTH,
+    depth: Annotated[
+        int,
+        typer.Option(
+            "--depth",
+            metavar="N",
+            min=0,
+            help="Most messages in a row, each way",
+            rich_help_panel=SELECTION,
+        ),
+    ] = 32,
+    limit: Annotated[
+        int,
+        typer.Option(
+            "--limit",
+            metavar="N",
+            min=1,
+            max=10_000,
+            help="Most publications, takes and callback runs",
+            rich_help_panel=SELECTION,
+        ),
+    ] = 1_000,
+    internal: InternalOption = False,
+    absolute: Annotated[
+        bool,
+        typer.Option(
+            "--absolute",
+            help="Points in time (UTC), not the time since the begin of the flow",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
+    form: Annotated[
+        FlowFormat | None,
+        typer.Option(
+            "--format",
+            help="A tree, or nodes and edges",
+            show_default="by the suffix of FILE, else table",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Print the flow of one message: what it was caused by, and what it caused.
+
+    A line is a publication, or a message taken with the callback run it was for.
+
+    Times count from the first line. NA is what the trace does not show.
+    """
+    from msgflow.cli.output import print_note, print_runs, print_text
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        flow = opened.flow(
+            topic,
+            at=at,
+            publication_id=publication,
+            take_id=take,
+            callback_instance_id=callback_instance,
+            run=run,
+            direction=direction.value,
+            depth=depth,
+            limit=limit,
+            internal=internal,
+        )
+    print_runs([flow.run])
+    is_json = form is FlowFormat.JSON or (
+        form is None and output is not None and output.suffix.lower() == ".json"
+    )
+    if is_json:
+        print_text(lambda width, color: flow.to_json(), output)
+    else:
+        from msgflow.export.flow_tree import tree_text
+
+        print_text(
+            lambda width, color: tree_text(flow, is_absolute=absolute, width=width, color=color),
+            output,
+        )
+    for note in flow.notes:
+        print_note(note)

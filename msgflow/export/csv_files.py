@@ -1,0 +1,58 @@
+"""Public views as CSV files, one per view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.export.directory import replacing_entries
+from msgflow.export.formats import csv_batch
+from msgflow.export.views import ExportedView, Selection
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import duckdb
+
+
+def export_csv(
+    connection: duckdb.DuckDBPyConnection,
+    directory: Path,
+    selection: Selection,
+    *,
+    force: bool = False,
+) -> tuple[ExportedView, ...]:
+    """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns.
+
+    Text stands in quotes, a missing value is an empty field without; bytes are hexadecimal.
+
+    Args:
+        connection: to the database.
+        directory: created if missing.
+        selection: what to write.
+        force: replace files that exist.
+
+    Raises:
+        UsageError: a file that is there already, or a directory that cannot be written.
+    """
+    names = {view: f"{view}.csv" for view in selection.views}
+    counts: dict[str, int] = {}
+    with replacing_entries(directory, list(names.values()), force=force) as aside:
+        for view, name in names.items():
+            counts[view] = _write(connection, selection, view, aside / name)
+    return tuple(ExportedView(view, directory / names[view], counts[view]) for view in names)
+
+
+def _write(
+    connection: duckdb.DuckDBPyConnection, selection: Selection, view: str, path: Path
+) -> int:
+    import pyarrow
+    import pyarrow.csv
+
+    row_count = 0
+    with selection.read(connection, view, selection.runs) as reader:
+        empty = csv_batch(pyarrow.RecordBatch.from_pylist([], schema=reader.schema))
+        with pyarrow.csv.CSVWriter(path, empty.schema) as writer:
+            for batch in reader:
+                writer.write_batch(csv_batch(batch))
+                row_count += batch.num_rows
+    return row_count

@@ -1,0 +1,97 @@
+"""A directory of exported views: all of it is written aside, then takes its place."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+_PARTITION = "run_id="
+
+
+@contextmanager
+def replacing_entries(
+    directory: Path, names: Sequence[str], *, force: bool = False
+) -> Iterator[Path]:
+    """Yield a directory to write `names` to; they take their places when all went well.
+
+    What fails or is interrupted before leaves `directory` as it was. Other entries stay.
+
+    Args:
+        directory: created if missing.
+        names: files or directories directly in it.
+        force: replace those that exist; of directories only those that an export has written.
+
+    Raises:
+        UsageError: one exists already, or the directory cannot be written.
+    """
+    _refuse_existing(directory, names, force)
+    aside = directory / f".export.{os.getpid()}.part"
+    is_new = not directory.exists()
+    try:
+        try:
+            aside.mkdir(parents=True)
+        except OSError as error:
+            raise _cannot("create the directory", error, directory) from error
+        try:
+            yield aside
+            _publish(directory, aside, names)
+        except OSError as error:
+            raise _cannot("write to the directory", error, directory) from error
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+        if is_new and directory.is_dir() and not any(directory.iterdir()):
+            directory.rmdir()
+
+
+def _publish(directory: Path, aside: Path, names: Sequence[str]) -> None:
+    old = aside / "old"
+    old.mkdir()
+    moved: list[str] = []
+    try:
+        for name in names:
+            if (directory / name).is_dir():
+                (directory / name).rename(old / name)
+            moved.append(name)
+            (aside / name).replace(directory / name)
+    except BaseException:
+        for name in moved:
+            if (old / name).exists():
+                shutil.rmtree(directory / name, ignore_errors=True)
+                (old / name).rename(directory / name)
+        raise
+
+
+def _refuse_existing(directory: Path, names: Sequence[str], force: bool) -> None:
+    existing = [directory / name for name in names if (directory / name).exists()]
+    if existing and not force:
+        raise UsageError(
+            f"it exists already — {existing[0]}",
+            "choose another directory, or replace what exists with --force",
+        )
+    for path in existing:
+        if path.is_dir() and not _is_exported(path):
+            raise UsageError(
+                f"the directory holds more than an export — {path}", "choose another directory"
+            )
+
+
+def _is_exported(path: Path) -> bool:
+    return all(
+        partition.is_dir()
+        and partition.name.startswith(_PARTITION)
+        and all(file.suffix == ".parquet" for file in partition.iterdir())
+        for partition in path.iterdir()
+    )
+
+
+def _cannot(action: str, error: OSError, directory: Path) -> UsageError:
+    reason = (error.strerror or str(error)).lower()
+    return UsageError(f"cannot {action}: {reason} — {directory}")

@@ -1,0 +1,186 @@
+"""The flow of one message as an object: text tree, dictionary for JSON, Arrow table."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from msgflow.export.plain import plain
+from msgflow.query.clocks import clock_notes
+from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
+
+if TYPE_CHECKING:
+    import duckdb
+    import pyarrow as pa
+
+    from msgflow.query.flow import Start
+    from msgflow.query.window import Run
+
+Key = tuple[str, int]
+Row = dict[str, Any]
+
+_LINK = ("link_kind", "wait_ns", "candidate_count", "is_loss_affected")
+_NODE = (
+    "kind",
+    "id",
+    "depth",
+    "start_ns",
+    "end_ns",
+    "node",
+    "label",
+    "topic_name",
+    "symbol",
+    "thread",
+    "host",
+)
+_STATE = ("missing", "reason", "cut_count", "internal_count")
+NOT_TAKEN = "not_taken"
+
+
+@dataclass(frozen=True)
+class Flow:
+    """What one message caused and was caused by. Times are integers in nanoseconds.
+
+    `str` of it is the tree that `msgflow flow` prints.
+
+    Attributes:
+        start: what it was followed from.
+        direction: 'forward', 'backward' or 'both'.
+        depth: most messages in a row, each way.
+        limit: most vertices.
+        run: the run it belongs to.
+        table: the rows of `main.flow_step`, nearest to the start first.
+        notes: what the rows do not say themselves, a sentence each.
+    """
+
+    start: Start
+    direction: str
+    depth: int
+    limit: int
+    run: Run
+    table: pa.Table
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def start_key(self) -> Key:
+        """The vertex that it was followed from, as (kind, id)."""
+        return (self.start.kind, self.start.id)
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the flow goes on beyond depth or limit."""
+        return any(node["cut_count"] for node in self.nodes.values())
+
+    @cached_property
+    def nodes(self) -> dict[Key, Row]:
+        """Vertices by (kind, id), nearest to the start first."""
+        found: dict[Key, Row] = {}
+        for row in self.table.to_pylist():
+            # That a message was not taken is said of the edge: the subscription may miss several.
+            state = dict.fromkeys(_STATE) if row["link_kind"] == NOT_TAKEN else row
+            node = {name: row[name] for name in _NODE} | {name: state[name] for name in _STATE}
+            found.setdefault((row["kind"], row["id"]), node)
+        return found
+
+    @cached_property
+    def edges(self) -> list[Row]:
+        """Links between the vertices, from cause to effect."""
+        return [
+            {
+                "from_kind": row["from_kind"],
+                "from_id": row["from_id"],
+                "to_kind": row["kind"],
+                "to_id": row["id"],
+                **{name: row[name] for name in _LINK},
+                "reason": row["reason"] if row["link_kind"] == NOT_TAKEN else None,
+            }
+            for row in self.table.to_pylist()
+            if row["from_kind"] is not None
+        ]
+
+    def to_arrow(self) -> pa.Table:
+        """Return the rows of `main.flow_step` as a pyarrow.Table."""
+        return self.table
+
+    def to_dict(self) -> Row:
+        """Return run, start, nodes and edges, made of what JSON can hold."""
+        return {
+            "run_id": self.run.run_id,
+            "run": self.run.name,
+            "start": {"kind": self.start.kind, "id": self.start.id},
+            "direction": self.direction,
+            "is_cut": self.is_cut,
+            "nodes": plain(list(self.nodes.values())),
+            "edges": plain(self.edges),
+        }
+
+    def to_json(self) -> str:
+        """Return what `to_dict` returns as JSON, one node or edge per line."""
+        content = self.to_dict()
+        parts = []
+        for name, value in content.items():
+            if name in ("nodes", "edges") and value:
+                rows = ",\n    ".join(json.dumps(row, ensure_ascii=False) for row in value)
+                parts.append(f'  "{name}": [\n    {rows}\n  ]')
+            else:
+                parts.append(f'  "{name}": {json.dumps(value, ensure_ascii=False)}')
+        return "{\n" + ",\n".join(parts) + "\n}"
+
+    def __str__(self) -> str:
+        from msgflow.export.flow_tree import tree_text
+
+        return tree_text(self)
+
+
+def read_flow(
+    connection: duckdb.DuckDBPyConnection,
+    start: Start,
+    *,
+    direction: str = "both",
+    depth: int,
+    limit: int,
+    internal: bool = False,
+) -> Flow:
+    """Return the flow that `start` is part of.
+
+    Args:
+        connection: to a database with the public views.
+        start: where to begin.
+        direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
+        depth: most messages in a row, each way.
+        limit: most vertices.
+        internal: follow effects on ROS's own topics too.
+
+    Raises:
+        UsageError: what to start from does not exist, or an argument cannot be.
+        QueryError: the database could not run it.
+    """
+    run = require_start(connection, start)
+    table = read_steps(
+        connection, start, direction=direction, depth=depth, limit=limit, internal=internal
+    )
+    flow = Flow(start, direction, depth, limit, run, table, list(start.notes))
+    flow.notes.extend(_notes(flow))
+    if len({node["host"] for node in flow.nodes.values()}) > 1:
+        flow.notes.extend(clock_notes(connection, [run]))
+    return flow
+
+
+def _notes(flow: Flow) -> list[str]:
+    notes = []
+    hidden = sum(node["internal_count"] or 0 for node in flow.nodes.values())
+    if hidden:
+        messages = "1 message" if hidden == 1 else f"{hidden} messages"
+        notes.append(f"{messages} on topics of ROS itself left out; --internal shows them")
+    cut = [node for node in flow.nodes.values() if node["cut_count"]]
+    by_depth = sum(abs(node["depth"]) >= flow.depth * STEPS_PER_MESSAGE for node in cut)
+    for number, option, value in (
+        (by_depth, "--depth", flow.depth),
+        (len(cut) - by_depth, "--limit", flow.limit),
+    ):
+        if number:
+            places = "1 place" if number == 1 else f"{number} places"
+            notes.append(f"the flow goes on at {places} beyond {option} {value}")
+    return notes

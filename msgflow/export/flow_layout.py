@@ -1,0 +1,166 @@
+"""Where the lines of a flow go: chains straight down, branches aside, nothing drawn twice."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from msgflow.export.flow import NOT_TAKEN
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from msgflow.export.flow import Flow, Key, Row
+
+
+@dataclass(eq=False)
+class Item:
+    """One vertex, or a take with the callback run it was for, or a message that was not taken.
+
+    Attributes:
+        node: the vertex; of the callback run where a take is drawn with it.
+        take: that take.
+        handover: the link from the take to the callback run.
+        number: given where another line refers to this one.
+        causes: items that lead here, with the links.
+        effects: items that this leads to, with the links.
+    """
+
+    node: Row
+    take: Row | None = None
+    handover: Row | None = None
+    number: int | None = None
+    causes: list[tuple[Item, Row]] = field(default_factory=list)
+    effects: list[tuple[Item, Row]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Line:
+    """An item where it is drawn.
+
+    Attributes:
+        item: what to draw.
+        link: the link from the line before, None for the first.
+        is_reference: it is drawn elsewhere already.
+    """
+
+    item: Item
+    link: Row | None
+    is_reference: bool = False
+
+
+@dataclass(eq=False)
+class Branch:
+    """Lines that follow each other straight, and what branches off after the last."""
+
+    depth: int = 0
+    lines: list[Line] = field(default_factory=list)
+    children: list[Branch] = field(default_factory=list)
+
+
+def lay_out_flow(flow: Flow) -> list[Branch]:
+    """Return one branch for each item to begin with: all that have no cause, or the start."""
+    items = _items(flow)
+    if flow.direction == "both":
+        tops = _tops(items, items[flow.start_key])
+    else:
+        tops = [items[flow.start_key]]
+    return _grow(tops, is_backward=flow.direction == "backward")
+
+
+def walk(branches: Sequence[Branch]) -> Iterator[Branch]:
+    """Yield all branches from top to bottom."""
+    stack = list(reversed(branches))
+    while stack:
+        branch = stack.pop()
+        yield branch
+        stack += reversed(branch.children)
+
+
+def _items(flow: Flow) -> dict[Key, Item]:
+    calls: dict[Key, list[Row]] = defaultdict(list)
+    for edge in flow.edges:
+        if edge["link_kind"] == "callback":
+            calls["take", edge["from_id"]].append(edge)
+    items: dict[Key, Item] = {}
+    for key, node in flow.nodes.items():
+        if node["kind"] not in ("take", "subscription"):
+            items[key] = Item(node)
+    for key, node in flow.nodes.items():
+        if node["kind"] != "take":
+            continue
+        callback = None
+        if len(calls[key]) == 1:
+            callback = items["callback_instance", calls[key][0]["to_id"]]
+        if callback is not None and callback.take is None:
+            callback.take, callback.handover = node, calls[key][0]
+            items[key] = callback
+        else:
+            items[key] = Item(node)
+    for edge in flow.edges:
+        cause = items[edge["from_kind"], edge["from_id"]]
+        target = (edge["to_kind"], edge["to_id"])
+        effect = Item(flow.nodes[target]) if edge["link_kind"] == NOT_TAKEN else items[target]
+        if edge is not effect.handover:
+            cause.effects.append((effect, edge))
+            effect.causes.append((cause, edge))
+    return items
+
+
+def _tops(items: dict[Key, Item], start: Item) -> list[Item]:
+    unique = sorted(dict.fromkeys(items.values()), key=_order)
+    tops = [item for item in unique if not item.causes]
+    reached = set(tops)
+    stack = list(tops)
+    while stack:
+        for effect, _ in stack.pop().effects:
+            if effect not in reached:
+                reached.add(effect)
+                stack.append(effect)
+    # In a ring everything has a cause: then what was asked for is as good a begin as any.
+    return tops if start in reached else [*tops, start]
+
+
+def _grow(tops: Sequence[Item], *, is_backward: bool) -> list[Branch]:
+    branches = [Branch() for _ in tops]
+    stack = [(branch, Line(item, None)) for branch, item in zip(branches, tops, strict=True)]
+    stack.reverse()
+    drawn: set[Item] = set()
+    referred: set[Item] = set()
+    while stack:
+        branch, line = stack.pop()
+        following = [line]
+        while len(following) == 1:
+            (line,) = following
+            if line.item in drawn:
+                branch.lines.append(Line(line.item, line.link, is_reference=True))
+                referred.add(line.item)
+                following = []
+            else:
+                branch.lines.append(line)
+                drawn.add(line.item)
+                following = _following(line.item, is_backward)
+        branch.children = [Branch(branch.depth + 1) for _ in following]
+        stack += reversed(list(zip(branch.children, following, strict=True)))
+    _number(branches, referred)
+    return branches
+
+
+def _following(item: Item, is_backward: bool) -> list[Line]:
+    pairs = item.causes if is_backward else item.effects
+    return [Line(other, link) for other, link in sorted(pairs, key=lambda pair: _order(pair[0]))]
+
+
+def _number(branches: Sequence[Branch], referred: set[Item]) -> None:
+    number = 0
+    for branch in walk(branches):
+        for line in branch.lines:
+            if line.item in referred and not line.is_reference:
+                number += 1
+                line.item.number = number
+
+
+def _order(item: Item) -> tuple[bool, int, str, int]:
+    start_ns = item.node["start_ns"]
+    return (start_ns is None, start_ns or 0, item.node["kind"], item.node["id"])

@@ -1,0 +1,191 @@
+"""The flow of one message as a text tree."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from msgflow.export.flow_layout import lay_out_flow, walk
+from msgflow.export.human import format_cell, format_duration, short_symbol
+from msgflow.query.window import format_epoch
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from msgflow.export.flow import Flow, Row
+    from msgflow.export.flow_layout import Branch, Item, Line
+
+_UNBOUNDED = 100_000
+_LEAST_WIDTH = 60
+_INDENT = 4
+_NOT_SEEN = {
+    "publication": "its publication was not seen",
+    "take": "its message was not seen",
+    "callback": "no callback was seen",
+}
+
+
+def tree_text(
+    flow: Flow, *, is_absolute: bool = False, width: int | None = None, color: bool = False
+) -> str:
+    """Return the tree of a flow; a line begins with its time since the first line.
+
+    What is drawn already is not drawn again: the line refers to the first place by a number in
+    brackets.
+
+    Args:
+        flow: what to draw.
+        is_absolute: points in time as UTC, in place of the time since the first line.
+        width: of the terminal, at which lines are wrapped; they are as long as they are when None.
+        color: with escape sequences for colours.
+    """
+    branches = lay_out_flow(flow)
+    painter = _Painter(flow, branches, is_absolute)
+    stream = io.StringIO()
+    deepest = max(branch.depth for branch in walk(branches))
+    console = Console(
+        file=stream,
+        width=_UNBOUNDED if width is None else max(width, _INDENT * deepest + _LEAST_WIDTH),
+        force_terminal=color,
+        color_system="standard" if color else None,
+        highlight=False,
+        markup=False,
+        emoji=False,
+        legacy_windows=False,
+    )
+    console.print(painter.title())
+    for branch in branches:
+        console.print(_tree(branch, painter))
+    return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
+
+
+def _tree(top: Branch, painter: _Painter) -> Tree:
+    tree = Tree(painter.label(top), guide_style="dim")
+    stack = [(tree, top)]
+    while stack:
+        parent, branch = stack.pop()
+        for child in branch.children:
+            stack.append((parent.add(painter.label(child)), child))
+    return tree
+
+
+class _Painter:
+    """Turns items into styled text."""
+
+    def __init__(self, flow: Flow, branches: Sequence[Branch], is_absolute: bool) -> None:
+        self.flow = flow
+        self.is_absolute = is_absolute
+        self.zero_ns: int = branches[0].lines[0].item.node["start_ns"]
+        self.has_hosts = len({node["host"] for node in flow.nodes.values()}) > 1
+        self.time_width = max(
+            len(self._time(line.item.node)) for branch in walk(branches) for line in branch.lines
+        )
+
+    def title(self) -> Text:
+        start = self.flow.nodes[self.flow.start_key]
+        text = f"{self.flow.start.kind} {self.flow.start.id}, {_printable(start['label'])}"
+        if not self.is_absolute:
+            text += f"; times count from {format_epoch(self.zero_ns)}"
+        return Text(text, style="bold")
+
+    def label(self, branch: Branch) -> Table:
+        # Two columns, so that what is wrapped stays right of the times.
+        grid = Table.grid(padding=(0, 2))
+        grid.add_column(justify="right", min_width=self.time_width, no_wrap=True, style="cyan")
+        grid.add_column(overflow="fold")
+        for line in branch.lines:
+            grid.add_row(self._time(line.item.node), self._text(line))
+        return grid
+
+    def _text(self, line: Line) -> Text:
+        item = line.item
+        text = Text()
+        if line.is_reference:
+            return text.append(f"see [{item.number}]  {self._name(item, line.link)}", style="dim")
+        if item.number is not None:
+            text.append(f"[{item.number}] ")
+        is_absent = item.node["kind"] == "subscription"
+        text.append(self._name(item, line.link), style="yellow" if is_absent else "bold")
+        for detail in self._details(item, line.link):
+            text.append("  ").append(detail)
+        if self.flow.direction == "both" and self._is_start(item):
+            text.append("  ◀", style="bold green")
+        return text
+
+    def _is_start(self, item: Item) -> bool:
+        return self.flow.nodes[self.flow.start_key] in (item.node, item.take)
+
+    def _time(self, node: Row) -> str:
+        start_ns = node["start_ns"]
+        if start_ns is None:
+            return "NA"
+        if self.is_absolute:
+            return format_epoch(start_ns)
+        offset_ns = start_ns - self.zero_ns
+        return f"{'+' if offset_ns >= 0 else ''}{format_duration(offset_ns)}"
+
+    def _name(self, item: Item, link: Row | None) -> str:
+        node = item.node
+        label, place = _printable(node["label"]), _printable(node["node"])
+        if node["kind"] == "publication":
+            # Else who published it stands on the line of the callback run.
+            is_alone = link is None or not item.causes
+            return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
+        if node["kind"] == "callback_instance":
+            return f"{place}  {label}"
+        return f"{place}  Subscription({label})"
+
+    def _details(self, item: Item, link: Row | None) -> list[str]:
+        node = item.node
+        if node["kind"] == "subscription":
+            return [f"not taken: {_reason(link)}"]
+        details = [_waits(edge) for _, edge in item.causes if edge["link_kind"] == "transport"]
+        if link is not None and link["link_kind"] not in ("transport", "direct"):
+            details.append(_waits(link))
+        if item.handover is not None:
+            details.append(f"wait {format_cell(item.handover['wait_ns'], 'ns')}")
+        if node["missing"] == "end":
+            details.append("ran NA: never seen to end")
+        elif node["kind"] == "callback_instance":
+            details.append(f"ran {format_duration(node['end_ns'] - node['start_ns'])}")
+        elif node["kind"] == "publication" and node["end_ns"] is not None:
+            details.append(f"in {format_duration(node['end_ns'] - node['start_ns'])}")
+        for vertex in (item.take, node):
+            if vertex is not None and vertex["missing"] in _NOT_SEEN:
+                why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
+                details.append(f"NA: {_NOT_SEEN[vertex['missing']]}{why}")
+        if node["kind"] != "publication" or not item.causes:
+            host = f" on {_printable(node['host'])}" if self.has_hosts else ""
+            details.append(f"thread {_printable(node['thread'])}{host}")
+        if node["symbol"]:
+            details.append(_printable(short_symbol(node["symbol"])))
+        number = node["cut_count"] + (item.take["cut_count"] if item.take else 0)
+        if number:
+            details.append(f"… {number} more")
+        return details
+
+
+def _waits(edge: Row) -> str:
+    text = str(edge["link_kind"])
+    if edge["wait_ns"] is not None:
+        text += f" {format_duration(edge['wait_ns'])}"
+    doubts = []
+    if (edge["candidate_count"] or 1) > 1:
+        doubts.append(f"one of {edge['candidate_count']} candidates")
+    if edge["is_loss_affected"]:
+        doubts.append("events were lost here")
+    return f"{text} ({', '.join(doubts)})" if doubts else text
+
+
+def _reason(row: Row | None) -> str:
+    reason = None if row is None else row["reason"]
+    return "reason unknown" if reason is None else str(reason)
+
+
+def _printable(value: object) -> str:
+    return format_cell(value)

@@ -1,0 +1,145 @@
+"""The public views, chosen for an export, run by run, within a time window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import nearest
+from msgflow.query.run import read_runs
+from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs, time_window
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import duckdb
+    import pyarrow as pa
+
+    from msgflow.query.window import Run
+
+_ROWS_AT_ONCE = 100_000
+_VIEWS = """
+SELECT views.view_name, list(columns.column_name)
+FROM duckdb_views() AS views
+JOIN duckdb_columns() AS columns
+    ON columns.database_name = views.database_name
+    AND columns.schema_name = views.schema_name
+    AND columns.table_name = views.view_name
+WHERE views.database_name = current_database() AND views.schema_name = 'main'
+    AND NOT views.internal
+GROUP BY views.view_name
+ORDER BY views.view_name
+"""
+# When the thing of a row happened, by the first of these columns that a view has …
+_TIMES = ("start_ns", "taken_ns", "sent_ns", "at_ns", "from_ns")
+# … else when the first of these things happened: of a link, its cause.
+_THINGS = (
+    ("request", "sent_ns"),
+    ("response", "sent_ns"),
+    ("callback_instance", "start_ns"),
+    ("publication", "start_ns"),
+    ("take", "taken_ns"),
+)
+# Views whose times say how far a recording reaches: a window leaves them whole.
+_WHOLE = ("run", "trace")
+
+
+@dataclass(frozen=True)
+class ExportedView:
+    """What was written of one view.
+
+    Attributes:
+        view: its name.
+        path: the file, or the directory with one file per run.
+        row_count: rows written.
+    """
+
+    view: str
+    path: Path
+    row_count: int
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Views to export, of which runs and which time.
+
+    Attributes:
+        views: names of the views, sorted.
+        columns: columns of each.
+        runs: the chosen runs, at least one.
+        start_ns: begin of the time window.
+        end_ns: its end, exclusive.
+    """
+
+    views: tuple[str, ...]
+    columns: dict[str, list[str]]
+    runs: tuple[Run, ...]
+    start_ns: int
+    end_ns: int
+
+    def read(
+        self, connection: duckdb.DuckDBPyConnection, view: str, runs: Sequence[Run]
+    ) -> pa.RecordBatchReader:
+        """Return the rows of a view, sorted by all columns, so that equal content comes equally."""
+        # The name comes from the catalogue of the database, never from the user.
+        text = f'SELECT * FROM main."{view}" WHERE list_contains($runs, run_id)'
+        bindings: dict[str, object] = {"runs": [run.run_id for run in runs]}
+        condition = self._condition(view)
+        if condition is not None:
+            text += f" AND {condition}"
+            bindings |= {"start_ns": self.start_ns, "end_ns": self.end_ns}
+        relation = connection.sql(f"{text} ORDER BY ALL", params=bindings)
+        return relation.to_arrow_reader(_ROWS_AT_ONCE)
+
+    def _condition(self, view: str) -> str | None:
+        columns = self.columns[view]
+        if view in _WHOLE or (self.start_ns, self.end_ns) == (MINIMUM_NS, MAXIMUM_NS):
+            return None
+        for name in _TIMES:
+            if name in columns:
+                return f"{name} >= $start_ns AND {name} < $end_ns"
+        for thing, name in _THINGS:
+            if f"{thing}_id" in columns:
+                return (
+                    f"{thing}_id IN (SELECT {thing}_id FROM main.{thing}"
+                    f" WHERE {name} >= $start_ns AND {name} < $end_ns)"
+                )
+        return None
+
+
+def select_views(
+    connection: duckdb.DuckDBPyConnection,
+    views: Sequence[str] = (),
+    *,
+    run: str | int | None = "all",
+    start: str | int | None = None,
+    end: str | int | None = None,
+    skip_first: float | None = None,
+) -> Selection:
+    """Return what to export.
+
+    Args:
+        connection: to the database.
+        views: names of views; all when empty.
+        run: 'all', a name or an id; the latest run when None.
+        start: begin of the time window: epoch ns, offset from the run's start, or ISO time.
+        end: its end, likewise.
+        skip_first: seconds to leave out at the begin of the run.
+
+    Raises:
+        UsageError: a view, run or time that does not exist, or no run at all.
+    """
+    columns = dict(connection.execute(_VIEWS).fetchall())
+    for view in views:
+        if view not in columns:
+            near = nearest(view, list(columns))
+            hint = f"did you mean {' or '.join(near)}" if near else "msgflow db schema"
+            raise UsageError(f"there is no such view — {view}", hint)
+    runs = choose_runs(read_runs(connection), run)
+    if not runs:
+        raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+    start_ns, end_ns = time_window(runs, start, end, skip_first)
+    chosen = tuple(sorted(set(views)) or sorted(columns))
+    return Selection(chosen, columns, runs, start_ns, end_ns)

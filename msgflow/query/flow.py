@@ -1,0 +1,177 @@
+"""The flow of one message: where it starts, and its steps as `main.flow_step` has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.errors import QueryError, UsageError
+from msgflow.query.run import first_line, read_runs
+from msgflow.query.topics import require_topic
+from msgflow.query.window import MINIMUM_NS, Run, choose_runs, format_epoch, time_point
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+DIRECTIONS = ("forward", "backward", "both")
+KINDS = ("publication", "take", "callback_instance")
+STEPS_PER_MESSAGE = 3
+MOST_VERTICES = 10_000
+
+_FIRST = """
+SELECT b.publication_id
+FROM main.publication AS b
+JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+WHERE b.run_id = $run_id AND p.topic_name = $topic AND b.start_ns >= $at_ns
+ORDER BY b.start_ns, b.publication_id
+LIMIT 1
+"""
+_LAST = """
+SELECT max(b.start_ns)
+FROM main.publication AS b
+JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+WHERE b.run_id = $run_id AND p.topic_name = $topic
+"""
+_STEPS = """
+SELECT run_id, depth, from_kind, from_id, link_kind, wait_ns, candidate_count, is_loss_affected,
+    kind, id, start_ns, end_ns, node, label, topic_name, symbol, thread, host, missing, reason,
+    cut_count, internal_count
+FROM main.flow_step(
+    $kind, $id,
+    direction := $direction, max_depth := $max_depth, max_vertices := $limit, internal := $internal
+)
+ORDER BY abs(depth), depth, start_ns, kind, id, from_kind, from_id, link_kind
+"""
+
+
+@dataclass(frozen=True)
+class Start:
+    """What a flow is followed from.
+
+    Attributes:
+        kind: one of `KINDS`.
+        id: its identity.
+        notes: what to say about the choice, a sentence each.
+    """
+
+    kind: str
+    id: int
+    notes: tuple[str, ...] = ()
+
+
+def find_start(
+    connection: duckdb.DuckDBPyConnection,
+    topic: str,
+    at: str | int | None = None,
+    run: str | int | None = None,
+) -> Start:
+    """Return the first publication of a topic at or after a time.
+
+    Args:
+        connection: to a database with the public views.
+        topic: its name.
+        at: epoch ns, an offset from the run's start, or ISO time; the begin of the run when None.
+        run: a name or an id; the latest run when None.
+
+    Raises:
+        UsageError: no such run or topic, a time that cannot be read, or no message then.
+    """
+    runs = choose_runs(read_runs(connection), run)
+    if len(runs) != 1:
+        many = f"{len(runs)} runs are chosen" if runs else "the database holds no run yet"
+        raise UsageError(
+            f"one message belongs to one run, but {many}",
+            "choose one with --run" if runs else "msgflow ingest TRACE",
+        )
+    require_topic(connection, runs, topic)
+    at_ns = MINIMUM_NS if at is None else time_point(at, runs, "--at")
+    bindings = {"run_id": runs[0].run_id, "topic": topic}
+    found = connection.execute(_FIRST, bindings | {"at_ns": at_ns}).fetchall()
+    if not found:
+        ((last_ns,),) = connection.execute(_LAST, bindings).fetchall()
+        if last_ns is None:
+            raise UsageError(
+                f"the trace shows no message that was published on the topic — {topic}",
+                f"msgflow query info-topics --run {runs[0].run_id}",
+            )
+        raise UsageError(
+            f"no message was published on {topic} at or after that time — {at}",
+            f"the last one was at {_place(last_ns, runs[0])}",
+        )
+    start_ns = runs[0].start_ns
+    is_early = at is not None and start_ns is not None and at_ns < start_ns
+    note = "the time of --at is before the run: this is the first message on the topic"
+    return Start("publication", found[0][0], (note,) if is_early else ())
+
+
+def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
+    """Return the run that `start` belongs to.
+
+    Raises:
+        UsageError: there is no such thing in the database.
+    """
+    # The kind is one of KINDS, never text of a user.
+    found = connection.execute(
+        f"SELECT run_id FROM main.{start.kind} WHERE {start.kind}_id = ?", [start.id]
+    ).fetchall()
+    if not found:
+        raise UsageError(
+            f"there is no such {start.kind} — {start.id}",
+            f'msgflow sql "SELECT * FROM {start.kind}"',
+        )
+    return next(run for run in read_runs(connection) if run.run_id == found[0][0])
+
+
+def read_steps(
+    connection: duckdb.DuckDBPyConnection,
+    start: Start,
+    *,
+    direction: str,
+    depth: int,
+    limit: int,
+    internal: bool,
+) -> pa.Table:
+    """Return the steps of a flow, nearest to the start first.
+
+    Args:
+        connection: to a database with the public views.
+        start: where to begin.
+        direction: one of `DIRECTIONS`.
+        depth: most messages in a row, each way.
+        limit: most vertices.
+        internal: follow effects on ROS's own topics too.
+
+    Raises:
+        UsageError: a direction, depth or limit that cannot be.
+        QueryError: the database could not run it.
+    """
+    if direction not in DIRECTIONS:
+        raise UsageError(
+            f"there is no such direction — {direction}", f"choose {' or '.join(DIRECTIONS)}"
+        )
+    if depth < 0:
+        raise UsageError(f"the depth is at least 0 — {depth}")
+    if not 1 <= limit <= MOST_VERTICES:
+        raise UsageError(f"the limit is from 1 to {MOST_VERTICES} — {limit}")
+    bindings = {
+        "kind": start.kind,
+        "id": start.id,
+        "direction": direction,
+        # No flow within the limit has more steps.
+        "max_depth": min(depth * STEPS_PER_MESSAGE, MOST_VERTICES),
+        "limit": limit,
+        "internal": internal,
+    }
+    try:
+        return connection.sql(_STEPS, params=bindings).to_arrow_table()
+    except duckdb.Error as error:
+        raise QueryError(f"the flow cannot be read: {first_line(error)}") from error
+
+
+def _place(time_ns: int, run: Run) -> str:
+    if run.start_ns is None:
+        return f"--at {time_ns}"
+    seconds, nanoseconds = divmod(time_ns - run.start_ns, 1_000_000_000)
+    return f"--at +{seconds}.{nanoseconds:09d} ({format_epoch(time_ns)})"

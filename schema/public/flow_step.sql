@@ -1,0 +1,262 @@
+-- name: main.flow_step
+-- kind: macro
+-- description: The picture of one message: what a publication, take or callback run causes, what it
+--     is caused by, or both, with times, names, and what is missing where a branch ends. Vertices
+--     nearest to the start come first where a limit cuts the flow.
+-- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
+--     does), and one per subscription that did not get a message
+-- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_id BIGINT  Identity of the vertex to start from
+-- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
+-- param: max_depth INTEGER = 96  Most steps from the start; a message is three of them
+-- param: max_vertices INTEGER = 1000  Most vertices
+-- param: internal BOOLEAN = false  Follow effects on ROS's own topics too
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: depth INTEGER  Steps from the start; negative: backward
+-- column: from_kind VARCHAR  Cause that the link comes from, as kind
+-- column: from_id BIGINT  Identity of the cause
+-- column: link_kind VARCHAR  'transport', 'callback', the kind of the causal link, or 'not_taken'
+--     to a subscription that did not get the message
+-- column: wait_ns BIGINT [ns]  Time between cause and effect; NULL where the effect is part of the
+--     cause
+-- column: candidate_count BIGINT  Causes that it could have been
+-- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
+-- column: kind VARCHAR  'publication', 'take', 'callback_instance', or 'subscription' where the
+--     message was not taken
+-- column: id BIGINT  Identity of the vertex
+-- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback run; the take
+-- column: end_ns BIGINT [epoch ns]  Its end
+-- column: node VARCHAR  Node, or process in brackets
+-- column: label VARCHAR  What it is: a topic, or what triggers the callback
+-- column: topic_name VARCHAR  Topic of the message
+-- column: symbol VARCHAR  Function of the callback
+-- column: thread VARCHAR  Name and id of the thread
+-- column: host VARCHAR  Machine or container
+-- column: missing VARCHAR  What the trace does not show here: 'publication' that was taken, 'take'
+--     of the message, 'callback' it was taken for, or the 'end' of the callback run
+-- column: reason VARCHAR  Why it is missing, as far as known
+-- column: cut_count BIGINT  Links that lead on from here beyond the limits
+-- column: internal_count BIGINT  Effects on ROS's own topics that are left out
+-- needs: store.publication, store.take, store.callback_instance, store.link_causal,
+--     store.link_transport, store.publisher, store.subscription, store.node, store.process,
+--     store.thread, store.host, store.callback, derive.vertex_key, derive.vertex_kind,
+--     derive.flow_link, derive.flow_end, derive.node_label,
+--     main.publication, main.take, main.callback_instance, main.callback_label
+CREATE OR REPLACE MACRO main.flow_step(
+    start_kind, start_id, direction := 'both', max_depth := 96, max_vertices := 1000,
+    internal := false
+) AS TABLE
+WITH RECURSIVE origin AS MATERIALIZED (
+    SELECT run_id FROM store.publication
+    WHERE start_kind = 'publication' AND publication_id = start_id
+    UNION ALL
+    SELECT run_id FROM store.take
+    WHERE start_kind = 'take' AND take_id = start_id
+    UNION ALL
+    SELECT run_id FROM store.callback_instance
+    WHERE start_kind = 'callback_instance' AND callback_instance_id = start_id
+),
+-- Effects on ROS's own topics: no branches of the picture.
+aside AS MATERIALIZED (
+    SELECT l.callback_instance_id, derive.vertex_key('publication', l.publication_id) AS key
+    FROM store.link_causal AS l
+    JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    WHERE p.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
+),
+link AS (
+    SELECT
+        derive.vertex_key(from_kind, from_id) AS from_key,
+        derive.vertex_key(to_kind, to_id) AS to_key
+    FROM derive.flow_link
+    WHERE run_id IN (SELECT run_id FROM origin)
+),
+edge AS MATERIALIZED (
+    SELECT false AS is_backward, l.from_key, l.to_key
+    FROM link AS l
+    ANTI JOIN aside AS a ON l.to_key = a.key
+    WHERE direction <> 'backward'
+    UNION ALL
+    SELECT true, to_key, from_key
+    FROM link
+    WHERE direction <> 'forward'
+),
+near (is_backward, key, depth) USING KEY (is_backward, key) AS (
+    SELECT s.is_backward, derive.vertex_key(start_kind, start_id)::BIGINT, 0
+    FROM (VALUES (false), (true)) AS s (is_backward)
+    CROSS JOIN origin AS o
+    UNION
+    SELECT n.is_backward, e.to_key, min(n.depth) + 1
+    FROM near AS n
+    JOIN edge AS e ON n.is_backward = e.is_backward AND n.key = e.from_key
+    ANTI JOIN recurring.near AS k ON n.is_backward = k.is_backward AND e.to_key = k.key
+    WHERE n.depth < max_depth AND (SELECT count(*) FROM recurring.near) <= max_vertices
+    GROUP BY n.is_backward, e.to_key
+),
+-- The same vertex may come twice, as effect and as cause: the start, and in rings others.
+vertex AS MATERIALIZED (
+    SELECT
+        key,
+        derive.vertex_kind(key) AS kind,
+        key // 8 AS id,
+        CASE WHEN bool_and(is_backward) THEN -min(depth) ELSE min(depth) END::INTEGER AS depth
+    FROM near
+    GROUP BY key
+    ORDER BY min(depth), bool_and(is_backward), kind, id
+    LIMIT max_vertices::BIGINT
+),
+shown AS MATERIALIZED (
+    SELECT n.is_backward, v.key, v.kind, v.id
+    FROM near AS n
+    JOIN vertex AS v ON n.key = v.key
+    WHERE direction = 'both' OR n.is_backward = (direction = 'backward')
+),
+cut AS (
+    SELECT s.key, count(*) AS cut_count
+    FROM shown AS s
+    JOIN edge AS e ON s.is_backward = e.is_backward AND s.key = e.from_key
+    ANTI JOIN vertex AS v ON e.to_key = v.key
+    GROUP BY s.key
+),
+left_out AS (
+    SELECT s.key, count(*) AS internal_count
+    FROM aside AS a
+    JOIN shown AS s ON s.kind = 'callback_instance' AND a.callback_instance_id = s.id
+    ANTI JOIN vertex AS v ON a.key = v.key
+    WHERE NOT s.is_backward
+    GROUP BY s.key
+),
+described AS MATERIALIZED (
+    SELECT
+        v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
+        b.process_id,
+        derive.node_label(n.full_name, o.name, o.pid) AS node,
+        coalesce(p.topic_name, '?') AS label,
+        p.topic_name,
+        NULL::VARCHAR AS symbol,
+        NULL::VARCHAR AS missing,
+        NULL::VARCHAR AS reason
+    FROM vertex AS v
+    JOIN main.publication AS b ON v.id = b.publication_id
+    JOIN store.process AS o ON b.process_id = o.process_id
+    LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    LEFT JOIN store.node AS n ON p.node_id = n.node_id
+    WHERE v.kind = 'publication'
+    UNION ALL
+    SELECT
+        v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
+        t.process_id,
+        derive.node_label(n.full_name, o.name, o.pid),
+        coalesce(s.topic_name, '?'),
+        s.topic_name,
+        NULL,
+        CASE
+            WHEN x.id IS NOT NULL THEN 'publication'
+            WHEN i.take_id IS NULL THEN 'callback'
+        END,
+        x.reason
+    FROM vertex AS v
+    JOIN main.take AS t ON v.id = t.take_id
+    JOIN store.process AS o ON t.process_id = o.process_id
+    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
+    LEFT JOIN store.node AS n ON s.node_id = n.node_id
+    LEFT JOIN derive.flow_end AS x ON x.kind = 'take' AND t.take_id = x.id
+    LEFT JOIN store.callback_instance AS i ON t.take_id = i.take_id
+    WHERE v.kind = 'take'
+    UNION ALL
+    SELECT
+        v.key, v.kind, v.id, v.depth, i.run_id, i.start_ns, i.end_ns, i.thread_id,
+        i.process_id, c.node, c.label, s.topic_name, k.symbol,
+        CASE
+            WHEN k.kind = 'subscription' AND i.take_id IS NULL THEN 'take'
+            WHEN i.end_ns IS NULL THEN 'end'
+        END,
+        NULL
+    FROM vertex AS v
+    JOIN main.callback_instance AS i ON v.id = i.callback_instance_id
+    JOIN store.callback AS k ON i.callback_id = k.callback_id
+    JOIN main.callback_label AS c ON i.callback_id = c.callback_id
+    LEFT JOIN store.subscription AS s ON k.subscription_id = s.subscription_id
+    WHERE v.kind = 'callback_instance'
+),
+arrow AS MATERIALIZED (
+    SELECT
+        l.from_kind, l.from_id, l.link_kind, l.to_id,
+        derive.vertex_key(l.from_kind, l.from_id) AS from_key,
+        derive.vertex_key(l.to_kind, l.to_id) AS to_key
+    FROM derive.flow_link AS l
+    JOIN vertex AS f ON l.from_kind = f.kind AND l.from_id = f.id
+    JOIN vertex AS t ON l.to_kind = t.kind AND l.to_id = t.id
+)
+SELECT
+    d.run_id,
+    d.depth,
+    a.from_kind,
+    a.from_id,
+    a.link_kind,
+    CASE
+        WHEN a.link_kind IN ('transport', 'callback', 'periodic_async', 'partial_sync')
+            THEN d.start_ns - f.end_ns
+    END AS wait_ns,
+    coalesce(lt.candidate_count, lc.candidate_count) AS candidate_count,
+    coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
+    d.kind,
+    d.id,
+    d.start_ns,
+    d.end_ns,
+    d.node,
+    d.label,
+    d.topic_name,
+    d.symbol,
+    printf('%s %d', coalesce(h.name, '?'), h.tid) AS thread,
+    m.hostname AS host,
+    d.missing,
+    d.reason,
+    coalesce(c.cut_count, 0) AS cut_count,
+    coalesce(o.internal_count, 0) AS internal_count
+FROM described AS d
+LEFT JOIN arrow AS a ON d.key = a.to_key
+LEFT JOIN described AS f ON a.from_key = f.key
+LEFT JOIN store.link_transport AS lt
+    ON a.link_kind = 'transport' AND a.to_id = lt.take_id AND a.from_id = lt.publication_id
+LEFT JOIN store.link_causal AS lc
+    ON a.from_kind = 'callback_instance'
+    AND a.from_id = lc.callback_instance_id
+    AND a.to_id = lc.publication_id
+    AND a.link_kind = lc.kind
+LEFT JOIN store.thread AS h ON d.thread_id = h.thread_id
+JOIN store.process AS q ON d.process_id = q.process_id
+JOIN store.host AS m ON q.host_id = m.host_id
+LEFT JOIN cut AS c ON d.key = c.key
+LEFT JOIN left_out AS o ON d.key = o.key
+UNION ALL
+SELECT
+    x.run_id,
+    d.depth + 1,
+    d.kind,
+    d.id,
+    'not_taken',
+    NULL,
+    NULL,
+    NULL,
+    'subscription',
+    x.subscription_id,
+    NULL,
+    NULL,
+    derive.node_label(n.full_name, o.name, o.pid),
+    coalesce(s.topic_name, '?'),
+    s.topic_name,
+    NULL,
+    NULL,
+    m.hostname,
+    'take',
+    x.reason,
+    0,
+    0
+FROM shown AS v
+JOIN described AS d ON v.key = d.key
+JOIN derive.flow_end AS x ON x.kind = 'publication' AND v.id = x.id
+JOIN store.subscription AS s ON x.subscription_id = s.subscription_id
+JOIN store.process AS o ON s.process_id = o.process_id
+JOIN store.host AS m ON o.host_id = m.host_id
+LEFT JOIN store.node AS n ON s.node_id = n.node_id
+WHERE v.kind = 'publication' AND NOT v.is_backward

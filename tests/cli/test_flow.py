@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from msgflow import Database
+from msgflow.cli import flow as command
+from msgflow.database import DEFAULT_DEPTH, DEFAULT_VERTICES
+from msgflow.query.flow import DIRECTIONS, MOST_VERTICES
+
+Msgflow = Callable[..., Result]
+
+
+def test_the_tree_goes_to_stdout_and_words_to_stderr(
+    msgflow: Msgflow, small_database: Path
+) -> None:
+    result = msgflow("flow", "--topic", "/chatter", "--at", "0.1s", "--db", small_database)
+    assert result.exit_code == 0
+    with Database(small_database) as database:
+        assert result.stdout == f"{database.flow('/chatter', at='0.1s')}\n"
+    assert result.stdout.splitlines()[1:] == [
+        "+0 ns  /talker  publishes /chatter  in 100 ns  thread thread 1  ◀"
+    ]
+    assert result.stderr == "run: noon (2)\n"
+
+
+def test_every_start_and_direction(msgflow: Msgflow, small_database: Path) -> None:
+    for direction in DIRECTIONS:
+        arguments = ("flow", "--publication", 1, "--direction", direction, "--absolute")
+        result = msgflow(*arguments, "--db", small_database)
+        assert result.exit_code == 0
+        assert "2023-11-14T22:13:20.500000000Z" in result.stdout
+    for kind in ("take", "callback-instance"):
+        result = msgflow("flow", f"--{kind}", 7, "--db", small_database)
+        assert result.exit_code == 2
+        assert f"no such {kind.replace('-', '_')} — 7" in result.stderr
+
+
+def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) -> None:
+    start = ("flow", "--publication", "2", "--db", small_database)
+    content = json.loads(msgflow(*start, "--format", "json").stdout)
+    assert [node["topic_name"] for node in content["nodes"]] == ["/chatter"]
+    result = msgflow(*start, "-o", tmp_path / "flow.json")
+    assert result.stdout == ""
+    assert json.loads((tmp_path / "flow.json").read_text()) == content
+    msgflow(*start, "-o", tmp_path / "flow.txt")
+    assert (tmp_path / "flow.txt").read_text() == msgflow(*start).stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((), "a flow starts from one thing"),
+        (("--topic", "/chater"), "no such topic"),
+        (("--topic", "/chatter", "--at", "2s"), "at or after that time — 2s"),
+        (("--publication", "1", "--limit", "0"), "--limit"),
+        (("--publication", "1", "--direction", "up"), "--direction"),
+    ],
+)
+def test_mistakes_have_code_2(
+    msgflow: Msgflow, small_database: Path, options: tuple[str, ...], message: str
+) -> None:
+    result = msgflow("flow", *options, "--db", small_database)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert message in result.stderr
+    assert "\n\nhint: " in result.stderr
+
+
+def test_the_options_are_those_of_the_library(msgflow: Msgflow) -> None:
+    """Stated twice, because help must not import what the library needs."""
+    assert tuple(command.Direction) == DIRECTIONS
+    text = " ".join(msgflow("flow", "--help").stdout.replace("│", "").split())
+    assert f"[default: {DEFAULT_DEPTH}]" in text
+    assert f"1<=x<={MOST_VERTICES}" in text
+    assert f"[default: {DEFAULT_VERTICES}]" in text

@@ -1,0 +1,243 @@
+"""The picture of a flow: tree, JSON, what is said about it. Its rows have golden cases."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import duckdb
+import pytest
+from golden import fill, insert
+
+from msgflow import Database, UsageError
+from msgflow.export.flow_tree import tree_text
+
+CASES = Path(__file__).resolve().parents[1] / "schema" / "cases" / "main.flow_step"
+
+
+def database_of(case: str, empty_database: Path, directory: Path) -> Database:
+    path = directory / f"{case}.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
+        fill(connection, CASES / case / "input")
+    return Database(path)
+
+
+@pytest.fixture(scope="module")
+def robot(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    """A camera whose images two nodes work on; the tracker joins both ways again."""
+    with database_of(
+        "forward_with_internal", empty_database, tmp_path_factory.mktemp("robot")
+    ) as database:
+        yield database
+
+
+def test_a_chain_goes_straight_down_and_what_was_asked_for_is_marked(robot: Database) -> None:
+    assert str(robot.flow("/detections")).splitlines() == [
+        "publication 2, /detections; times count from 1970-01-01T00:00:00.000000100Z",
+        "  +0 ns  /camera  Timer(100 ms)  ran 90 ns  thread thread 1  Camera::tick",
+        " +10 ns  publishes /image  in 10 ns",
+        "+120 ns  /detector  Subscription(/image)  transport 80 ns  wait 20 ns  ran 60 ns"
+        "  thread thread 1  Detector::on_image",
+        "+150 ns  publishes /detections  in 10 ns  ◀",
+        "+220 ns  /tracker  Subscription(/detections)"
+        "  transport 40 ns (events were lost here)  wait 20 ns  ran NA: never seen to end"
+        "  thread thread 1  Tracker::on_detections",
+        "+250 ns  publishes /tracks  in 10 ns",
+        "├──      NA  /recorder  Subscription(/tracks)  not taken: reason unknown",
+        "└──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
+    ]
+
+
+def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> None:
+    assert str(robot.flow("/image", direction="forward")).splitlines() == [
+        "publication 1, /image; times count from 1970-01-01T00:00:00.000000110Z",
+        "  +0 ns  /camera  publishes /image  in 10 ns  thread thread 1",
+        "├──  +95 ns  /recorder  Subscription(/image)  transport 85 ns"
+        "  NA: no callback was seen  thread thread 1",
+        "├── +110 ns  /detector  Subscription(/image)  transport 80 ns  wait 20 ns  ran 60 ns"
+        "  thread thread 1  Detector::on_image",
+        "│   +140 ns  publishes /detections  in 10 ns",
+        "│   +210 ns  /tracker  Subscription(/detections)"
+        "  transport 40 ns (events were lost here)  wait 20 ns  ran NA: never seen to end"
+        "  thread thread 1  Tracker::on_detections",
+        "│   +240 ns  [1] publishes /tracks  in 10 ns",
+        "│   ├──      NA  /recorder  Subscription(/tracks)  not taken: reason unknown",
+        "│   └──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
+        "└── +120 ns  /tracker  Subscription(/image)  transport 90 ns (one of 2 candidates)"
+        "  wait 20 ns  ran 10 ns  thread thread 1  Tracker::on_image",
+        "    +240 ns  see [1]  publishes /tracks",
+    ]
+
+
+def test_backward_ends_at_one_cause_twice(robot: Database) -> None:
+    lines = str(robot.flow("/tracks", direction="backward")).splitlines()
+    assert [line.split(" ns")[0].strip() + " ns" for line in lines[1:]] == [
+        "+0 ns",
+        "├── -120 ns",
+        "│   -240 ns",
+        "│   -250 ns",
+        "└──  -30 ns",
+        "-100 ns",
+        "-130 ns",
+        "-240 ns",
+    ]
+    assert lines[2].count("partial_sync 110 ns") == 1
+    assert lines[3].endswith("[1] publishes /image  in 10 ns")
+    assert lines[-1].endswith("see [1]  publishes /image")
+
+
+def test_a_ring_is_drawn_once(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("ring", empty_database, tmp_path) as database:
+        for direction in ("forward", "backward", "both"):
+            lines = str(database.flow(publication_id=1, direction=direction)).splitlines()
+            assert len(lines) == 4
+            assert "[1] " in lines[1]
+            assert "see [1]" in lines[3]
+
+
+def test_what_the_trace_does_not_show_is_said(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("take_without_publication", empty_database, tmp_path) as database:
+        line = str(database.flow(take_id=6)).splitlines()[1]
+    assert "NA: its publication was not seen, reason unknown" in line
+    with database_of("callback_without_message", empty_database, tmp_path) as database:
+        line = str(database.flow(callback_instance_id=5)).splitlines()[1]
+    assert "NA: its message was not seen" in line
+
+
+def test_points_in_time_and_widths(robot: Database) -> None:
+    flow = robot.flow("/image")
+    absolute = tree_text(flow, is_absolute=True).splitlines()
+    assert absolute[0] == "publication 1, /image"
+    assert absolute[1].startswith("1970-01-01T00:00:00.000000100Z  /camera  Timer")
+    for width in (20, 80, 120):
+        lines = tree_text(flow, width=width).splitlines()[1:]
+        assert max(map(len, lines)) <= max(width, 72)
+    assert "\x1b[" not in tree_text(flow)
+    assert "\x1b[" in tree_text(flow, color=True)
+
+
+def test_limits_are_said(robot: Database) -> None:
+    flow = robot.flow("/image", direction="forward", depth=1)
+    assert flow.is_cut
+    assert flow.notes == [
+        "1 message on topics of ROS itself left out; --internal shows them",
+        "the flow goes on at 1 place beyond --depth 1",
+    ]
+    cut = robot.flow("/image", direction="forward", limit=3)
+    assert "the flow goes on at 3 places beyond --limit 3" in cut.notes
+    assert str(cut).count("… 1 more") == 3
+    assert not robot.flow("/image").is_cut
+
+
+def test_json_has_each_node_once_and_all_edges(robot: Database) -> None:
+    flow = robot.flow("/image")
+    content = json.loads(flow.to_json())
+    assert content == flow.to_dict()
+    assert list(content) == ["run_id", "run", "start", "direction", "is_cut", "nodes", "edges"]
+    assert content["start"] == {"kind": "publication", "id": 1}
+    keys = [(node["kind"], node["id"]) for node in content["nodes"]]
+    assert len(keys) == len(set(keys)) == 13
+    ends = {(edge["from_kind"], edge["from_id"]) for edge in content["edges"]}
+    ends |= {(edge["to_kind"], edge["to_id"]) for edge in content["edges"]}
+    assert ends == set(keys)
+    reasons = {
+        (edge["to_id"], edge["reason"])
+        for edge in content["edges"]
+        if edge["link_kind"] == "not_taken"
+    }
+    assert reasons == {(4, None), (6, "before_subscription")}
+
+
+def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> None:
+    with Database(small_database) as database:
+        assert database.flow("/chatter").start.id == 2
+        assert database.flow("/chatter", run="morning").start.id == 1
+        for at in (None, "0.5s", "500ms", 1_700_000_010_500_000_000, "2023-11-14T22:13:30.5Z"):
+            assert database.flow("/chatter", at=at).start.id == 2
+        # A number without unit is epoch ns, which who wrote it may not have meant.
+        early = database.flow("/chatter", at="2")
+        assert (early.start.id, len(early.notes)) == (2, 1)
+        assert "before the run" in early.notes[0]
+        with pytest.raises(UsageError) as raised:
+            database.flow("/chatter", at="0.500000001s")
+        assert raised.value.hint is not None
+        assert "--at +0.500000000 " in raised.value.hint
+        assert database.flow("/chatter", at="+0.500000000").start.id == 2
+
+
+def test_what_cannot_be_started_from_is_named(small_database: Path) -> None:
+    with Database(small_database) as database:
+        for given, message in (
+            ({"topic": "/chater"}, "no such topic"),
+            ({}, "starts from one thing"),
+            ({"topic": "/chatter", "take_id": 1}, "starts from one thing"),
+            ({"publication_id": 7}, "no such publication — 7"),
+            ({"publication_id": 1, "at": "1s"}, "an identity tells"),
+            ({"topic": "/chatter", "run": "all"}, "2 runs are chosen"),
+            ({"topic": "/chatter", "at": "noon"}, "cannot read the time of --at"),
+            ({"topic": "/chatter", "direction": "up"}, "no such direction"),
+            ({"topic": "/chatter", "depth": -1}, "depth"),
+            ({"topic": "/chatter", "limit": 0}, "limit"),
+        ):
+            with pytest.raises(UsageError, match=message):
+                database.flow(**given)  # type: ignore[arg-type]
+
+
+def test_a_topic_without_publications_says_so(small_database: Path) -> None:
+    with duckdb.connect(str(small_database)) as connection:
+        names = ["subscription_id", "run_id", "topic_name"]
+        insert(connection, "subscription", names, [["1", "2", "/unused"]])
+    with (
+        Database(small_database) as database,
+        pytest.raises(UsageError, match="no message that was published on the topic"),
+    ):
+        database.flow("/unused")
+
+
+def test_a_long_chain_is_read_as_far_as_the_limits_say(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    """A ping-pong of many messages: every message is caused by the one before."""
+    path = tmp_path / "pingpong.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
+        fill(connection, CASES / "ring" / "input")
+        for table in ("publication", "take", "callback_instance", "link_transport", "link_causal"):
+            connection.execute(f"DELETE FROM store.{table}")
+        connection.execute(CHAIN)
+    with Database(path) as database:
+        flow = database.flow(publication_id=10_000)
+        assert {abs(node["depth"]) for node in flow.nodes.values()} == set(range(97))
+        assert len(str(flow).splitlines()) == 2 * 64 + 2
+        assert flow.notes == ["the flow goes on at 2 places beyond --depth 32"]
+        everything = database.flow(publication_id=10_000, depth=1_000_000, limit=1_000)
+        assert len(everything.nodes) == 1_000
+        assert everything.notes == ["the flow goes on at 2 places beyond --limit 1000"]
+
+
+CHAIN = """
+INSERT INTO store.publication BY NAME
+    SELECT n AS publication_id, 1 AS run_id, 1 AS trace_id, 1 AS process_id, 1 AS thread_id,
+        10 * n AS start_ns, 10 * n + 1 AS end_ns
+    FROM range(1, 20001) AS r (n);
+INSERT INTO store.take BY NAME
+    SELECT n AS take_id, 1 AS run_id, 1 AS trace_id, 1 AS process_id, 1 AS thread_id,
+        10 * n + 2 AS taken_ns, 'rmw' AS "method"
+    FROM range(1, 20001) AS r (n);
+INSERT INTO store.callback_instance BY NAME
+    SELECT n AS callback_instance_id, 1 AS run_id, 1 AS trace_id, 1 AS callback_id,
+        1 AS process_id, 1 AS thread_id, 10 * n + 3 AS start_ns, 10 * n + 12 AS end_ns,
+        n AS take_id, false AS is_intra_process, 1 AS depth
+    FROM range(1, 20001) AS r (n);
+INSERT INTO store.link_transport BY NAME
+    SELECT 1 AS run_id, n AS publication_id, n AS take_id, 'exact' AS "method",
+        false AS is_self_loop, false AS is_loss_affected
+    FROM range(1, 20001) AS r (n);
+INSERT INTO store.link_causal BY NAME
+    SELECT 1 AS run_id, n AS callback_instance_id, n + 1 AS publication_id, 'direct' AS kind,
+        false AS is_loss_affected
+    FROM range(1, 20000) AS r (n);
+"""
