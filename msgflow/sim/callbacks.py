@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.sim.publish import CallbackInstance, publish
 from msgflow.sim.transport import Message, Middleware, PublisherObject, Root, SubscriptionObject
+from msgflow.sim.write import read
 
 if TYPE_CHECKING:
     from msgflow.sim.machine import Thread
@@ -62,13 +63,12 @@ def run_subscription(
     tracepoints = thread.machine.tracepoints
     emit, context = thread.emit, thread.context
     rmw_handle, buffer = subscription.rmw_handle, subscription.message
-    rmw = time + 2_000 + int(random() * 8_000)
+    reading = time + 2_000 + int(random() * 8_000)
     if not subscription.queue:
-        emit(tracepoints.rmw_take, rmw, context, rmw_handle, buffer, 0, 0)
         middleware.failed_takes += 1
-        return rmw
+        return read(thread, rmw_handle, buffer, reading, 0, 0)
     message = subscription.queue.popleft()
-    emit(tracepoints.rmw_take, rmw, context, rmw_handle, buffer, message.stamp_ns, 1)
+    rmw = read(thread, rmw_handle, buffer, reading, message.stamp_ns, 1)
     rcl = rmw + 200 + int(random() * 900)
     emit(tracepoints.rcl_take, rcl, context, buffer)
     rclcpp = rcl + 150 + int(random() * 600)

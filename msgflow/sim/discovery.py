@@ -11,6 +11,7 @@ from collections import deque
 
 from msgflow.sim.machine import RunningProcess, Thread
 from msgflow.sim.transport import latency_between
+from msgflow.sim.write import read, write
 
 _TOPIC = "ros_discovery_info"
 
@@ -36,10 +37,9 @@ class DiscoveryListener(Thread):
         if later := self.take_cpu(time):
             self.world.at(later, self._listen)
             return
-        rmw_take = self.machine.tracepoints.rmw_take
         while self._heard:
             taken = self._heard.popleft()
-            self.emit(rmw_take, time, self.context, self.rmw_handle, self._message, 0, taken)
+            time = read(self, self.rmw_handle, self._message, time, 0, taken)
             time += 1_500 + int(self.world.random() * 2_000)
         self.keep_cpu(time)
         self._awake = False
@@ -58,18 +58,14 @@ class Discovery:
     def announce(self, thread: Thread, rmw_handle: int, message: int, time: int) -> int:
         """Publish what the process has, from `time` on; returns the time when that is done."""
         world, machine = thread.world, thread.machine
-        stamp = time + 100
-        rmw = stamp + 50 + int(world.random() * 150)
-        stamp_ns, rmw_ns = stamp + machine.epoch, rmw + machine.epoch
-        thread.emit(
-            machine.tracepoints.rmw_publish, rmw, thread.context, rmw_handle, message, stamp_ns
-        )
+        written = write(thread, rmw_handle, message, time)
         world.truth.publication.add(
             next(world.publication_ids), machine.hostname, thread.process.pid, thread.tid, None,
-            _TOPIC, None, rmw_handle, None, None, rmw_ns, stamp_ns, None, True,
+            _TOPIC, None, rmw_handle, None, None, written.rmw + machine.epoch, written.stamp_ns,
+            None, True,
         )  # fmt: skip
         for listener in self._listeners:
             latency = latency_between(thread.process, listener.process)
-            arrival = rmw + latency.base + world.tail(latency.tail)
+            arrival = written.end + latency.base + world.tail(latency.tail)
             world.at(arrival, listener.hear, int(listener.process is not thread.process))
-        return rmw + 5_000 + int(world.random() * 10_000)
+        return written.end + 5_000 + int(world.random() * 10_000)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +10,12 @@ from uuid import UUID
 
 from msgflow.errors import UsageError
 from msgflow.sim.builtin import scenarios
-from msgflow.sim.ctf import TraceIdentity, TraceWriter
+from msgflow.sim.ctf import TraceIdentity
 from msgflow.sim.discovery import Discovery
 from msgflow.sim.layout import layouts
 from msgflow.sim.machine import Machine, RunningProcess
 from msgflow.sim.meta import write_meta
+from msgflow.sim.recorder import Recorder
 from msgflow.sim.startup import Startup
 from msgflow.sim.system import SECOND, Host, Scenario
 from msgflow.sim.transport import Middleware
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from msgflow.sim.executor import ExecutorThread
+    from msgflow.sim.recording import Recording
 
 # 2025-03-14 09:26:53.589793238 UTC: when every simulated trace begins.
 _EPOCH_NS = 1_741_944_413_589_793_238
@@ -38,7 +40,8 @@ class Simulation:
 
     Attributes:
         directory: holds one folder per host and `truth`.
-        trace_directories: the CTF traces, one per host in the order of the scenario.
+        trace_directories: the CTF traces in the order of the scenario's hosts, as a rule one of
+            each.
         event_count: events in all traces.
         truth: name of each truth table and its Parquet file.
         meta: JSON file with what was simulated, and counts.
@@ -58,6 +61,8 @@ def simulate(
     factor: float = 1.0,
     seed: int = 0,
     clock_offset_ns: int = 0,
+    layout: str | None = None,
+    recording: Recording | None = None,
 ) -> Simulation:
     """Simulate a ROS 2 system and write its traces and the truth about them.
 
@@ -70,11 +75,13 @@ def simulate(
         seed: of everything that is random.
         clock_offset_ns: each host's clock is this much ahead of that of the host before it, in
             addition to what the scenario says.
+        layout: name of a layout, see `layouts()`; that of the scenario if None.
+        recording: how it is recorded; as the scenario says if None.
 
     Raises:
         UsageError: unknown scenario or layout, factor not positive, directory not empty.
     """
-    chosen = _choose(scenario)
+    chosen = _choose(scenario, layout, recording)
     if not 0 < factor < float("inf"):
         raise UsageError(f"the factor must be a positive number — {factor}")
     target = _empty_directory(Path(directory))
@@ -83,9 +90,12 @@ def simulate(
     course = f"{chosen.name}/{seed}"
     identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}"
     truth = Truth(target / "truth")
+    for event in layouts()[chosen.layout].events:
+        for field in event.fields or (None,):
+            truth.declared.add(event.name, None if field is None else field.name)
     world = World(course, truth)
     machines = {
-        host.hostname: _machine(chosen, host, index * clock_offset_ns, target, identity)
+        host.hostname: _machine(chosen, host, index * clock_offset_ns, target, identity, truth)
         for index, host in enumerate(chosen.hosts)
     }
     middleware = Middleware(world, overwrites=chosen.overwrites)
@@ -97,7 +107,7 @@ def simulate(
     middleware.finish()
     end = world.end + _STOP_DELAY_NS
     for machine in machines.values():
-        machine.trace.close(end)
+        machine.recorder.close(end)
     truth.close()
     meta = target / "truth" / "meta.json"
     write_meta(
@@ -115,21 +125,27 @@ def simulate(
     )
     return Simulation(
         directory=target,
-        trace_directories=tuple(machine.trace.directory for machine in machines.values()),
+        trace_directories=tuple(
+            path for machine in machines.values() for path in machine.recorder.directories
+        ),
         event_count=sum(
-            sum(machine.trace.event_counts().values()) for machine in machines.values()
+            sum(machine.tracepoints.counts().values()) for machine in machines.values()
         ),
         truth={name: table.path for name, table in truth.tables.items()},
         meta=meta,
     )
 
 
-def _choose(scenario: str | Scenario) -> Scenario:
+def _choose(scenario: str | Scenario, layout: str | None, recording: Recording | None) -> Scenario:
     known = scenarios()
     if isinstance(scenario, str):
         if scenario not in known:
             raise UsageError(f"unknown scenario — {scenario}", f"choose one of {', '.join(known)}")
         scenario = known[scenario]
+    if layout is not None:
+        scenario = replace(scenario, layout=layout)
+    if recording is not None:
+        scenario = replace(scenario, recording=recording)
     if scenario.layout not in layouts():
         raise UsageError(
             f"unknown layout — {scenario.layout}", f"choose one of {', '.join(layouts())}"
@@ -167,7 +183,12 @@ def _empty_directory(directory: Path) -> Path:
 
 
 def _machine(
-    scenario: Scenario, host: Host, clock_offset: int, target: Path, identity_key: str
+    scenario: Scenario,
+    host: Host,
+    clock_offset: int,
+    target: Path,
+    identity_key: str,
+    truth: Truth,
 ) -> Machine:
     digest = sha256(f"{identity_key}/{host.hostname}".encode()).digest()
     epoch = _EPOCH_NS + host.clock_offset_ns + clock_offset
@@ -180,7 +201,12 @@ def _machine(
         # Up to about thirteen days, so that hosts count from quite different values.
         uptime_ns=_SHORTEST_UPTIME_NS + int.from_bytes(digest[:7], "little") % 2**50,
     )
-    trace = TraceWriter(
-        target / host.hostname, layouts()[scenario.layout], identity, host.cpu_count
+    recorder = Recorder(
+        target / host.hostname,
+        layouts()[scenario.layout],
+        identity,
+        host.cpu_count,
+        scenario.recording,
+        truth,
     )
-    return Machine(host.hostname, epoch, trace)
+    return Machine(host.hostname, epoch, recorder, scenario.recording)

@@ -1,46 +1,31 @@
-"""Trace layouts as data: which events a tracetools version declares, with which fields.
+"""Trace layouts as data: which events a release of ROS 2 declares, with which fields.
 
-A further version is one more `Layout` in `layouts()`; nothing else knows about versions but the
-modules that emit (`startup`, `publish`, `executor`, `discovery`).
+Releases are told as differences from the one before. Layouts named after a DDS implementation have
+its `dds:*` events as well, which only forks of Fast DDS and Cyclone DDS have.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, replace
+from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
+
+from msgflow.sim.events import SIGNATURES, EventField, parse_fields
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-
-class FieldKind(Enum):
-    """Kinds of payload fields: `struct` code and the TSDL of one element."""
-
-    POINTER = ("Q", "integer { size = 64; align = 8; signed = 0; encoding = none; base = 16; }")
-    UNSIGNED = ("Q", "integer { size = 64; align = 8; signed = 0; encoding = none; base = 10; }")
-    SIGNED = ("q", "integer { size = 64; align = 8; signed = 1; encoding = none; base = 10; }")
-    SIGNED_32 = ("i", "integer { size = 32; align = 8; signed = 1; encoding = none; base = 10; }")
-    BYTES = ("s", "integer { size = 8; align = 8; signed = 0; encoding = none; base = 10; }")
-    STRING = ("", "string")
-
-    def __init__(self, code: str, tsdl: str) -> None:
-        self.code = code
-        self.tsdl = tsdl
-
-
-@dataclass(frozen=True, slots=True)
-class EventField:
-    """A payload field; `length` is the number of elements of BYTES."""
-
-    name: str
-    kind: FieldKind
-    length: int = 0
+_LARGE_PACKET = 32 * 1024
+_SMALL_PACKET = 8 * 1024
 
 
 @dataclass(frozen=True, slots=True)
 class EventType:
-    """An event class: full name (`ros2:rcl_init`) and fields in the order of the trace."""
+    """An event class: full name (`ros2:rcl_init`) and fields in the order of the trace.
+
+    The names of the fields are names of the event's signature.
+    """
 
     name: str
     fields: tuple[EventField, ...]
@@ -48,112 +33,255 @@ class EventType:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What one tracetools version writes.
+    """What the traces of one tracetools version look like, and what ROS 2 did at that time.
 
     Attributes:
-        name: name of the layout, as in `Scenario.layout`.
-        version: what `rcl_init.version` says.
-        events: event classes, numbered from 0 in this order.
+        name: name by which scenarios choose it.
+        version: version string that rcl_init carries.
+        events: event classes in the order of declaration, which numbers them.
+        is_stamped_by_rmw: the rmw layer makes the source stamp and emits rmw_publish then; else
+            DDS makes it, after rmw_publish.
+        is_rosout_first: a node's publisher of /rosout is created before rcl_node_init.
+        is_stamped_early: DDS makes the stamp when write is entered (Cyclone DDS); else once the
+            message is serialised (Fast DDS).
+        dds_write: the `dds:*` events of a publication, in order.
+        packet_bytes: size of a sub-buffer, hence of a packet.
+        tracer_minor: of LTTng 2.x.
     """
 
     name: str
     version: str
     events: tuple[EventType, ...]
+    is_stamped_by_rmw: bool = False
+    is_rosout_first: bool = True
+    is_stamped_early: bool = False
+    dds_write: tuple[str, ...] = ()
+    packet_bytes: int = _LARGE_PACKET
+    tracer_minor: int = 13
+
+    def declares(self, event: str, field: str | None = None) -> bool:
+        """Whether traces of this layout have this event (and field)."""
+        return any(
+            declared.name == event
+            and (field is None or any(field == one.name for one in declared.fields))
+            for declared in self.events
+        )
+
+    def having(
+        self, *whole: str, provider: str = "ros2", **fields: str
+    ) -> Mapping[str, tuple[EventField, ...]]:
+        """The events with others added, `whole` ones as their signatures, or changed."""
+        named = {f"{provider}:{name}": parse_fields(text) for name, text in fields.items()}
+        complete = {f"{provider}:{name}": SIGNATURES[f"{provider}:{name}"] for name in whole}
+        return {event.name: event.fields for event in self.events} | complete | named
 
 
-_KINDS = {
-    "pointer": FieldKind.POINTER,
-    "unsigned": FieldKind.UNSIGNED,
-    "signed": FieldKind.SIGNED,
-    "signed_32": FieldKind.SIGNED_32,
-    "string": FieldKind.STRING,
-}
+def _events(fields: Mapping[str, tuple[EventField, ...]]) -> tuple[EventType, ...]:
+    return tuple(EventType(name, fields[name]) for name in SIGNATURES if name in fields)
 
 
-def _event(name: str, declaration: str = "") -> EventType:
-    """Read fields from text such as `context_handle pointer, gid bytes 24`."""
-    fields = []
-    for part in filter(None, declaration.split(", ")):
-        field_name, kind, *length = part.split()
-        if kind == "bytes":
-            fields.append(EventField(field_name, FieldKind.BYTES, int(length[0])))
-        else:
-            fields.append(EventField(field_name, _KINDS[kind]))
-    return EventType(f"ros2:{name}", tuple(fields))
+_NOTHING = Layout("", "", ())
 
-
-JAZZY = Layout(
-    name="jazzy",
-    version="8.2.3",
-    events=(
-        _event("rcl_init", "context_handle pointer, version string"),
-        _event(
+_FOXY = Layout(
+    name="foxy",
+    version="1.0.5",
+    events=_events(
+        _NOTHING.having(
+            "rcl_init",
             "rcl_node_init",
-            "node_handle pointer, rmw_handle pointer, node_name string, namespace string",
-        ),
-        _event("rmw_publisher_init", "rmw_publisher_handle pointer, gid bytes 24"),
-        _event(
             "rcl_publisher_init",
-            "publisher_handle pointer, node_handle pointer, rmw_publisher_handle pointer, "
-            "topic_name string, queue_depth unsigned",
-        ),
-        _event("rclcpp_publish", "message pointer"),
-        _event("rclcpp_intra_publish", "publisher_handle pointer, message pointer"),
-        _event("rcl_publish", "publisher_handle pointer, message pointer"),
-        _event("rmw_publish", "rmw_publisher_handle pointer, message pointer, timestamp signed"),
-        _event("rmw_subscription_init", "rmw_subscription_handle pointer, gid bytes 24"),
-        _event(
             "rcl_subscription_init",
-            "subscription_handle pointer, node_handle pointer, rmw_subscription_handle pointer, "
-            "topic_name string, queue_depth unsigned",
-        ),
-        _event("rclcpp_subscription_init", "subscription_handle pointer, subscription pointer"),
-        _event("rclcpp_subscription_callback_added", "subscription pointer, callback pointer"),
-        _event(
-            "rmw_take",
-            "rmw_subscription_handle pointer, message pointer, source_timestamp signed, "
-            "taken signed_32",
-        ),
-        _event("rcl_take", "message pointer"),
-        _event("rclcpp_take", "message pointer"),
-        _event(
+            "rclcpp_subscription_init",
+            "rclcpp_subscription_callback_added",
             "rcl_service_init",
-            "service_handle pointer, node_handle pointer, rmw_service_handle pointer, "
-            "service_name string",
-        ),
-        _event("rclcpp_service_callback_added", "service_handle pointer, callback pointer"),
-        _event(
+            "rclcpp_service_callback_added",
             "rcl_client_init",
-            "client_handle pointer, node_handle pointer, rmw_client_handle pointer, "
-            "service_name string",
-        ),
-        _event("rcl_timer_init", "timer_handle pointer, period signed"),
-        _event("rclcpp_timer_callback_added", "timer_handle pointer, callback pointer"),
-        _event("rclcpp_timer_link_node", "timer_handle pointer, node_handle pointer"),
-        _event("rclcpp_callback_register", "callback pointer, symbol string"),
-        _event("callback_start", "callback pointer, is_intra_process signed_32"),
-        _event("callback_end", "callback pointer"),
-        _event("rcl_lifecycle_state_machine_init", "node_handle pointer, state_machine pointer"),
-        _event(
+            "rcl_timer_init",
+            "rclcpp_timer_callback_added",
+            "rclcpp_callback_register",
+            "callback_start",
+            "callback_end",
+        )
+    ),
+    packet_bytes=_SMALL_PACKET,
+    tracer_minor=11,
+)
+
+_GALACTIC = replace(
+    _FOXY,
+    name="galactic",
+    version="2.3.0",
+    events=_events(
+        _FOXY.having(
+            "rclcpp_publish",
+            "rcl_publish",
+            "rclcpp_timer_link_node",
+            "rcl_lifecycle_state_machine_init",
             "rcl_lifecycle_transition",
-            "state_machine pointer, start_label string, goal_label string",
-        ),
-        _event("rclcpp_executor_get_next_ready"),
-        _event("rclcpp_executor_wait_for_work", "timeout signed"),
-        _event("rclcpp_executor_execute", "handle pointer"),
-        _event("rclcpp_construct_ring_buffer", "buffer pointer, capacity unsigned"),
-        _event("rclcpp_buffer_to_ipb", "buffer pointer, ipb pointer"),
-        _event("rclcpp_ipb_to_subscription", "ipb pointer, subscription pointer"),
-        _event(
-            "rclcpp_ring_buffer_enqueue",
-            "buffer pointer, index unsigned, size unsigned, overwritten signed_32",
-        ),
-        _event("rclcpp_ring_buffer_dequeue", "buffer pointer, index unsigned, size unsigned"),
-        _event("rclcpp_ring_buffer_clear", "buffer pointer"),
+        )
     ),
 )
 
+_HUMBLE = replace(
+    _GALACTIC,
+    name="humble",
+    version="4.1.1",
+    events=_events(
+        _GALACTIC.having(
+            "rmw_take",
+            "rcl_take",
+            "rclcpp_take",
+            "rclcpp_executor_get_next_ready",
+            "rclcpp_executor_wait_for_work",
+            "rclcpp_executor_execute",
+            rclcpp_publish="message pointer",
+            rmw_publish="message pointer",
+            rmw_publisher_init="rmw_publisher_handle pointer, gid padded 24",
+            rmw_subscription_init="rmw_subscription_handle pointer, gid padded 24",
+        )
+    ),
+    packet_bytes=_LARGE_PACKET,
+    tracer_minor=13,
+)
 
+# What follows the 16 bytes of an identifier is what tracetools read beyond its end.
+_IRON = replace(
+    _HUMBLE,
+    name="iron",
+    version="6.3.1",
+    events=_events(
+        _HUMBLE.having(
+            "rmw_publisher_init",
+            "rmw_subscription_init",
+            "rclcpp_intra_publish",
+            "rclcpp_construct_ring_buffer",
+            "rclcpp_buffer_to_ipb",
+            "rclcpp_ipb_to_subscription",
+            "rclcpp_ring_buffer_enqueue",
+            "rclcpp_ring_buffer_dequeue",
+            "rclcpp_ring_buffer_clear",
+        )
+    ),
+)
+
+_JAZZY = replace(
+    _IRON,
+    name="jazzy",
+    version="8.2.3",
+    events=_events(_IRON.having("rmw_publish")),
+    is_stamped_by_rmw=True,
+    is_rosout_first=False,
+)
+
+_KILTED = replace(
+    _JAZZY,
+    name="kilted",
+    version="8.6.0",
+    events=_events(
+        _JAZZY.having(
+            "rmw_client_init",
+            "rmw_send_request",
+            "rmw_take_request",
+            "rmw_send_response",
+            "rmw_take_response",
+            rmw_publisher_init="rmw_publisher_handle pointer, gid bytes 16",
+            rmw_subscription_init="rmw_subscription_handle pointer, gid bytes 16",
+        )
+    ),
+)
+
+_ROLLING = replace(
+    _KILTED,
+    name="rolling",
+    version="8.10.1",
+    events=_events(_KILTED.having("message_link_periodic_async", "message_link_partial_sync")),
+)
+
+
+def _with_fast_dds(layout: Layout, *, suffix: str = "fastdds", is_write_first: bool) -> Layout:
+    """The instrumented Fast DDS; the first branch of the fork emits `dds:write_pre` first."""
+    order = ("write", "write_pre") if is_write_first else ("write_pre", "write")
+    return replace(
+        layout,
+        name=f"{layout.name}-{suffix}",
+        events=_events(
+            layout.having(
+                "write_pre",
+                "read",
+                provider="dds",
+                create_writer="writer pointer, topic_name string, gid_prefix bytes 12, "
+                "gid_entity bytes 4",
+                create_reader="reader pointer, topic_name string, gid_prefix bytes 12, "
+                "gid_entity bytes 4",
+                write="writer pointer, timestamp signed",
+            )
+        ),
+        dds_write=tuple(f"dds:{name}" for name in order),
+    )
+
+
+def _with_cyclone_dds(layout: Layout) -> Layout:
+    """The instrumented Cyclone DDS, as offered to its developers."""
+    return replace(
+        layout,
+        name=f"{layout.name}-cyclonedds",
+        events=_events(
+            layout.having(
+                "write",
+                "read",
+                provider="dds",
+                create_writer="writer pointer, topic_name string, gid bytes 16",
+                create_reader="reader pointer, topic_name string, gid bytes 16",
+            )
+        ),
+        is_stamped_early=True,
+        dds_write=("dds:write",),
+    )
+
+
+def _with_early_cyclone_dds(layout: Layout) -> Layout:
+    """The first instrumentation of Cyclone DDS, which has no stamps."""
+    return replace(
+        layout,
+        name=f"{layout.name}-cyclonedds",
+        events=_events(
+            layout.having(
+                provider="dds",
+                create_writer="writer pointer, topic_name string",
+                create_reader="reader pointer, topic_name string",
+                write="writer pointer, data pointer",
+                read="reader pointer",
+            )
+        ),
+        is_stamped_early=True,
+        dds_write=("dds:write",),
+    )
+
+
+def _with_message_links(layout: Layout) -> Layout:
+    """The branch for annotations, which users of the instrumented DDS also use."""
+    events = layout.having("message_link_periodic_async", "message_link_partial_sync")
+    return replace(layout, events=_events(events))
+
+
+@cache
 def layouts() -> Mapping[str, Layout]:
     """Every layout by name."""
-    return {JAZZY.name: JAZZY}
+    annotated = _with_message_links(_HUMBLE)
+    known = (
+        _FOXY,
+        _with_early_cyclone_dds(_FOXY),
+        _with_fast_dds(_FOXY, is_write_first=False),
+        _GALACTIC,
+        _with_early_cyclone_dds(_GALACTIC),
+        _with_fast_dds(_GALACTIC, is_write_first=False),
+        _HUMBLE,
+        _with_cyclone_dds(annotated),
+        _with_fast_dds(annotated, is_write_first=False),
+        _with_fast_dds(annotated, suffix="fastdds-write-first", is_write_first=True),
+        _IRON,
+        _JAZZY,
+        _KILTED,
+        _ROLLING,
+    )
+    return MappingProxyType({layout.name: layout for layout in known})

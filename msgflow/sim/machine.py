@@ -2,56 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-from msgflow.sim.ctf import Tracepoint, TraceWriter, thread_context
+from msgflow.sim.ctf import thread_context
 from msgflow.sim.memory import AddressSpace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from msgflow.sim import system
+    from msgflow.sim.recorder import Recorder
+    from msgflow.sim.recording import Recording
     from msgflow.sim.world import World
 
 # A woken thread sometimes finds itself on another CPU.
 _MIGRATION = 1 / 128
-
-
-@dataclass(frozen=True, slots=True)
-class Tracepoints:
-    """The event classes that the simulation emits; field names are event names."""
-
-    rcl_init: Tracepoint
-    rcl_node_init: Tracepoint
-    rmw_publisher_init: Tracepoint
-    rcl_publisher_init: Tracepoint
-    rclcpp_publish: Tracepoint
-    rcl_publish: Tracepoint
-    rmw_publish: Tracepoint
-    rmw_subscription_init: Tracepoint
-    rcl_subscription_init: Tracepoint
-    rclcpp_subscription_init: Tracepoint
-    rclcpp_subscription_callback_added: Tracepoint
-    rmw_take: Tracepoint
-    rcl_take: Tracepoint
-    rclcpp_take: Tracepoint
-    rcl_service_init: Tracepoint
-    rclcpp_service_callback_added: Tracepoint
-    rcl_timer_init: Tracepoint
-    rclcpp_timer_callback_added: Tracepoint
-    rclcpp_timer_link_node: Tracepoint
-    rclcpp_callback_register: Tracepoint
-    callback_start: Tracepoint
-    callback_end: Tracepoint
-    rclcpp_executor_get_next_ready: Tracepoint
-    rclcpp_executor_wait_for_work: Tracepoint
-    rclcpp_executor_execute: Tracepoint
-
-    @classmethod
-    def of(cls, trace: TraceWriter) -> Tracepoints:
-        """Those of a trace."""
-        return cls(**{field.name: trace.tracepoint(f"ros2:{field.name}") for field in fields(cls)})
 
 
 class Machine:
@@ -60,19 +25,27 @@ class Machine:
     Attributes:
         hostname: its name.
         epoch: what its clock shows at time 0 (ns since the epoch); added to a time, it gives the
-            trace's time stamp and the ROS stamp.
-        trace: its trace.
-        tracepoints: the event classes of its trace.
+            trace's time stamp.
+        recorder: writes its traces.
+        layout: of its traces.
+        tracepoints: the events that can be emitted.
         free_at: for each CPU the time from which on it is free.
     """
 
-    def __init__(self, hostname: str, epoch: int, trace: TraceWriter) -> None:
+    def __init__(self, hostname: str, epoch: int, recorder: Recorder, recording: Recording) -> None:
         self.hostname = hostname
         self.epoch = epoch
-        self.trace = trace
-        self.tracepoints = Tracepoints.of(trace)
-        self.emitters = tuple(stream.emit for stream in trace.streams)
-        self.free_at = [0] * len(trace.streams)
+        self.recorder = recorder
+        self.layout = recorder.layout
+        self.tracepoints = recorder.tracepoints
+        self.emitters = recorder.emitters
+        self.free_at = [0] * recorder.cpu_count
+        self._stamp_epoch = epoch + recording.realtime_offset_ns
+        self._slew_ppb = round(recording.slew_ppm * 1000)
+
+    def stamp_ns(self, time: int) -> int:
+        """What the clock that makes source stamps shows at `time` (ns since the epoch)."""
+        return time + self._stamp_epoch + time * self._slew_ppb // 1_000_000_000
 
 
 class RunningProcess:

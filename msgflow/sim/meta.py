@@ -30,10 +30,13 @@ def write_meta(
         **arguments,
         "hosts": {
             name: {
-                "trace": str(machine.trace.directory.relative_to(path.parent.parent)),
+                "traces": [
+                    str(directory.relative_to(path.parent.parent))
+                    for directory in machine.recorder.directories
+                ],
                 "begin_of_tracing_ns": machine.epoch,
-                "cpu_count": len(machine.trace.streams),
-                "events": dict(machine.trace.event_counts()),
+                "cpu_count": machine.recorder.cpu_count,
+                "events": dict(machine.tracepoints.counts()),
             }
             for name, machine in machines.items()
         },

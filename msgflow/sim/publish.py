@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.sim.transport import Message, Middleware, PublisherObject, Root
+from msgflow.sim.write import write
 
 if TYPE_CHECKING:
     from msgflow.sim.machine import Thread
@@ -45,15 +46,12 @@ def publish(
     rclcpp_ns: int | None = None
     rcl = time
     if publisher.is_rclcpp:
-        emit(tracepoints.rclcpp_publish, time, context, publisher.message)
+        emit(tracepoints.rclcpp_publish, time, context, publisher.handle, publisher.message)
         rclcpp_ns = time + epoch
         rcl += 250 + int(random() * 900)
     emit(tracepoints.rcl_publish, rcl, context, publisher.handle, publisher.message)
-    # The rmw layer reads the clock first and emits the event then.
-    stamp = rcl + 200 + int(random() * 500)
-    rmw = stamp + 60 + int(random() * 200)
-    stamp_ns = stamp + epoch
-    emit(tracepoints.rmw_publish, rmw, context, publisher.rmw_handle, publisher.message, stamp_ns)
+    written = write(thread, publisher.rmw_handle, publisher.message, rcl, publisher.size_bytes)
+    rmw, stamp_ns = written.rmw, written.stamp_ns
     publication_id = next(world.publication_ids)
     topic = publisher.topic
     hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
@@ -78,5 +76,5 @@ def publish(
         message = Message(
             publication_id, publisher, tid, rclcpp_ns, rcl_ns, rmw, rmw_ns, stamp_ns, root, path
         )
-        middleware.send(rmw, message)
-    return rmw + 3_000 + int(random() * 6_000)
+        middleware.send(written.end, message)
+    return written.end + 3_000 + int(random() * 6_000)

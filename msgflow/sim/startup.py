@@ -1,4 +1,4 @@
-"""From rcl_init to spin: the events of a starting process, in the order of ROS 2 Jazzy.
+"""From rcl_init to spin: the events of a starting process, in the order of its release of ROS 2.
 
 The steps are separate, so that other processes start meanwhile.
 """
@@ -15,6 +15,7 @@ from msgflow.sim.executor import ExecutorThread
 from msgflow.sim.publish import publish
 from msgflow.sim.system import MICROSECOND
 from msgflow.sim.transport import Middleware, PublisherObject, SubscriptionObject
+from msgflow.sim.write import entity_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -50,6 +51,8 @@ class Startup:
         self._time = 0
         self._announcer = 0
         self._announcement = 0
+        # DDS has writers of its own, which tell others what there is.
+        self._discovery_writers = tuple(process.memory.allocate() for _ in range(3))
         self._steps = self._sequence()
 
     def begin(self, time: int, _: None = None) -> None:
@@ -67,7 +70,7 @@ class Startup:
         self._world.at(self._time, self.begin)
 
     def _emit(self, name: str, *values: object) -> None:
-        """Emit the event `ros2:NAME` a little later than the one before."""
+        """Emit an event a little later than the one before."""
         self._time += 300 + int(self._world.random() * 1_500)
         self.thread.emit(getattr(self._tracepoints, name), self._time, self.thread.context, *values)
 
@@ -86,8 +89,8 @@ class Startup:
         self._announcer = self._memory.allocate()
         self._announcement = self._memory.on_stack()
         listener = DiscoveryListener(process)
-        self._emit("rmw_publisher_init", self._announcer, process.gid(3))
-        self._emit("rmw_subscription_init", listener.rmw_handle, process.gid(4))
+        self._create_writer(self._announcer, "ros_discovery_info")
+        self._create_reader(listener.rmw_handle, "ros_discovery_info")
         self._discovery.join(listener)
         yield True
         for node in process.description.nodes:
@@ -98,11 +101,17 @@ class Startup:
         name = node.full_name
         self._work(300 * MICROSECOND)
         self._announce()
-        self._emit("rcl_node_init", handle, self._memory.allocate(), node.name, node.namespace)
-        yield True
-        # rclcpp creates it after the node, with a handle on the stack that is copied later.
+        described = (handle, self._memory.allocate(), node.name, node.namespace)
+        is_rosout_first = self._process.machine.layout.is_rosout_first
+        if not is_rosout_first:
+            self._emit("rcl_node_init", *described)
+            yield True
+        # Its handle is on the stack and copied later. Until Iron it is made as part of the node.
         rosout = self._create_publisher(name, handle, _ROSOUT, _INTERNAL_DEPTH, is_rclcpp=False)
         yield True
+        if is_rosout_first:
+            self._emit("rcl_node_init", *described)
+            yield True
         for service, symbol in symbols.parameter_services():
             self._create_service(handle, f"{name}/{service}", symbol)
             yield True
@@ -121,7 +130,7 @@ class Startup:
         publishers = {}
         for publisher in node.publishers:
             publishers[publisher.topic] = self._create_publisher(
-                name, handle, publisher.topic, publisher.depth
+                name, handle, publisher.topic, publisher.depth, size_bytes=publisher.size_bytes
             )
             yield True
         for subscription in node.subscriptions:
@@ -144,21 +153,28 @@ class Startup:
         self._time = publish(self.thread, self._middleware, publisher, self._time, None)
 
     def _create_publisher(
-        self, node: str, node_handle: int, topic: str, depth: int, *, is_rclcpp: bool = True
+        self,
+        node: str,
+        node_handle: int,
+        topic: str,
+        depth: int,
+        *,
+        is_rclcpp: bool = True,
+        size_bytes: int = 0,
     ) -> PublisherObject:
         self._work(250 * MICROSECOND)
         self._announce()
         memory = self._memory
         address: Callable[[], int] = memory.allocate if is_rclcpp else memory.on_stack
         rmw_handle, init_handle = memory.allocate(), address()
-        self._emit("rmw_publisher_init", rmw_handle, self._process.gid(3))
+        self._create_writer(rmw_handle, f"rt{topic}")
         self._emit("rcl_publisher_init", init_handle, node_handle, rmw_handle, topic, depth)
         handle = init_handle
         while not is_rclcpp and handle == init_handle:
             handle = memory.on_stack()
         publisher = PublisherObject(
             self._process, node, topic, init_handle, handle, rmw_handle, memory.on_stack(),
-            is_rclcpp, topic in {_ROSOUT, _PARAMETER_EVENTS}, self._time, [],
+            is_rclcpp, topic in {_ROSOUT, _PARAMETER_EVENTS}, self._time, [], size_bytes,
         )  # fmt: skip
         self._middleware.add_publisher(publisher)
         return publisher
@@ -178,7 +194,7 @@ class Startup:
         rmw_handle, handle = memory.allocate(), memory.allocate()
         subscription, callback = memory.allocate(), memory.allocate()
         topic = description.topic
-        self._emit("rmw_subscription_init", rmw_handle, self._process.gid(4))
+        self._create_reader(rmw_handle, f"rt{topic}")
         self._emit(
             "rcl_subscription_init", handle, node_handle, rmw_handle, topic, description.depth
         )
@@ -193,11 +209,37 @@ class Startup:
         self.thread.subscriptions.append(created)
         self._middleware.add_subscription(created)
 
+    def _create_writer(self, rmw_handle: int, dds_topic: str) -> None:
+        """A publisher of the middleware layer and its DDS writer."""
+        gid = self._process.gid(3)
+        self._announce_entity("create_writer", entity_of(rmw_handle), dds_topic, gid)
+        self._emit("rmw_publisher_init", rmw_handle, gid)
+
+    def _create_reader(self, rmw_handle: int, dds_topic: str) -> None:
+        """A subscription of the middleware layer and its DDS reader."""
+        gid = self._process.gid(4)
+        self._announce_entity("create_reader", entity_of(rmw_handle), dds_topic, gid)
+        self._emit("rmw_subscription_init", rmw_handle, gid)
+
+    def _announce_entity(self, event: str, entity: int, dds_topic: str, gid: bytes) -> None:
+        """DDS creates a writer or reader and says so with a writer that nobody has created."""
+        stamp_ns = self._process.machine.stamp_ns(self._time + 250)
+        writer = self._discovery_writers[1 if event == "create_writer" else 2]
+        self._emit("dds_write", writer, 0, stamp_ns)
+        self._emit(f"dds_{event}", entity, dds_topic, gid[:12], gid[12:16], gid[:16])
+
     def _create_service(self, node_handle: int, name: str, symbol: str) -> None:
         self._work(250 * MICROSECOND)
         self._announce()
-        handle, callback = self._memory.allocate(), self._memory.allocate()
-        self._emit("rcl_service_init", handle, node_handle, self._memory.allocate(), name)
+        memory = self._memory
+        handle, callback = memory.allocate(), memory.allocate()
+        for event, prefix, suffix in (
+            ("create_reader", "rq", "Request"), ("create_writer", "rr", "Reply")
+        ):  # fmt: skip
+            dds_topic = f"{prefix}{name}{suffix}"
+            kind = 3 if event == "create_writer" else 4
+            self._announce_entity(event, memory.allocate(), dds_topic, self._process.gid(kind))
+        self._emit("rcl_service_init", handle, node_handle, memory.allocate(), name)
         self._emit("rclcpp_service_callback_added", handle, callback)
         self._emit("rclcpp_callback_register", callback, symbol)
 

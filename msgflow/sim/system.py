@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from msgflow.errors import UsageError
+from msgflow.sim.recording import PERFECT, Recording
 
 MICROSECOND = 1_000
 MILLISECOND = 1_000_000
@@ -34,10 +35,11 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Publisher:
-    """A publisher of a node: topic (fully expanded) and history depth."""
+    """A publisher of a node: topic (fully expanded), history depth, size of its messages."""
 
     topic: str
     depth: int = 10
+    size_bytes: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +135,7 @@ class Scenario:
         layout: name of the trace layout, see `msgflow.sim.layout`.
         overwrites: a full queue drops its oldest message (keep last); when false, queues hold
             whatever comes, so that every message is delivered.
+        recording: how its traces are recorded.
     """
 
     name: str
@@ -142,6 +145,7 @@ class Scenario:
     duration_ns: int = 10 * SECOND
     layout: str = "jazzy"
     overwrites: bool = False
+    recording: Recording = PERFECT
 
     def __post_init__(self) -> None:
         hostnames = {host.hostname for host in self.hosts}

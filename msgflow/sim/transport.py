@@ -52,6 +52,7 @@ class PublisherObject:
         handle: the handle that rcl_publish names.
         is_rclcpp: publishing passes through rclcpp (not for /rosout).
         matches: one per subscription of the topic.
+        size_bytes: size of its messages, of which the duration of writing depends.
     """
 
     process: RunningProcess
@@ -65,6 +66,7 @@ class PublisherObject:
     is_internal: bool
     created: int
     matches: list[Match]
+    size_bytes: int = 0
 
 
 @dataclass(slots=True)

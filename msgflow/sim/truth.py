@@ -70,6 +70,11 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "executor_state": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, start_ns=_TIME, end_ns=_TIME, state=_TEXT
     ),
+    "trace": _schema(host=_TEXT, pid=_NUMBER, path=_TEXT, clock_error_ns=_COUNT),
+    "declared": _schema(event=_TEXT, field=_TEXT),
+    "unrecorded": _schema(
+        host=_TEXT, pid=_NUMBER, tid=_NUMBER, event=_TEXT, ts_ns=_TIME, cause=_TEXT
+    ),
 }  # fmt: skip
 
 
@@ -124,6 +129,9 @@ class Truth:
         self.causal = self.tables["causal"]
         self.end_to_end = self.tables["end_to_end"]
         self.executor_state = self.tables["executor_state"]
+        self.trace = self.tables["trace"]
+        self.declared = self.tables["declared"]
+        self.unrecorded = self.tables["unrecorded"]
 
     def close(self) -> None:
         """Complete all files."""

@@ -5,8 +5,19 @@ It knows layouts and bytes, nothing of ROS 2 or of the simulation.
 
 from __future__ import annotations
 
-from msgflow.sim.ctf.stream import StreamWriter
-from msgflow.sim.ctf.trace import TraceIdentity, TraceWriter
-from msgflow.sim.ctf.tracepoint import Tracepoint, thread_context
+from msgflow.sim.ctf.stream import Break, Ending, Faults, StreamWriter
+from msgflow.sim.ctf.trace import USER_ID, TraceIdentity, TraceWriter
+from msgflow.sim.ctf.tracepoint import Tracepoint, thread_context, thread_of
 
-__all__ = ["StreamWriter", "TraceIdentity", "TraceWriter", "Tracepoint", "thread_context"]
+__all__ = [
+    "USER_ID",
+    "Break",
+    "Ending",
+    "Faults",
+    "StreamWriter",
+    "TraceIdentity",
+    "TraceWriter",
+    "Tracepoint",
+    "thread_context",
+    "thread_of",
+]

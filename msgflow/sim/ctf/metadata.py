@@ -9,11 +9,13 @@ from __future__ import annotations
 from struct import Struct
 from typing import TYPE_CHECKING
 
+from msgflow.sim.events import EventField, FieldKind
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from uuid import UUID
 
-    from msgflow.sim.layout import EventField, EventType, Layout
+    from msgflow.sim.layout import EventType, Layout
 
 _PACKET_BYTES = 4096
 _MAGIC = 0x75D1_1D57
@@ -164,10 +166,15 @@ def packets(text: str, uuid: UUID) -> Iterator[bytes]:
 
 
 def _event_text(event: EventType, event_id: int) -> str:
-    fields = "".join(f"\t\t{_field_text(field)};\n" for field in event.fields)
+    fields = "".join(f"\t\t{line};\n" for field in event.fields for line in _field_lines(field))
     return _EVENT.format(name=event.name, id=event_id, fields=fields)
 
 
-def _field_text(field: EventField) -> str:
+def _field_lines(field: EventField) -> Iterator[str]:
+    if field.kind is FieldKind.SEQUENCE:
+        length = f"__{field.name}_length"
+        yield f"{FieldKind.UNSIGNED.tsdl} {length}"
+        yield f"{field.kind.tsdl} _{field.name}[ {length} ]"
+        return
     length = f"[{field.length}]" if field.length else ""
-    return f"{field.kind.tsdl} _{field.name}{length}"
+    yield f"{field.kind.tsdl} _{field.name}{length}"

@@ -1,17 +1,19 @@
-"""One stream file (one CPU) in packets, and its index file."""
+"""The events of one CPU in packets: stream files and their index files."""
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
 from struct import Struct
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from msgflow.sim.ctf.tracepoint import Tracepoint, extended
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
     from uuid import UUID
 
-PACKET_BYTES = 32 * 1024
 PAGE_BYTES = 4096
 
 _LOW = 0xFFFF_FFFF
@@ -21,6 +23,40 @@ _HEADER = Struct("<I16sIQ" + "QQQQQQI")
 _INDEX_HEADER = Struct(">IIII")
 _INDEX_MAGIC = 0xC1F1_DCC1
 _INDEX_ENTRY = Struct(">QQQQQQQQQ")
+_FOR_EVER = 1 << 62
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """Packets end at `begin`, the next ones begin at `end`; what happens between is not recorded.
+
+    With a `directory`, files are continued there.
+    """
+
+    begin: int
+    end: int
+    directory: Path | None = None
+
+
+class Faults(Protocol):
+    """What goes wrong while a stream is recorded."""
+
+    def lost_events(self) -> int:
+        """How many events are lost behind the packet that is now full."""
+
+    def is_packet_lost(self) -> bool:
+        """Whether the packet that is now complete is lost."""
+
+    def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
+        """An event is not in the trace."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a stream ends: complete, without its last packet, or in the middle of it."""
+
+    is_last_packet_missing: bool = False
+    is_last_packet_cut: bool = False
 
 
 class StreamWriter:
@@ -31,71 +67,170 @@ class StreamWriter:
     """
 
     def __init__(
-        self, path: Path, index_path: Path, uuid: UUID, cpu: int, origin: int, begin: int
+        self,
+        directory: Path,
+        uuid: UUID,
+        cpu: int,
+        origin: int,
+        packet_bytes: int,
+        *,
+        begin: int = 0,
+        breaks: Iterable[Break] = (),
+        faults: Faults | None = None,
+        ending: Ending | None = None,
     ) -> None:
         """Open the files.
 
         Args:
-            path: stream file.
-            index_path: its index.
+            directory: of the trace; its folder `index` exists.
             uuid: of the trace.
             cpu: number of the CPU.
             origin: clock value (cycles) at time 0.
+            packet_bytes: size of a full packet.
             begin: time of the begin of the first packet.
+            breaks: in the order of time.
+            faults: what goes wrong; nothing if None.
+            ending: how the last file ends; completely if None.
         """
-        self._file = path.open("wb")
-        self._index = index_path.open("wb")
-        self._index.write(_INDEX_HEADER.pack(_INDEX_MAGIC, 1, 1, _INDEX_ENTRY.size))
         self._uuid = uuid.bytes
         self._cpu = cpu
         self._origin = origin
+        self._packet_bytes = packet_bytes
         self._begin = begin + origin
+        self._breaks = deque(breaks)
+        self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
+        self._silent_until = 0
+        self._faults = faults
+        self._ending = ending
         # Nothing was written before, so that the first event carries the whole clock value.
         self._last = 0
         self._records: list[bytes] = []
+        self._entries: list[tuple[Tracepoint, int, bytes]] = []
         self._size = _HEADER.size
         self._sequence = 0
-        self._offset = 0
+        self._discarded = 0
+        self._to_lose = 0
+        self._is_full = False
+        self._open(directory)
 
     def emit(self, tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
-        """Append one event at `time` (ns since time 0)."""
+        """Append one event at `time` (ns since time 0), if the trace has such events."""
+        pack = tracepoint.pack
+        if pack is None:
+            return
+        if time >= self._next_break:
+            self._pass_breaks(time)
+        if time < self._silent_until:
+            self._lose(tracepoint, time, context, "pause")
+            return
+        if self._to_lose:
+            self._to_lose -= 1
+            self._discarded += 1
+            self._lose(tracepoint, time, context, "loss")
+            return
         cycles = time + self._origin
-        record = tracepoint.pack(tracepoint.id, cycles & _LOW, context, *values)
+        record = pack(tracepoint.id, cycles & _LOW, context, *values)
         if cycles - self._last > _LOW:
             record = extended(record, tracepoint.id, cycles)
-        tracepoint.count += 1
         size = self._size + len(record)
-        if size > PACKET_BYTES:
-            self._write_packet(cycles, PACKET_BYTES)
+        if size > self._packet_bytes or self._is_full:
+            if self._faults is not None and not self._is_full:
+                self._is_full = True
+                self._to_lose = self._faults.lost_events()
+                if self._to_lose:
+                    self.emit(tracepoint, time, context, *values)
+                    return
+            self._is_full = False
+            self._write_packet(cycles, self._packet_bytes)
             size = _HEADER.size + len(record)
+        tracepoint.count += 1
         self._records.append(record)
+        if self._faults is not None:
+            self._entries.append((tracepoint, time, context))
         self._size = size
         self._last = cycles
 
     def close(self, end: int) -> None:
         """Write what is left as a last packet, which ends at time `end` (empty or not)."""
-        pages = -(-self._size // PAGE_BYTES)
-        self._write_packet(end + self._origin, pages * PAGE_BYTES)
-        self._file.close()
-        self._index.close()
+        self._pass_breaks(end)
+        if end > self._silent_until:
+            self._end_packet(end, self._ending)
+        self._close()
 
-    def _write_packet(self, end: int, size: int) -> None:
+    def _pass_breaks(self, time: int) -> None:
+        """Do what is due at `time` or before it."""
+        while self._breaks and self._breaks[0].begin <= time:
+            due = self._breaks.popleft()
+            self._end_packet(due.begin)
+            self._begin = due.end + self._origin
+            self._silent_until = due.end
+            if due.directory is not None:
+                self._close()
+                self._open(due.directory)
+        self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
+
+    def _end_packet(self, end: int, ending: Ending | None = None) -> None:
+        self._is_full = False
+        self._to_lose = 0
+        pages = -(-self._size // PAGE_BYTES)
+        self._write_packet(end + self._origin, pages * PAGE_BYTES, ending)
+
+    def _write_packet(self, end: int, size: int, ending: Ending | None = None) -> None:
         content_bits, packet_bits = self._size * 8, size * 8
+        sequence, begin = self._sequence, self._begin
         header = _HEADER.pack(
             _MAGIC, self._uuid, _STREAM_ID, self._cpu,
-            self._begin, end, content_bits, packet_bits, self._sequence, 0, self._cpu,
+            begin, end, content_bits, packet_bits, sequence, self._discarded, self._cpu,
         )  # fmt: skip
-        self._file.write(header)
-        self._file.writelines(self._records)
-        self._file.write(bytes(size - self._size))
-        self._index.write(
-            _INDEX_ENTRY.pack(
-                self._offset, packet_bits, content_bits, self._begin, end,
-                0, _STREAM_ID, self._cpu, self._sequence,
-            )
+        entry = _INDEX_ENTRY.pack(
+            self._offset, packet_bits, content_bits, begin, end,
+            self._discarded, _STREAM_ID, self._cpu, sequence,
         )  # fmt: skip
+        kept = self._kept(ending)
+        if kept is None:
+            self._withdraw(0, "packets" if ending is None else "truncation")
+        else:
+            self._file.write(header)
+            self._file.writelines(self._records[:kept])
+            if ending is not None and ending.is_last_packet_cut:
+                self._withdraw(kept, "truncation")
+                self._file.writelines(record[:-1] for record in self._records[kept : kept + 1])
+            else:
+                self._file.write(bytes(size - self._size))
+                self._index.write(entry)
+                self._offset += size
         self._records.clear()
+        self._entries.clear()
         self._size = _HEADER.size
         self._begin = end
-        self._offset += size
         self._sequence += 1
+
+    def _kept(self, ending: Ending | None) -> int | None:
+        """How many events of the packet are recorded; None if the whole packet is missing."""
+        if ending is not None and ending.is_last_packet_missing:
+            return None
+        if ending is not None and ending.is_last_packet_cut:
+            return len(self._records) // 2
+        if self._faults is not None and self._faults.is_packet_lost():
+            return None
+        return len(self._records)
+
+    def _withdraw(self, kept: int, cause: str) -> None:
+        """Only the first `kept` events of the packet are recorded."""
+        for tracepoint, time, context in self._entries[kept:]:
+            tracepoint.count -= 1
+            self._lose(tracepoint, time, context, cause)
+
+    def _lose(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
+        if self._faults is not None:
+            self._faults.unrecorded(tracepoint, time, context, cause)
+
+    def _open(self, directory: Path) -> None:
+        self._file = (directory / f"ros2_{self._cpu}").open("wb")
+        self._index = (directory / "index" / f"ros2_{self._cpu}.idx").open("wb")
+        self._index.write(_INDEX_HEADER.pack(_INDEX_MAGIC, 1, 1, _INDEX_ENTRY.size))
+        self._offset = 0
+
+    def _close(self) -> None:
+        self._file.close()
+        self._index.close()

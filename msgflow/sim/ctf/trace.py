@@ -1,4 +1,4 @@
-"""A whole trace of one host: directory, metadata, one stream per CPU."""
+"""A whole trace: directory, metadata, one stream per CPU."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from msgflow.sim.ctf.metadata import metadata_text, packets
-from msgflow.sim.ctf.stream import StreamWriter
-from msgflow.sim.ctf.tracepoint import Tracepoint
+from msgflow.sim.ctf.stream import Break, Ending, Faults, StreamWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Sequence
     from pathlib import Path
     from uuid import UUID
 
     from msgflow.sim.layout import Layout
 
-_USER_ID = 1000
+USER_ID = 1000
 _NANOSECONDS = 1_000_000_000
 
 
@@ -32,6 +31,7 @@ class TraceIdentity:
         boot_uuid: of the host's boot, hence of its clock.
         epoch_ns: time 0 of the trace in ns since the epoch, on the host's own clock.
         uptime_ns: how long before time 0 the host booted, which is what its clock shows then.
+        buffering: 'uid' or 'pid', with what belongs to it: the id and, for 'pid', the name.
     """
 
     session: str
@@ -40,53 +40,59 @@ class TraceIdentity:
     boot_uuid: UUID
     epoch_ns: int
     uptime_ns: int
+    buffering: tuple[str, int, str] = ("uid", USER_ID, "")
 
 
 class TraceWriter:
-    """Writes one LTTng-UST trace, with buffers per user and CPU.
+    """Writes one LTTng-UST trace, a stream for each CPU.
 
     Attributes:
-        directory: where `metadata` lies.
+        directory: where `metadata` lies, in the first chunk of a rotated trace.
+        directories: of all chunks.
         streams: one per CPU.
     """
 
     def __init__(
-        self, directory: Path, layout: Layout, identity: TraceIdentity, cpu_count: int
+        self,
+        directory: Path,
+        layout: Layout,
+        identity: TraceIdentity,
+        cpu_count: int,
+        *,
+        begin: int = 0,
+        breaks: Sequence[Break] = (),
+        faults: Faults | None = None,
+        ending: Callable[[int], Ending | None] = lambda cpu: None,
     ) -> None:
-        self.directory = directory / "ust" / "uid" / str(_USER_ID) / "64-bit"
-        index = self.directory / "index"
-        index.mkdir(parents=True)
+        """Make the directories and open the files; `ending` is asked for each CPU."""
+        self.directory = directory
+        chunks = (chunk.directory for chunk in breaks)
+        self.directories = (directory, *(chunk for chunk in chunks if chunk is not None))
         text = metadata_text(
             layout,
             uuid=identity.uuid,
             clock_uuid=identity.boot_uuid,
             clock_offset=identity.epoch_ns - identity.uptime_ns,
-            environment=_environment(identity),
+            environment=_environment(identity, layout.tracer_minor),
         )
-        with (self.directory / "metadata").open("wb") as file:
-            file.writelines(packets(text, identity.uuid))
-        self._tracepoints = {
-            event.name: Tracepoint(event, event_id) for event_id, event in enumerate(layout.events)
-        }
+        for chunk in self.directories:
+            (chunk / "index").mkdir(parents=True)
+            with (chunk / "metadata").open("wb") as file:
+                file.writelines(packets(text, identity.uuid))
         self.streams = tuple(
             StreamWriter(
-                self.directory / f"ros2_{cpu}",
-                index / f"ros2_{cpu}.idx",
+                directory,
                 identity.uuid,
                 cpu,
                 identity.uptime_ns,
-                begin=0,
+                layout.packet_bytes,
+                begin=begin,
+                breaks=breaks,
+                faults=faults,
+                ending=ending(cpu),
             )
             for cpu in range(cpu_count)
         )
-
-    def tracepoint(self, name: str) -> Tracepoint:
-        """The event class of this full name; KeyError if the layout does not have it."""
-        return self._tracepoints[name]
-
-    def event_counts(self) -> Mapping[str, int]:
-        """Events written so far by name, those that occurred."""
-        return {name: point.count for name, point in self._tracepoints.items() if point.count}
 
     def close(self, end: int) -> None:
         """Complete the files; tracing stops at time `end`."""
@@ -94,16 +100,21 @@ class TraceWriter:
             stream.close(end)
 
 
-def _environment(identity: TraceIdentity) -> dict[str, str | int]:
+def _environment(identity: TraceIdentity, tracer_minor: int) -> dict[str, str | int]:
     created = datetime.fromtimestamp(identity.epoch_ns // _NANOSECONDS, UTC)
+    scheme, buffering_id, process_name = identity.buffering
+    named: dict[str, str | int] = {}
+    if scheme == "pid":
+        named = {"procname": process_name, "vpid": buffering_id}
     return {
         "domain": "ust",
         "tracer_name": "lttng-ust",
         "tracer_major": 2,
-        "tracer_minor": 13,
-        "tracer_buffering_scheme": "uid",
-        "tracer_buffering_id": _USER_ID,
+        "tracer_minor": tracer_minor,
+        "tracer_buffering_scheme": scheme,
+        "tracer_buffering_id": buffering_id,
         "architecture_bit_width": 64,
+        **named,
         "trace_name": f"{identity.session}-{created:%Y%m%d%H%M%S}",
         "trace_creation_datetime": f"{created:%Y%m%dT%H%M%S}+0000",
         "hostname": identity.hostname,

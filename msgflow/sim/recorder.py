@@ -1,0 +1,261 @@
+"""Records what happens on a host: which traces there are, and what is missing from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from hashlib import sha256
+from random import Random
+from typing import TYPE_CHECKING
+from uuid import UUID
+
+from msgflow.sim.ctf import (
+    USER_ID,
+    Break,
+    Ending,
+    TraceIdentity,
+    Tracepoint,
+    TraceWriter,
+    thread_of,
+)
+from msgflow.sim.events import SIGNATURES
+from msgflow.sim.recording import Buffers, Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
+
+    from msgflow.sim.layout import Layout
+    from msgflow.sim.truth import Truth
+
+# What the session that only waits for its snapshot has enabled.
+_INITIALISATION = (
+    "_init",
+    "_callback_added",
+    "rclcpp_callback_register",
+    "rclcpp_timer_link_node",
+    "rclcpp_construct_ring_buffer",
+    "rclcpp_buffer_to_ipb",
+    "rclcpp_ipb_to_subscription",
+)
+
+
+class Tracepoints:
+    """The events as the simulation emits them, one attribute each.
+
+    Those of `ros2` have their short names (`rcl_init`), others their provider's name before it
+    (`dds_write`). An event that the layout does not have is there too: emitting it does nothing.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        numbers = {event.name: number for number, event in enumerate(layout.events)}
+        self._all: dict[str, Tracepoint] = {}
+        for name, signature in SIGNATURES.items():
+            number = numbers.get(name)
+            fields = None if number is None else layout.events[number].fields
+            tracepoint = Tracepoint(name, number or 0, signature, fields)
+            self._all[name] = tracepoint
+            setattr(self, name.removeprefix("ros2:").replace(":", "_"), tracepoint)
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Tracepoint: ...
+
+    def counts(self) -> Mapping[str, int]:
+        """Events recorded so far by name, those that occurred."""
+        return {name: point.count for name, point in self._all.items() if point.count}
+
+
+class Recorder:
+    """Writes the traces of one host.
+
+    Attributes:
+        layout: of the traces.
+        cpu_count: how many CPUs write streams.
+        tracepoints: what can be emitted.
+        emitters: `emit(tracepoint, time, context, *values)` for each CPU.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        layout: Layout,
+        identity: TraceIdentity,
+        cpu_count: int,
+        recording: Recording,
+        truth: Truth,
+    ) -> None:
+        self.layout = layout
+        self.cpu_count = cpu_count
+        self.tracepoints = Tracepoints(layout)
+        self._directory = directory
+        self._identity = identity
+        self._recording = recording
+        self._truth = truth
+        self._random = Random(str(identity.uuid))
+        self._snapshot: TraceWriter | None = None
+        self._writers: dict[int, TraceWriter] = {}
+        if recording.is_perfect:
+            only = self._writer(0, "")
+            self.emitters: tuple[Callable[..., None], ...] = tuple(
+                stream.emit for stream in only.streams
+            )
+            return
+        if recording.is_dual_session:
+            self._snapshot = self._trace(
+                "snapshot", ("uid", USER_ID, ""), breaks=(), begin=0, is_faultless=True
+            )
+        if recording.buffers is Buffers.PER_USER:
+            self._writer(0, "")
+        self.emitters = tuple(self._emitter(cpu) for cpu in range(cpu_count))
+
+    @property
+    def directories(self) -> tuple[Path, ...]:
+        """Where `metadata` files lie."""
+        snapshot = () if self._snapshot is None else self._snapshot.directories
+        return (
+            *snapshot,
+            *(path for writer in self._writers.values() for path in writer.directories),
+        )
+
+    def close(self, end: int) -> None:
+        """Complete the files; tracing stops at time `end`."""
+        if self._snapshot is not None:
+            self._snapshot.close(min(end, self._recording.start_ns))
+        for writer in self._writers.values():
+            writer.close(max(end, self._recording.start_ns + 1))
+
+    # What a stream asks when it is recorded with faults.
+
+    def lost_events(self) -> int:
+        """How many events are lost behind the packet that is now full."""
+        if self._random.random() >= self._recording.lost_event_share:
+            return 0
+        return self._random.randint(1, self._recording.longest_loss)
+
+    def is_packet_lost(self) -> bool:
+        """Whether the packet that is now complete is lost."""
+        return self._random.random() < self._recording.lost_packet_share
+
+    def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
+        """Write down an event that the trace should have and has not."""
+        pid, tid, _ = thread_of(context)
+        identity = self._identity
+        self._truth.unrecorded.add(
+            identity.hostname, pid, tid, tracepoint.name, time + identity.epoch_ns, cause
+        )
+
+    def _emitter(self, cpu: int) -> Callable[..., None]:
+        start = self._recording.start_ns
+        is_per_process = self._recording.buffers is Buffers.PER_PROCESS
+
+        def emit(tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
+            if tracepoint.pack is None:
+                return
+            if time < start:
+                if self._snapshot is not None and tracepoint.name.endswith(_INITIALISATION):
+                    self._snapshot.streams[cpu].emit(tracepoint, time, context, *values)
+                else:
+                    self.unrecorded(tracepoint, time, context, "late start")
+                return
+            pid, name = 0, ""
+            if is_per_process:
+                pid, _, name = thread_of(context)
+            self._writer(pid, name).streams[cpu].emit(tracepoint, time, context, *values)
+
+        return emit
+
+    def _writer(self, pid: int, name: str) -> TraceWriter:
+        """The trace of a process, or that of the user if `pid` is 0."""
+        writer = self._writers.get(pid)
+        if writer is None:
+            session = "runtime" if self._recording.is_dual_session else ""
+            buffering = ("pid", pid, name) if pid else ("uid", USER_ID, "")
+            writer = self._writers[pid] = self._trace(
+                session,
+                buffering,
+                breaks=(
+                    *(Break(begin, end) for begin, end in self._recording.pauses),
+                    *(Break(time, time) for time in self._recording.rotations),
+                ),
+                begin=self._recording.start_ns,
+            )
+        return writer
+
+    def _trace(
+        self,
+        session: str,
+        buffering: tuple[str, int, str],
+        *,
+        breaks: tuple[Break, ...],
+        begin: int,
+        is_faultless: bool = False,
+    ) -> TraceWriter:
+        identity, recording = self._identity, self._recording
+        _, pid, _ = buffering
+        error = 0
+        if session != "runtime" and recording.clock_error_ns:
+            error = self._random.randint(-recording.clock_error_ns, recording.clock_error_ns)
+        uuid = identity.uuid
+        if session or buffering[0] == "pid":
+            digest = sha256(f"{identity.uuid}/{session}/{buffering}".encode()).digest()
+            uuid = UUID(bytes=digest[:16], version=4)
+        base = self._directory / session
+        paths = self._chunks(base, buffering)
+        first = next(paths)
+        if not is_faultless:
+            self._truth.trace.add(
+                identity.hostname,
+                pid if buffering[0] == "pid" else None,
+                str(first.relative_to(self._directory.parent)),
+                error,
+            )
+        ordered = sorted(breaks, key=lambda one: one.begin)
+        continued = tuple(
+            replace(one, directory=next(paths)) if one.begin == one.end else one for one in ordered
+        )
+        return TraceWriter(
+            first,
+            self.layout,
+            replace(
+                identity,
+                uuid=uuid,
+                epoch_ns=identity.epoch_ns + error,
+                buffering=buffering,
+            ),
+            self.cpu_count,
+            begin=begin,
+            breaks=continued,
+            faults=None if recording.is_perfect or is_faultless else self,
+            ending=lambda cpu: None if is_faultless else self._ending(cpu),
+        )
+
+    def _chunks(self, base: Path, buffering: tuple[str, int, str]) -> Iterator[Path]:
+        """Directories of the chunks of a trace; a single one unless it is rotated."""
+        scheme, number, name = buffering
+        place = f"ust/uid/{number}/64-bit"
+        if scheme == "pid":
+            place = f"ust/pid/{name}-{number}-{_date(self._identity.epoch_ns):%Y%m%d-%H%M%S}"
+        if not self._recording.rotations:
+            yield base / place
+            return
+        times = (self._recording.start_ns, *self._recording.rotations)
+        for ordinal, begin in enumerate(times, start=1):
+            end = times[ordinal] if ordinal < len(times) else begin
+            span = "-".join(
+                f"{_date(self._identity.epoch_ns + time):%Y%m%dT%H%M%S+0000}"
+                for time in (begin, end)
+            )
+            yield base / "archives" / f"{span}-{ordinal}" / place
+
+    def _ending(self, cpu: int) -> Ending | None:
+        recording = self._recording
+        if cpu < recording.cut_streams:
+            return Ending(is_last_packet_cut=True)
+        if cpu < recording.cut_streams + recording.unfinished_streams:
+            return Ending(is_last_packet_missing=True)
+        return None
+
+
+def _date(ns: int) -> datetime:
+    return datetime.fromtimestamp(ns // 1_000_000_000, UTC)

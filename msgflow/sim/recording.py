@@ -1,0 +1,84 @@
+"""How a system is recorded: data only, no behaviour. The default recording is perfect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from msgflow.errors import UsageError
+
+
+class Buffers(Enum):
+    """Where LTTng keeps what processes emit: one trace per user, or one per process."""
+
+    PER_USER = "uid"
+    PER_PROCESS = "pid"
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What becomes of the events of every host. Times are ns since the begin of the scenario.
+
+    Attributes:
+        start_ns: recording starts then; what happened before is not in the trace.
+        is_dual_session: a second session, `snapshot`, has the initialisation events from before
+            `start_ns`; the one that starts then is `runtime`.
+        pauses: recording is stopped and started again at these times.
+        rotations: the trace is continued in a further chunk of the archive from these times on.
+        buffers: one trace per user, or one per process.
+        clock_error_ns: the epoch offsets of the traces of one host differ by up to this much:
+            those of processes, or that of the snapshot from that of the rest.
+        lost_event_share: behind this share (0..1) of the packets, events are lost for a while.
+        longest_loss: how many events are lost at most at once.
+        lost_packet_share: this share of the packets is missing.
+        cut_streams: so many streams of each trace end in the middle of a packet.
+        unfinished_streams: so many others lack their last packet.
+        realtime_offset_ns: what the clock that makes source stamps is ahead of the trace's clock
+            at the begin.
+        slew_ppm: parts per million by which it is faster than the trace's clock.
+    """
+
+    start_ns: int = 0
+    is_dual_session: bool = False
+    pauses: tuple[tuple[int, int], ...] = ()
+    rotations: tuple[int, ...] = ()
+    buffers: Buffers = Buffers.PER_USER
+    clock_error_ns: int = 0
+    lost_event_share: float = 0.0
+    longest_loss: int = 200
+    lost_packet_share: float = 0.0
+    cut_streams: int = 0
+    unfinished_streams: int = 0
+    realtime_offset_ns: int = 0
+    slew_ppm: float = 0.0
+
+    def __post_init__(self) -> None:
+        for share in (self.lost_event_share, self.lost_packet_share):
+            if not 0 <= share <= 1:
+                raise UsageError(f"not a share between 0 and 1 — {share}")
+        if not abs(self.slew_ppm) < 1000:
+            raise UsageError(f"no clock is that much faster or slower — {self.slew_ppm} ppm")
+        if min(self.start_ns, self.cut_streams, self.unfinished_streams, self.clock_error_ns) < 0:
+            raise UsageError(f"a negative number makes no sense here — {self}")
+        if self.longest_loss < 1:
+            raise UsageError(f"at least one event is lost — {self.longest_loss}")
+        times = [self.start_ns]
+        if bad := [pause for pause in self.pauses if pause[0] >= pause[1]]:
+            raise UsageError(f"a pause must end after it has begun — {bad[0]}")
+        for begin, end in sorted((*self.pauses, *((time, time) for time in self.rotations))):
+            times += [begin, end]
+        if times != sorted(times):
+            raise UsageError("pauses and rotations must follow the start and each other")
+        if self.is_dual_session and (self.start_ns == 0 or self.buffers is Buffers.PER_PROCESS):
+            raise UsageError(
+                "a dual session needs a late start and buffers per user",
+                "give the time at which the second session starts",
+            )
+
+    @property
+    def is_perfect(self) -> bool:
+        """Whether every event of the layout is recorded, by one trace of each host."""
+        return self == Recording(realtime_offset_ns=self.realtime_offset_ns, slew_ppm=self.slew_ppm)
+
+
+PERFECT = Recording()

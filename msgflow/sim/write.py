@@ -1,0 +1,84 @@
+"""What the middleware layer and DDS do with a message: stamp it and write it, or read it.
+
+Who makes the source stamp and when, and which `dds:*` events tell of it, is the layout's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from msgflow.sim.machine import Thread
+
+# Fast DDS serialises a message before it stamps it, at about 5 bytes per ns.
+_SERIALISING_NS_PER_BYTE = 0.2
+_SENDING_NS_PER_BYTE = 0.08
+# Now and then the writer is locked, or the thread has lost its CPU.
+_HELD_UP = 1 / 400
+_LONGEST_HOLD_UP_NS = 250_000
+# Where an object of the middleware layer keeps that of DDS.
+_ENTITY_OFFSET = 0x2A0
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A message that was written: times, and the stamp in ns since the epoch."""
+
+    rmw: int
+    stamp_ns: int
+    end: int
+
+
+def entity_of(rmw_handle: int) -> int:
+    """The DDS writer or reader that belongs to a publisher or subscription."""
+    return rmw_handle + _ENTITY_OFFSET
+
+
+def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: int = 0) -> Written:
+    """Publish a message in the middleware layer, called at `time`."""
+    machine = thread.machine
+    random, layout = thread.world.random, machine.layout
+    tracepoints, emit, context = machine.tracepoints, thread.emit, thread.context
+    duration = int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * random()))
+    if layout.is_stamped_by_rmw:
+        # The rmw layer reads the clock first and emits the event then.
+        stamp = time + 200 + int(random() * 500)
+        rmw = stamp + 60 + int(random() * 200)
+        stamp_ns = machine.stamp_ns(stamp)
+        emit(tracepoints.rmw_publish, rmw, context, rmw_handle, message, stamp_ns)
+        return Written(rmw, stamp_ns, rmw + duration + int(size_bytes * _SENDING_NS_PER_BYTE))
+
+    rmw = time + 260 + int(random() * 700)
+    emit(tracepoints.rmw_publish, rmw, context, rmw_handle, message, 0)
+    entered = rmw + 150 + int(random() * 400)
+    stamp = entered + 200 + int(random() * 800)
+    if not layout.is_stamped_early:
+        stamp += duration + thread.world.tail(1_500)
+        if random() < _HELD_UP:
+            stamp += int(random() * _LONGEST_HOLD_UP_NS)
+    stamp_ns = machine.stamp_ns(stamp)
+    writer = entity_of(rmw_handle)
+    end = stamp
+    for name in layout.dds_write:
+        if name == "dds:write":
+            end = stamp + 60 + int(random() * 300)
+            emit(tracepoints.dds_write, end, context, writer, message, stamp_ns)
+        else:
+            end = end + 150 if end > stamp else entered
+            emit(tracepoints.dds_write_pre, end, context, writer, message)
+    if layout.is_stamped_early:
+        end += duration
+    return Written(rmw, stamp_ns, end + int(size_bytes * _SENDING_NS_PER_BYTE))
+
+
+def read(thread: Thread, rmw_handle: int, buffer: int, time: int, stamp_ns: int, taken: int) -> int:
+    """Try to take a message in the middleware layer from `time` on; returns the time of rmw_take.
+
+    `stamp_ns` is the message's source stamp, 0 if there is none; `taken` is 1 if there was one.
+    """
+    tracepoints, emit, context = thread.machine.tracepoints, thread.emit, thread.context
+    emit(tracepoints.dds_read, time, context, entity_of(rmw_handle), buffer)
+    rmw = time + 250
+    emit(tracepoints.rmw_take, rmw, context, rmw_handle, buffer, stamp_ns, taken)
+    return rmw
