@@ -59,8 +59,10 @@ class Discovery:
         """Publish what the process has, from `time` on; returns the time when that is done."""
         world, machine = thread.world, thread.machine
         written = write(thread, rmw_handle, message, time)
+        publication_id = next(world.publication_ids)
+        written.add_to_truth(thread, publication_id)
         world.truth.publication.add(
-            next(world.publication_ids), machine.hostname, thread.process.pid, thread.tid, None,
+            publication_id, machine.hostname, thread.process.pid, thread.tid, None,
             _TOPIC, None, rmw_handle, None, None, written.rmw + machine.epoch, written.stamp_ns,
             None, True,
         )  # fmt: skip

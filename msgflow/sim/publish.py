@@ -53,6 +53,7 @@ def publish(
     written = write(thread, publisher.rmw_handle, publisher.message, rcl, publisher.size_bytes)
     rmw, stamp_ns = written.rmw, written.stamp_ns
     publication_id = next(world.publication_ids)
+    written.add_to_truth(thread, publication_id)
     topic = publisher.topic
     hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
     rcl_ns, rmw_ns = rcl + epoch, rmw + epoch

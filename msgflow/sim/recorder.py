@@ -134,7 +134,7 @@ class Recorder:
         return self._random.randint(1, self._recording.longest_loss)
 
     def is_packet_lost(self) -> bool:
-        """Whether the packet that is now complete is lost."""
+        """Whether the packet that is now full is lost."""
         return self._random.random() < self._recording.lost_packet_share
 
     def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:

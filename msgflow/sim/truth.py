@@ -71,6 +71,9 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, start_ns=_TIME, end_ns=_TIME, state=_TEXT
     ),
     "trace": _schema(host=_TEXT, pid=_NUMBER, path=_TEXT, clock_error_ns=_COUNT),
+    "dds_event": _schema(
+        publication_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, event=_TEXT, ts_ns=_TIME
+    ),
     "declared": _schema(event=_TEXT, field=_TEXT),
     "unrecorded": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, event=_TEXT, ts_ns=_TIME, cause=_TEXT
@@ -130,6 +133,7 @@ class Truth:
         self.end_to_end = self.tables["end_to_end"]
         self.executor_state = self.tables["executor_state"]
         self.trace = self.tables["trace"]
+        self.dds_event = self.tables["dds_event"]
         self.declared = self.tables["declared"]
         self.unrecorded = self.tables["unrecorded"]
 

@@ -23,11 +23,28 @@ _ENTITY_OFFSET = 0x2A0
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A message that was written: times, and the stamp in ns since the epoch."""
+    """A message that was written.
+
+    Attributes:
+        rmw: time of rmw_publish.
+        stamp_ns: source stamp, in ns since the epoch.
+        end: time at which the call returns.
+        dds: times of the `dds:*` events, with their names.
+    """
 
     rmw: int
     stamp_ns: int
     end: int
+    dds: tuple[tuple[str, int], ...] = ()
+
+    def add_to_truth(self, thread: Thread, publication_id: int) -> None:
+        """Write down the `dds:*` events of a publication."""
+        machine = thread.machine
+        for event, time in self.dds:
+            thread.world.truth.dds_event.add(
+                publication_id, machine.hostname, thread.process.pid, thread.tid, event,
+                time + machine.epoch,
+            )  # fmt: skip
 
 
 def entity_of(rmw_handle: int) -> int:
@@ -60,6 +77,7 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     stamp_ns = machine.stamp_ns(stamp)
     writer = entity_of(rmw_handle)
     end = stamp
+    dds = []
     for name in layout.dds_write:
         if name == "dds:write":
             end = stamp + 60 + int(random() * 300)
@@ -67,9 +85,10 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
         else:
             end = end + 150 if end > stamp else entered
             emit(tracepoints.dds_write_pre, end, context, writer, message)
+        dds.append((name, end))
     if layout.is_stamped_early:
         end += duration
-    return Written(rmw, stamp_ns, end + int(size_bytes * _SENDING_NS_PER_BYTE))
+    return Written(rmw, stamp_ns, end + int(size_bytes * _SENDING_NS_PER_BYTE), tuple(dds))
 
 
 def read(thread: Thread, rmw_handle: int, buffer: int, time: int, stamp_ns: int, taken: int) -> int:

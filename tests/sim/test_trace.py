@@ -12,7 +12,7 @@ from itertools import pairwise
 import pytest
 
 from msgflow.sim import simulate
-from msgflow.sim.layout import JAZZY
+from msgflow.sim.layout import layouts
 
 _PACKET_HEADER = struct.Struct("<I16sIQQQQQQQI")
 _INDEX_HEADER = struct.Struct(">IIII")
@@ -160,7 +160,7 @@ def test_layout_equals_that_of_a_recorded_trace(bt2, recorded_jazzy):
         if type(message).__name__ == "_StreamBeginningMessageConst":
             recorded = {c.name: c for c in message.stream.cls.values()}
             break
-    shared = [event for event in JAZZY.events if event.name in recorded]
+    shared = [event for event in layouts()["jazzy"].events if event.name in recorded]
     assert len(shared) >= 30
     for event in shared:
         members = recorded[event.name].payload_field_class

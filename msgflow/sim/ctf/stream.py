@@ -45,7 +45,7 @@ class Faults(Protocol):
         """How many events are lost behind the packet that is now full."""
 
     def is_packet_lost(self) -> bool:
-        """Whether the packet that is now complete is lost."""
+        """Whether the packet that is now full is lost."""
 
     def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
         """An event is not in the trace."""
@@ -141,7 +141,7 @@ class StreamWriter:
                     self.emit(tracepoint, time, context, *values)
                     return
             self._is_full = False
-            self._write_packet(cycles, self._packet_bytes)
+            self._write_packet(cycles, self._packet_bytes, is_full=True)
             size = _HEADER.size + len(record)
         tracepoint.count += 1
         self._records.append(record)
@@ -175,7 +175,9 @@ class StreamWriter:
         pages = -(-self._size // PAGE_BYTES)
         self._write_packet(end + self._origin, pages * PAGE_BYTES, ending)
 
-    def _write_packet(self, end: int, size: int, ending: Ending | None = None) -> None:
+    def _write_packet(
+        self, end: int, size: int, ending: Ending | None = None, *, is_full: bool = False
+    ) -> None:
         content_bits, packet_bits = self._size * 8, size * 8
         sequence, begin = self._sequence, self._begin
         header = _HEADER.pack(
@@ -186,14 +188,15 @@ class StreamWriter:
             self._offset, packet_bits, content_bits, begin, end,
             self._discarded, _STREAM_ID, self._cpu, sequence,
         )  # fmt: skip
-        kept = self._kept(ending)
+        kept = self._kept(ending, is_full=is_full)
         if kept is None:
             self._withdraw(0, "packets" if ending is None else "truncation")
         else:
             self._file.write(header)
             self._file.writelines(self._records[:kept])
             if ending is not None and ending.is_last_packet_cut:
-                self._withdraw(kept, "truncation")
+                # A packet that is not whole cannot be relied on, even what there is of it.
+                self._withdraw(0, "truncation")
                 self._file.writelines(record[:-1] for record in self._records[kept : kept + 1])
             else:
                 self._file.write(bytes(size - self._size))
@@ -205,13 +208,13 @@ class StreamWriter:
         self._begin = end
         self._sequence += 1
 
-    def _kept(self, ending: Ending | None) -> int | None:
+    def _kept(self, ending: Ending | None, *, is_full: bool) -> int | None:
         """How many events of the packet are recorded; None if the whole packet is missing."""
         if ending is not None and ending.is_last_packet_missing:
             return None
         if ending is not None and ending.is_last_packet_cut:
             return len(self._records) // 2
-        if self._faults is not None and self._faults.is_packet_lost():
+        if is_full and self._faults is not None and self._faults.is_packet_lost():
             return None
         return len(self._records)
 
