@@ -17,12 +17,13 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test bench babeltrace clean
+.PHONY: help demo test bench truth babeltrace clean
 
 help:
 	@echo 'make demo   simulate a robot, ingest its trace, print end-to-end latency'
 	@echo 'make test   style, types, import contracts, tests'
 	@echo 'make bench  speed and memory of reading and ingesting, beside Babeltrace 2'
+	@echo 'make truth  precision and recall on systems of which everything is known, minutes'
 	@echo 'make clean  remove what these made'
 
 demo: $(VENV)/.installed
@@ -40,6 +41,9 @@ test: $(VENV)/.developed babeltrace
 
 bench: $(VENV)/.installed babeltrace
 	$(BIN)/python benchmarks/run.py
+
+truth: $(VENV)/.installed
+	$(BIN)/python benchmarks/truth.py
 
 $(VENV)/.made:
 	@$(APT); command -v $(PYTHON) >/dev/null 2>&1 || apt_install python3 python3-venv

@@ -53,6 +53,9 @@ from __future__ import annotations
 
 from msgflow.sim.builtin import scenarios
 from msgflow.sim.engine import Simulation, simulate
+from msgflow.sim.layout import layouts
+from msgflow.sim.long_recording import long_recording
+from msgflow.sim.recording import Buffers, Recording
 from msgflow.sim.system import (
     Host,
     Node,
@@ -65,15 +68,19 @@ from msgflow.sim.system import (
 )
 
 __all__ = [
+    "Buffers",
     "Host",
     "Node",
     "Process",
     "Publisher",
+    "Recording",
     "Scenario",
     "Simulation",
     "Subscription",
     "Timer",
     "Work",
+    "layouts",
+    "long_recording",
     "scenarios",
     "simulate",
 ]

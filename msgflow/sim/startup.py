@@ -226,7 +226,19 @@ class Startup:
         stamp_ns = self._process.machine.stamp_ns(self._time + 250)
         writer = self._discovery_writers[1 if event == "create_writer" else 2]
         self._emit("dds_write", writer, 0, stamp_ns)
+        if self._tracepoints.dds_write.pack is not None:
+            self._add_write_to_truth(stamp_ns)
         self._emit(f"dds_{event}", entity, dds_topic, gid[:12], gid[12:16], gid[:16])
+
+    def _add_write_to_truth(self, stamp_ns: int) -> None:
+        """DDS has published for itself, of which nothing but its own event tells."""
+        thread, truth = self.thread, self._world.truth
+        place = (thread.machine.hostname, thread.process.pid, thread.tid)
+        publication_id = next(self._world.publication_ids)
+        truth.publication.add(
+            publication_id, *place, None, None, None, None, None, None, None, stamp_ns, None, True
+        )
+        truth.dds_event.add(publication_id, *place, "dds:write", self._time + thread.machine.epoch)
 
     def _create_service(self, node_handle: int, name: str, symbol: str) -> None:
         self._work(250 * MICROSECOND)

@@ -1,0 +1,109 @@
+"""Runs the comparison in DuckDB."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import duckdb
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_SQL = Path(__file__).parent
+_RECORDED_COLUMNS = """{
+    t: 'VARCHAR', id: 'VARCHAR', kind: 'VARCHAR', host: 'VARCHAR', vpid: 'INTEGER', vtid: 'INTEGER',
+    ev: 'MAP(VARCHAR, BIGINT)', "start": 'BIGINT', "end": 'BIGINT', msg: 'VARCHAR', cb: 'VARCHAR',
+    seen: 'INTEGER', "in": 'VARCHAR', "out": 'VARCHAR', type: 'VARCHAR', annot: 'INTEGER',
+    flavour: 'VARCHAR', hosts: 'MAP(VARCHAR, STRUCT(hostname VARCHAR))'
+}"""
+
+
+@dataclass(frozen=True)
+class Score:
+    """How good one kind of rows is.
+
+    Attributes:
+        kind: of link (`transport`, `direct`, …), or of row (`publication`, `take`, …).
+        is_built: msgflow has a definition for this kind.
+        happened: true ones.
+        decided: those of them that the trace decides, which must be found.
+        found: rows.
+        wrong: rows that are not true.
+        repeated: rows beyond the first for one true link.
+        missing: decided, but not found.
+        precision: share of the rows that are true.
+        recall: share of the decided ones that were found.
+        labels: right and found rows by method or kind.
+    """
+
+    kind: str
+    is_built: bool
+    happened: int
+    decided: int
+    found: int
+    wrong: int
+    repeated: int
+    missing: int
+    precision: float
+    recall: float
+    labels: str
+
+
+@dataclass(frozen=True)
+class Drop:
+    """Messages that a subscription did not take: the true reason and the one that was given."""
+
+    truth: str
+    reason: str
+    messages: int
+    is_right: bool
+
+
+def compare_simulated(
+    database: Path, truth: Mapping[str, Path]
+) -> tuple[list[Score], list[Drop] | None]:
+    """Compare an ingested simulation with its truth tables.
+
+    Returns the scores, and the reasons of what was not delivered; None if the database has none.
+    """
+    with _open(database) as connection:
+        for name, path in truth.items():
+            connection.execute(f"CREATE TEMP VIEW simulated_{name} AS FROM '{path}'")
+        scores = _score(connection, "simulated")
+        columns = connection.execute(
+            "SELECT column_name FROM duckdb_columns() "
+            "WHERE database_name = 'analysed' AND schema_name = 'main' "
+            "AND table_name = 'stat_delivery'"
+        ).fetchall()
+        if {("publication_id",), ("subscription_id",), ("status",), ("reason",)} - set(columns):
+            return scores, None
+        drops = connection.execute((_SQL / "drops.sql").read_text()).fetchall()
+        return scores, [Drop(*row) for row in drops]
+
+
+def compare_recorded(database: Path, truth: Path) -> list[Score]:
+    """Compare an ingested recording with its `truth.jsonl.gz`."""
+    with _open(database) as connection:
+        connection.execute(
+            f"CREATE TEMP VIEW recorded AS FROM read_json('{truth}', "
+            f"format = 'newline_delimited', columns = {_RECORDED_COLUMNS})"
+        )
+        return _score(connection, "recorded")
+
+
+def _open(database: Path) -> duckdb.DuckDBPyConnection:
+    connection = duckdb.connect()
+    connection.execute(f"ATTACH '{database}' AS analysed (READ_ONLY)")
+    return connection
+
+
+def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
+    connection.execute(
+        "CREATE TEMP TABLE built AS SELECT schema_name || '.' || view_name FROM duckdb_views() "
+        "WHERE database_name = 'analysed' AND schema_name = 'derive'"
+    )
+    for name in (source, "found", "score"):
+        connection.execute((_SQL / f"{name}.sql").read_text())
+    return [Score(*row) for row in connection.execute("FROM score").fetchall()]

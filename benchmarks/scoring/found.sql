@@ -1,0 +1,75 @@
+-- What msgflow has found (the database `analysed`): every link by the places and times of its ends.
+-- Times are those of the trace, which the tables of the store have.
+CREATE OR REPLACE TEMP TABLE found_link AS
+WITH place AS (
+    SELECT t.thread_id, h.hostname AS host, p.pid, t.tid
+    FROM analysed.store.thread AS t
+    JOIN analysed.store.process AS p ON t.process_id = p.process_id
+    JOIN analysed.store.host AS h ON p.host_id = h.host_id
+),
+instance AS (
+    SELECT 'publication' AS kind, publication_id AS id, thread_id, start_ns AS ts_ns
+    FROM analysed.store.publication
+    UNION ALL
+    SELECT 'take', take_id, thread_id, taken_ns
+    FROM analysed.store.take
+    UNION ALL
+    SELECT 'callback_instance', callback_instance_id, thread_id, start_ns
+    FROM analysed.store.callback_instance
+    UNION ALL
+    SELECT 'request_sent', request_id, sender_thread_id, sent_ns
+    FROM analysed.store.request
+    UNION ALL
+    SELECT 'request_taken', request_id, receiver_thread_id, taken_ns
+    FROM analysed.store.request
+    UNION ALL
+    SELECT 'response_sent', response_id, sender_thread_id, sent_ns
+    FROM analysed.store.response
+    UNION ALL
+    SELECT 'response_taken', response_id, receiver_thread_id, taken_ns
+    FROM analysed.store.response
+),
+link AS (
+    SELECT
+        kind, kind AS label, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id
+    FROM instance
+    WHERE kind IN ('publication', 'callback_instance')
+    UNION ALL
+    -- The middleware's own takes carry no stamp; nobody subscribes to them.
+    SELECT 'take', method, 'take', take_id, 'take', take_id
+    FROM analysed.store.take
+    WHERE method <> 'callback_only' AND coalesce(source_timestamp_ns, 0) <> 0
+    UNION ALL
+    SELECT 'transport', method, 'publication', publication_id, 'take', take_id
+    FROM analysed.store.link_transport
+    UNION ALL
+    SELECT kind, kind, 'callback_instance', callback_instance_id, 'publication', publication_id
+    FROM analysed.store.link_causal
+    UNION ALL
+    SELECT 'link_request', 'request', 'callback_instance', callback_instance_id, 'request_sent',
+        request_id
+    FROM analysed.store.link_request
+    WHERE callback_instance_id IS NOT NULL
+    UNION ALL
+    SELECT 'link_response', 'response', 'callback_instance', callback_instance_id,
+        'response_sent', response_id
+    FROM analysed.store.link_response
+    WHERE callback_instance_id IS NOT NULL
+    UNION ALL
+    SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id
+    FROM analysed.store.request
+    WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL
+    UNION ALL
+    SELECT 'response', 'response', 'response_sent', response_id, 'response_taken', response_id
+    FROM analysed.store.response
+    WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL
+)
+SELECT
+    row_number() OVER () AS number, l.kind, l.label, l.from_id, l.to_id,
+    l.from_kind, fp.host AS from_host, fp.pid AS from_pid, fp.tid AS from_tid, f.ts_ns AS from_ns,
+    l.to_kind, tp.host AS to_host, tp.pid AS to_pid, tp.tid AS to_tid, t.ts_ns AS to_ns
+FROM link AS l
+JOIN instance AS f ON l.from_kind = f.kind AND l.from_id = f.id
+JOIN place AS fp ON f.thread_id = fp.thread_id
+JOIN instance AS t ON l.to_kind = t.kind AND l.to_id = t.id
+JOIN place AS tp ON t.thread_id = tp.thread_id;

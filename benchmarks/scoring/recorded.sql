@@ -1,0 +1,72 @@
+-- What is true of a recorded system, from its truth.jsonl.gz (the view recorded). Kinds of links:
+-- `annot` is what annotations and trace imply, `seen` what the trace shows.
+
+CREATE OR REPLACE TEMP TABLE hostname AS
+SELECT entry.key AS host, entry.value.hostname AS hostname
+FROM (SELECT unnest(map_entries(hosts)) AS entry FROM recorded WHERE t = 'meta');
+
+CREATE OR REPLACE TEMP TABLE truth_time AS
+WITH instance AS (
+    SELECT
+        CASE
+            WHEN t = 'cb' THEN 'callback_instance'
+            WHEN kind IN ('topic', 'intra') THEN CASE t WHEN 'pub' THEN 'publication' ELSE t END
+            WHEN t = 'pub' THEN kind || '_sent'
+            ELSE kind || '_taken'
+        END AS kind,
+        id, host, vpid, vtid,
+        CASE WHEN t = 'cb' THEN ["start", "end"] ELSE map_values(ev) END AS times
+    FROM recorded
+    WHERE t IN ('pub', 'take', 'cb')
+    UNION ALL
+    SELECT 'take', k.id, k.host, k.vpid, k.vtid, [c."start"]
+    FROM recorded AS k
+    JOIN recorded AS c ON k.t = 'take' AND c.t = 'cb' AND k.cb = c.id
+    WHERE k.kind IN ('topic', 'intra')
+)
+SELECT DISTINCT i.kind, i.id, n.hostname AS host, i.vpid AS pid, i.vtid AS tid, moment AS ts_ns
+FROM (SELECT kind, id, host, vpid, vtid, unnest(times) AS moment FROM instance) AS i
+JOIN hostname AS n ON i.host = n.host
+WHERE moment IS NOT NULL;
+
+CREATE OR REPLACE TEMP TABLE truth_link AS
+WITH pub AS (FROM recorded WHERE t = 'pub'),
+take AS (FROM recorded WHERE t = 'take'),
+link AS (
+    SELECT
+        l.type, k.cb, l."out", l.seen = 1 AS is_seen
+    FROM recorded AS l
+    JOIN take AS k ON l."in" = k.id
+    WHERE l.t = 'link' AND l.annot = 1
+)
+SELECT
+    'transport' AS kind, 'publication' AS from_kind, p.id AS from_id, 'take' AS to_kind,
+    k.id AS to_id, p.seen = 1 AND k.seen = 1 AS is_decided,
+    CASE m.flavour
+        WHEN 'humble' THEN 'derive.link_transport_nearest' ELSE 'derive.link_transport_exact'
+    END AS needs
+FROM take AS k
+CROSS JOIN (SELECT flavour FROM recorded WHERE t = 'meta') AS m
+JOIN pub AS p ON k.msg = p.id
+WHERE k.kind IN ('topic', 'intra')
+UNION ALL
+SELECT
+    k.kind, k.kind || '_sent', p.id, k.kind || '_taken', k.id, p.seen = 1 AND k.seen = 1,
+    'derive.' || k.kind
+FROM take AS k
+JOIN pub AS p ON k.msg = p.id
+WHERE k.kind IN ('request', 'response')
+UNION ALL
+SELECT
+    CASE kind WHEN 'request' THEN 'link_request' ELSE 'direct' END, 'callback_instance', cb,
+    CASE kind WHEN 'request' THEN 'request_sent' ELSE 'publication' END, id, seen = 1,
+    CASE kind WHEN 'request' THEN 'derive.link_request' ELSE 'derive.link_causal_direct' END
+FROM pub
+WHERE cb IS NOT NULL AND kind <> 'response'
+UNION ALL
+SELECT
+    CASE type WHEN 'service' THEN 'link_response' ELSE type END, 'callback_instance', cb,
+    CASE type WHEN 'service' THEN 'response_sent' ELSE 'publication' END, "out", is_seen,
+    CASE type WHEN 'service' THEN 'derive.link_response' ELSE 'derive.link_causal_' || type END
+FROM link
+WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL;

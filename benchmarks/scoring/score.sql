@@ -1,0 +1,66 @@
+-- Precision and recall by kind of link. A link that was found is right if it is true, whether or
+-- not the trace decides it; a true one that the trace decides and that was not found is missing.
+CREATE OR REPLACE TEMP TABLE verdict AS
+SELECT
+    f.number, f.kind, f.label, f.from_id AS found_from_id, f.to_id AS found_to_id,
+    l.from_id, l.to_id
+FROM found_link AS f
+LEFT JOIN truth_time AS a
+    ON f.from_kind = a.kind AND f.from_host = a.host AND f.from_pid = a.pid
+    AND f.from_tid = a.tid AND f.from_ns = a.ts_ns
+LEFT JOIN truth_time AS b
+    ON f.to_kind = b.kind AND f.to_host = b.host AND f.to_pid = b.pid AND f.to_tid = b.tid
+    AND f.to_ns = b.ts_ns
+LEFT JOIN truth_link AS l ON f.kind = l.kind AND a.id = l.from_id AND b.id = l.to_id
+QUALIFY row_number() OVER (PARTITION BY f.number ORDER BY l.from_id NULLS LAST, l.to_id) = 1;
+
+CREATE OR REPLACE TEMP TABLE score AS
+WITH found AS (
+    SELECT
+        kind,
+        count(*) AS found,
+        count(from_id) AS right_count,
+        count(*) - count(from_id) AS wrong,
+        count(from_id) - count(DISTINCT (from_id, to_id)) FILTER (from_id IS NOT NULL) AS repeated
+    FROM verdict
+    GROUP BY kind
+),
+labelled AS (
+    SELECT kind, string_agg(label || ' ' || right_count || '/' || found, ', ' ORDER BY label) AS labels
+    FROM (
+        SELECT kind, label, count(*) AS found, count(from_id) AS right_count
+        FROM verdict
+        GROUP BY kind, label
+    )
+    GROUP BY kind
+),
+expected AS (
+    SELECT
+        l.kind,
+        any_value(l.needs) AS needs,
+        count(*) AS happened,
+        count(*) FILTER (l.is_decided) AS decided,
+        count(*) FILTER (l.is_decided AND v.from_id IS NULL) AS missing
+    FROM truth_link AS l
+    LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM verdict) AS v
+        ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
+    GROUP BY l.kind
+)
+SELECT
+    coalesce(e.kind, f.kind) AS kind,
+    coalesce(e.needs, 'derive.link_transport') IN (FROM built) AS is_built,
+    coalesce(e.happened, 0) AS happened,
+    coalesce(e.decided, 0) AS decided,
+    coalesce(f.found, 0) AS found,
+    coalesce(f.wrong, 0) AS wrong,
+    coalesce(f.repeated, 0) AS repeated,
+    coalesce(e.missing, 0) AS missing,
+    coalesce(f.right_count / nullif(f.found, 0), 1) AS precision,
+    coalesce(1 - e.missing / nullif(e.decided, 0), 1) AS recall,
+    coalesce(labels, '') AS labels
+FROM expected AS e
+FULL JOIN found AS f ON e.kind = f.kind
+LEFT JOIN labelled AS s ON coalesce(e.kind, f.kind) = s.kind
+-- Truth that says nothing of a kind does not judge it.
+WHERE e.kind IS NOT NULL
+ORDER BY 1;

@@ -1,0 +1,252 @@
+"""Precision and recall of what msgflow finds, where what happened is known.
+
+    python benchmarks/truth.py [--system NAME]… [--layout NAME]… [--recording NAME]… [--quick]
+        [--factor 0.1] [--traces DIR] [--csv FILE]
+
+Simulates systems, each in the layout of every release of ROS 2 and recorded with the faults that
+recordings have, ingests the traces and compares the result with the truth, row by row, in SQL. The
+recorded systems in ../shared/traces are compared likewise where that folder exists.
+
+For each kind of link: how many there were, how many of these the trace decides, how many rows were
+found, wrong ones, and decided ones that are missing. Precision is the share of the rows that are
+true, recall the share of the decided links that were found; both must be 1.000. A kind that this
+version of msgflow has no definition for is marked, and judged by precision only. The exit code is 1
+if a figure that must be 1.000 is not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scoring import Drop, Score, compare_recorded, compare_simulated
+
+from msgflow.ingest import ingest
+from msgflow.sim import (
+    Buffers,
+    Recording,
+    Scenario,
+    layouts,
+    long_recording,
+    scenarios,
+    simulate,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SHARED_TRACES = Path(__file__).parents[1] / ".." / "shared" / "traces"
+SECOND = 1_000_000_000
+PERFECT = "perfect"
+LONG = "long_recording"
+# Recall of the half an hour in which clocks drift apart by 36 ms.
+LOWEST_RECALL = {LONG: 0.999}
+
+# What recordings do to a second of a system.
+RECORDINGS = {
+    PERFECT: Recording(),
+    "late": Recording(start_ns=SECOND // 3),
+    "loss": Recording(lost_event_share=0.3),
+    "packets": Recording(lost_packet_share=0.2),
+    "pause": Recording(pauses=((SECOND // 3, SECOND // 2),)),
+    "truncated": Recording(cut_streams=1, unfinished_streams=1),
+    "dual": Recording(start_ns=SECOND // 3, is_dual_session=True, clock_error_ns=3_000),
+    "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
+    "per_process": Recording(buffers=Buffers.PER_PROCESS, clock_error_ns=3_000),
+    "drift": Recording(realtime_offset_ns=7_000_000, slew_ppm=20),
+    "everything": Recording(
+        start_ns=SECOND // 20,
+        pauses=((SECOND // 3, SECOND // 2),),
+        rotations=(SECOND * 2 // 3,),
+        buffers=Buffers.PER_PROCESS,
+        lost_event_share=0.2,
+        lost_packet_share=0.05,
+        unfinished_streams=1,
+        slew_ppm=-20,
+    ),
+}
+# Faults do not depend on the layout but for stamps, of which these have all kinds.
+FAULTY_LAYOUTS = ("jazzy", "humble", "humble-fastdds")
+FAULTY_SYSTEMS = ("pipeline", "two_hosts")
+QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A simulation to be compared."""
+
+    system: str
+    layout: str
+    recording: str
+    scenario: Scenario
+    factor: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A score and where it comes from."""
+
+    system: str
+    layout: str
+    recording: str
+    score: Score
+
+    @property
+    def is_good(self) -> bool:
+        """Whether every figure that must be 1.000 is."""
+        lowest = LOWEST_RECALL.get(self.system, 1)
+        is_complete = self.score.recall >= lowest or not self.score.is_built
+        return self.score.wrong == 0 and not self._is_repeated and is_complete
+
+    @property
+    def _is_repeated(self) -> bool:
+        # Losses may tear an instance in two, but nothing may be linked twice.
+        is_link = self.score.kind not in {"publication", "take", "callback_instance"}
+        return self.score.repeated > 0 and (is_link or self.recording == PERFECT)
+
+
+def cases(arguments: argparse.Namespace) -> Iterator[Case]:
+    """What is to be simulated."""
+    known = scenarios()
+    for system in arguments.system or [*known, LONG]:
+        if system == LONG:
+            if not arguments.quick:
+                yield Case(LONG, "humble", "drift", long_recording(), 1)
+            continue
+        for layout in arguments.layout or layouts():
+            for recording in arguments.recording or RECORDINGS:
+                is_faulty = recording != PERFECT
+                is_asked_for = arguments.system or arguments.layout or arguments.recording
+                is_usual = not is_faulty or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
+                if arguments.quick:
+                    is_usual = (system, layout) in QUICK and recording in {PERFECT, "loss"}
+                elif is_asked_for:
+                    is_usual = True
+                if is_usual:
+                    scenario = known[system]
+                    yield Case(system, layout, recording, scenario, arguments.factor)
+
+
+def compare(case: Case, directory: Path) -> tuple[list[Judged], list[Drop] | None]:
+    """Simulate, ingest and compare; drops are None where the database knows no reasons."""
+    recording = None if case.system == LONG else RECORDINGS[case.recording]
+    simulation = simulate(
+        case.scenario,
+        directory / "trace",
+        factor=case.factor,
+        layout=case.layout,
+        recording=recording,
+        clock_offset_ns=350_000_000,
+    )
+    database = directory / "run.duckdb"
+    ingest([simulation.directory], database)
+    scores, drops = compare_simulated(database, simulation.truth)
+    return [Judged(case.system, case.layout, case.recording, score) for score in scores], drops
+
+
+def compare_recordings(traces: Path) -> Iterator[Judged]:
+    """Compare the recorded systems."""
+    for truth in sorted(traces.glob("*/truth.jsonl.gz")):
+        with tempfile.TemporaryDirectory() as temporary:
+            database = Path(temporary) / "run.duckdb"
+            ingest([truth.parent], database)
+            for score in compare_recorded(database, truth):
+                yield Judged(truth.parent.name, "recorded", "recorded", score)
+
+
+def show(judged: Judged) -> None:
+    """Print one line."""
+    score = judged.score
+    mark = " " if judged.is_good else "✗"
+    recall = f"{score.recall:.4f}" if score.is_built else "not built"
+    print(
+        f"{mark} {judged.system:24} {judged.layout:27} {judged.recording:12} {score.kind:18} "
+        f"{score.happened:7} {score.decided:7} {score.found:7} {score.wrong:5} {score.missing:7} "
+        f"{score.precision:.4f} {recall:>9}  {score.labels}",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Compare everything and say what is wrong."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--system", action="append", choices=[*scenarios(), LONG])
+    parser.add_argument("--layout", action="append", choices=list(layouts()))
+    parser.add_argument("--recording", action="append", choices=list(RECORDINGS))
+    parser.add_argument("--quick", action="store_true", help="a few only")
+    parser.add_argument("--factor", type=float, default=0.1, help="length of the simulations")
+    parser.add_argument("--traces", type=Path, default=SHARED_TRACES, help="recorded systems")
+    parser.add_argument("--csv", type=Path, help="write the table there as well")
+    arguments = parser.parse_args()
+
+    print(
+        f"  {'system':24} {'layout':27} {'recording':12} {'kind':18} {'true':>7} {'decided':>7} "
+        f"{'found':>7} {'wrong':>5} {'missing':>7} {'prec.':>6} {'recall':>9}  right/found"
+    )
+    everything: list[Judged] = []
+    reasons: list[tuple[Case, Drop]] = []
+    has_reasons = False
+    for case in cases(arguments):
+        with tempfile.TemporaryDirectory() as temporary:
+            judged, drops = compare(case, Path(temporary))
+        has_reasons |= drops is not None
+        reasons += [(case, drop) for drop in drops or []]
+        everything += judged
+        for one in judged:
+            show(one)
+    if not (arguments.system or arguments.layout or arguments.recording):
+        if arguments.traces.is_dir():
+            for one in compare_recordings(arguments.traces):
+                everything.append(one)
+                show(one)
+        else:
+            print(f"note: no recorded systems — {arguments.traces}", file=sys.stderr)
+
+    are_reasons_right = show_reasons(reasons, has_reasons)
+    if arguments.csv:
+        write_csv(arguments.csv, everything)
+    bad = [one for one in everything if not one.is_good]
+    print(f"\n{len(everything)} figures, {len(bad)} of them not what they must be")
+    sys.exit(1 if bad or not are_reasons_right else 0)
+
+
+def show_reasons(reasons: list[tuple[Case, Drop]], has_reasons: bool) -> bool:
+    """Print why messages were not delivered, said and true; whether all that must agree does."""
+    if not has_reasons:
+        print("\nnote: this version gives no reasons for what was not delivered", file=sys.stderr)
+        return True
+    counted: dict[tuple[str, str, str, bool], int] = {}
+    for case, drop in reasons:
+        fault = case.recording if case.recording == PERFECT else "with faults"
+        key = (fault, drop.truth, drop.reason, drop.is_right)
+        counted[key] = counted.get(key, 0) + drop.messages
+    print(f"\n  {'recording':12} {'true reason':20} {'reason given':20} {'messages':>8}")
+    is_all_right = True
+    for (fault, truth, reason, is_right), messages in sorted(counted.items()):
+        # Gaps hide what happened: there the reasons are shown, not judged.
+        is_bad = not is_right and fault == PERFECT
+        is_all_right &= not is_bad
+        print(f"{'✗' if is_bad else ' '} {fault:12} {truth:20} {reason:20} {messages:8}")
+    return is_all_right
+
+
+def write_csv(path: Path, judged: list[Judged]) -> None:
+    """Write every figure."""
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        names = list(Score.__dataclass_fields__)
+        writer.writerow(["system", "layout", "recording", *names])
+        for one in judged:
+            values = [getattr(one.score, name) for name in names]
+            writer.writerow([one.system, one.layout, one.recording, *values])
+
+
+if __name__ == "__main__":
+    main()
