@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msgflow.sim.intra import IntraBuffer, publish_intra
 from msgflow.sim.publish import CallbackInstance, publish
-from msgflow.sim.transport import Message, Middleware, PublisherObject, Root, SubscriptionObject
-from msgflow.sim.write import read
+from msgflow.sim.take import Taken, take
+from msgflow.sim.transport import Root
 
 if TYPE_CHECKING:
-    from msgflow.sim.machine import Thread
-    from msgflow.sim.system import Work
+    from msgflow.sim.executor import CallbackGroup
+    from msgflow.sim.machine import Steps, Thread
+    from msgflow.sim.transport import Middleware, SubscriptionObject, UserCode
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class TimerObject:
     """A timer as it exists in its process; `due` is when it has to be called next."""
 
@@ -22,131 +24,165 @@ class TimerObject:
     handle: int
     callback: int
     period: int
-    work: Work
-    publishers: tuple[PublisherObject, ...]
-    log: PublisherObject | None
+    code: UserCode
+    group: CallbackGroup
     due: int
 
+    def is_ready(self, time: int) -> bool:
+        """Whether it has to be called."""
+        return self.due <= time
 
-def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: int) -> int:
+
+def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: int) -> Steps:
     """Call a timer on a thread that has a CPU; returns the time of callback_end."""
     # As rcl does it: calls that were missed are left out.
     timer.due += timer.period
     if timer.due < time:
         timer.due += (1 + (time - timer.due - 1) // timer.period) * timer.period
-    world, machine = thread.world, thread.machine
-    hostname, pid, tid, epoch = machine.hostname, thread.process.pid, thread.tid, machine.epoch
-    start = time + 500 + int(world.random() * 2_500)
-    start_ns = start + epoch
-    instance_id = next(world.callback_instance_ids)
-    root = Root(instance_id, hostname, pid, tid, start, start_ns)
-    instance = CallbackInstance(instance_id, start_ns, root, (), None, None)
-    end = _call(
-        thread, middleware, timer.callback, start, instance,
-        timer.work, timer.publishers, timer.log,
-    )  # fmt: skip
-    world.truth.callback_instance.add(
-        instance_id, hostname, pid, tid, timer.node, "timer",
-        timer.callback, start_ns, end + epoch, None,
-    )  # fmt: skip
-    return end
+    start = time + 500 + int(thread.world.random() * 2_500)
+    if not timer.code.is_callback:
+        return (yield from execute(thread, middleware, timer.code, start, None))
+    return (
+        yield from run_callback(
+            thread, middleware, timer.code, start, timer.callback, timer.node, "timer", None
+        )
+    )
 
 
 def run_subscription(
     thread: Thread, middleware: Middleware, subscription: SubscriptionObject, time: int
-) -> int:
+) -> Steps:
     """Take one message and run the callback with it; returns the time of callback_end.
 
-    If there is no message, the take fails and nothing else happens.
+    If there is no message, the take fails and nothing else happens. A message that has come
+    through an intra-process buffer as well is taken, but is not handed to the callback again.
     """
-    random = thread.world.random
-    tracepoints = thread.machine.tracepoints
-    emit, context = thread.emit, thread.context
-    rmw_handle, buffer = subscription.rmw_handle, subscription.message
-    reading = time + 2_000 + int(random() * 8_000)
-    if not subscription.queue:
-        middleware.failed_takes += 1
-        return read(thread, rmw_handle, buffer, reading, 0, 0)
-    message = subscription.queue.popleft()
-    rmw = read(thread, rmw_handle, buffer, reading, message.stamp_ns, 1)
-    rcl = rmw + 200 + int(random() * 900)
-    emit(tracepoints.rcl_take, rcl, context, buffer)
-    rclcpp = rcl + 150 + int(random() * 600)
-    emit(tracepoints.rclcpp_take, rclcpp, context, buffer)
-    start = rclcpp + 400 + int(random() * 1_500)
+    code = subscription.code
+    taken, time = take(thread, middleware, subscription, time)
+    if taken is None:
+        return time
+    if taken.is_copy:
+        taken.write(thread, subscription, None)
+        return time + 300
+    start = time + 400 + int(thread.world.random() * 1_500)
+    if not code.is_callback:
+        taken.write(thread, subscription, None)
+        cause = CallbackInstance(
+            None, None, taken.message.root, taken.message.path, taken.take_id, taken.rmw_ns
+        )
+        return (yield from execute(thread, middleware, code, start, cause))
+    return (
+        yield from run_callback(
+            thread, middleware, code, start, subscription.callback, subscription.node,
+            "subscription", taken, subscription,
+        )
+    )  # fmt: skip
 
+
+def run_buffer(thread: Thread, middleware: Middleware, buffer: IntraBuffer, time: int) -> Steps:
+    """Take one message from a buffer and run the callback with it."""
+    random = thread.world.random
+    time = yield thread.hold(time + 300 + int(random() * 1_500))
+    if not buffer.ring.messages:
+        # Another thread of the executor was faster.
+        return time
+    message = buffer.ring.dequeue(thread, time)
+    subscription = buffer.subscription
+    if buffer.ring.messages:
+        subscription.executor.wake(time)
+    taken = Taken(
+        next(thread.world.take_ids), message, time, "ring_buffer", None,
+        dequeue_ns=time + thread.machine.epoch,
+    )  # fmt: skip
+    taken.is_replay = message.time < subscription.created
+    return (
+        yield from run_callback(
+            thread, middleware, subscription.code, time + 400 + int(random() * 1_500),
+            buffer.callback, subscription.node, "subscription", taken, subscription, is_intra=1,
+        )
+    )  # fmt: skip
+
+
+def run_callback(
+    thread: Thread,
+    middleware: Middleware,
+    code: UserCode,
+    start: int,
+    callback: int,
+    node: str,
+    kind: str,
+    taken: Taken | None,
+    subscription: SubscriptionObject | None = None,
+    is_intra: int = 0,
+    instance_id: int | None = None,
+) -> Steps:
+    """Run a callback from `start` on; returns the time of callback_end."""
     world, machine = thread.world, thread.machine
     hostname, pid, tid, epoch = machine.hostname, thread.process.pid, thread.tid, machine.epoch
-    rmw_ns, rcl_ns, rclcpp_ns, start_ns = rmw + epoch, rcl + epoch, rclcpp + epoch, start + epoch
-    take_id = next(world.take_ids)
-    instance_id = next(world.callback_instance_ids)
-    instance = CallbackInstance(instance_id, start_ns, message.root, message.path, take_id, rmw_ns)
-    end = _call(
-        thread, middleware, subscription.callback, start, instance,
-        subscription.description.work, subscription.publishers, subscription.log,
-    )  # fmt: skip
-    end_ns = end + epoch
-
-    truth, publisher, is_internal = world.truth, message.publisher, subscription.is_internal
-    truth.take.add(
-        take_id, hostname, pid, tid, subscription.node, publisher.topic,
-        subscription.handle, rmw_ns, rcl_ns, rclcpp_ns, message.stamp_ns,
-        message.publication_id, instance_id, is_internal,
-    )  # fmt: skip
-    truth.transport.add(
-        message.publication_id, take_id, publisher.topic,
-        publisher.process.machine.hostname, publisher.process.pid, message.tid,
-        message.rclcpp_ns, message.rcl_ns, message.rmw_ns, message.stamp_ns,
-        hostname, pid, tid, rmw_ns, rcl_ns, rclcpp_ns, rmw - message.rmw, is_internal,
-    )  # fmt: skip
-    truth.callback_instance.add(
-        instance_id, hostname, pid, tid, subscription.node, "subscription",
-        subscription.callback, start_ns, end_ns, take_id,
-    )  # fmt: skip
-    if message.root is not None and subscription.is_sink:
-        _reach_sink(thread, subscription, message, message.root, take_id, rmw_ns, end)
+    truth = world.truth
+    if instance_id is None:
+        instance_id = next(world.callback_instance_ids)
+    start_ns = start + epoch
+    if taken is None:
+        # Flows begin in timers; what the callback of a service publishes is no flow from a timer.
+        root = Root(instance_id, hostname, pid, tid, start, start_ns) if kind == "timer" else None
+        instance = CallbackInstance(instance_id, start_ns, root, (), None, None)
+    else:
+        message = taken.message
+        instance = CallbackInstance(
+            instance_id, start_ns, message.root, message.path, taken.take_id, taken.rmw_ns
+        )
+    parent_id = thread.running[-1] if thread.running else None
+    thread.running.append(instance_id)
+    end: int | None = None
+    emit = thread.emit
+    emit(machine.tracepoints.callback_start, start, thread.context, callback, is_intra)
+    try:
+        end = yield from execute(thread, middleware, code, start, instance)
+        thread.emit(machine.tracepoints.callback_end, end, thread.context, callback)
+    finally:
+        thread.running.pop()
+        end_ns = None if end is None else end + epoch
+        if taken is not None and subscription is not None:
+            taken.write(thread, subscription, instance_id)
+        truth.callback_instance.add(
+            instance_id, hostname, pid, tid, node, kind, callback, start_ns, end_ns,
+            None if taken is None else taken.take_id, bool(is_intra), parent_id,
+        )  # fmt: skip
+        if taken is not None and subscription is not None and subscription.is_sink:
+            taken.reach_sink(thread, subscription, end)
     return end
 
 
-def _reach_sink(
-    thread: Thread,
-    subscription: SubscriptionObject,
-    message: Message,
-    root: Root,
-    take_id: int,
-    take_ns: int,
-    end: int,
-) -> None:
-    machine = thread.machine
-    thread.world.truth.end_to_end.add(
-        root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns, message.path,
-        machine.hostname, thread.process.pid, thread.tid, subscription.node, take_id, take_ns,
-        end + machine.epoch, end - root.start,
-    )  # fmt: skip
-
-
-def _call(
+def execute(
     thread: Thread,
     middleware: Middleware,
-    callback: int,
+    code: UserCode,
     start: int,
-    instance: CallbackInstance,
-    work: Work,
-    publishers: tuple[PublisherObject, ...],
-    log: PublisherObject | None,
-) -> int:
-    """Run user code: compute, publish, log; returns the time of callback_end."""
+    instance: CallbackInstance | None,
+) -> Steps:
+    """Run user code: compute, publish, do, log; returns the time at which it ends."""
     random = thread.world.random
-    tracepoints = thread.machine.tracepoints
-    thread.emit(tracepoints.callback_start, start, thread.context, callback, 0)
+    work = code.work
     duration = work.typical_ns + int(random() * work.spread_ns)
     if work.slow_probability and random() < work.slow_probability:
         duration += int((1 + random()) * work.slow_ns / 2)
     time = start + 200 + duration * 4 // 5
-    for publisher in publishers:
-        time = publish(thread, middleware, publisher, time, instance)
-    if log is not None:
-        time = publish(thread, middleware, log, time, instance)
-    end = time + 200 + duration // 5
-    thread.emit(tracepoints.callback_end, end, thread.context, callback)
-    return end
+    if not code.is_stepwise:
+        for publisher in code.publishers:
+            time = publish(thread, middleware, publisher, time, instance)
+        if code.log is not None:
+            time = publish(thread, middleware, code.log, time, instance)
+        return time + 200 + duration // 5
+    for publisher in code.publishers:
+        time = yield thread.hold(time)
+        if publisher.intra is not None:
+            time = yield from publish_intra(thread, middleware, publisher, time, instance)
+        else:
+            time = publish(thread, middleware, publisher, time, instance)
+    for deed in code.deeds:
+        time = yield thread.hold(time)
+        time = yield from deed(thread, middleware, time, instance)
+    if code.log is not None:
+        time = publish(thread, middleware, code.log, time, instance)
+    return (yield thread.hold(time + 200 + duration // 5))

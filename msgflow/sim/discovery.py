@@ -34,6 +34,8 @@ class DiscoveryListener(Thread):
             self.world.at(time + 10_000 + self.world.tail(20_000), self._listen)
 
     def _listen(self, time: int, _: None) -> None:
+        if self.process.is_stopped:
+            return
         if later := self.take_cpu(time):
             self.world.at(later, self._listen)
             return
@@ -55,6 +57,10 @@ class Discovery:
         """A process can be heard and hears from now on."""
         self._listeners.append(listener)
 
+    def leave(self, listener: DiscoveryListener) -> None:
+        """A process has ended."""
+        self._listeners.remove(listener)
+
     def announce(self, thread: Thread, rmw_handle: int, message: int, time: int) -> int:
         """Publish what the process has, from `time` on; returns the time when that is done."""
         world, machine = thread.world, thread.machine
@@ -64,7 +70,7 @@ class Discovery:
         world.truth.publication.add(
             publication_id, machine.hostname, thread.process.pid, thread.tid, None,
             _TOPIC, None, rmw_handle, None, None, written.rmw + machine.epoch, written.stamp_ns,
-            None, True,
+            None, True, None,
         )  # fmt: skip
         for listener in self._listeners:
             latency = latency_between(thread.process, listener.process)

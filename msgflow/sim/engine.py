@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -16,6 +17,7 @@ from msgflow.sim.layout import layouts
 from msgflow.sim.machine import Machine, RunningProcess
 from msgflow.sim.meta import write_meta
 from msgflow.sim.recorder import Recorder
+from msgflow.sim.services import ServiceNetwork
 from msgflow.sim.startup import Startup
 from msgflow.sim.system import SECOND, Host, Scenario
 from msgflow.sim.transport import Middleware
@@ -25,7 +27,6 @@ from msgflow.sim.world import World
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from msgflow.sim.executor import ExecutorThread
     from msgflow.sim.recording import Recording
 
 # 2025-03-14 09:26:53.589793238 UTC: when every simulated trace begins.
@@ -98,12 +99,15 @@ def simulate(
         host.hostname: _machine(chosen, host, index * clock_offset_ns, target, identity, truth)
         for index, host in enumerate(chosen.hosts)
     }
-    middleware = Middleware(world, overwrites=chosen.overwrites)
-    threads = _start(chosen, world, machines, middleware, course)
+    middleware = Middleware(world, overwrites=chosen.overwrites, expected=_subscriptions(chosen))
+    network = ServiceNetwork(world)
+    processes = _start(chosen, world, machines, middleware, network, course)
     world.run(int(chosen.duration_ns * factor), middleware.arrive)
 
-    for thread in threads:
-        thread.finish()
+    for process in processes:
+        for thread in process.threads:
+            thread.finish()
+    network.finish()
     middleware.finish()
     end = world.end + _STOP_DELAY_NS
     for machine in machines.values():
@@ -158,19 +162,32 @@ def _start(
     world: World,
     machines: Mapping[str, Machine],
     middleware: Middleware,
+    network: ServiceNetwork,
     course: str,
-) -> list[ExecutorThread]:
-    """Plan the start of every process; its main threads."""
+) -> list[RunningProcess]:
+    """Plan the start and the end of every process."""
     discovery = Discovery()
     version = layouts()[scenario.layout].version
-    threads = []
+    processes = []
     for number, description in enumerate(scenario.processes):
         machine = machines[description.hostname]
         process = RunningProcess(world, machine, description, number, course)
-        startup = Startup(process, middleware, discovery, version)
+        startup = Startup(process, middleware, discovery, network, version)
         world.at(description.start_ns, startup.begin)
-        threads.append(startup.thread)
-    return threads
+        if description.stop_ns is not None:
+            world.at(description.stop_ns, startup.end)
+        processes.append(process)
+    return processes
+
+
+def _subscriptions(scenario: Scenario) -> Counter[str]:
+    """How many subscriptions of each topic there will be."""
+    return Counter(
+        subscription.topic
+        for process in scenario.processes
+        for node in process.nodes
+        for subscription in node.subscriptions
+    )
 
 
 def _empty_directory(directory: Path) -> Path:
@@ -209,4 +226,4 @@ def _machine(
         scenario.recording,
         truth,
     )
-    return Machine(host.hostname, epoch, recorder, scenario.recording)
+    return Machine(host.hostname, epoch, recorder, scenario.recording, host.stamp_resolution_ns)

@@ -1,161 +1,130 @@
-"""rclcpp's single-threaded executor in the main thread of a process.
+"""What the threads of one executor share: what they execute, and who of them waits.
 
-The loop: get_next_ready; if there was nothing wait_for_work and get_next_ready once more; execute.
-What is ready is decided when a wait ends: timers first, then subscriptions, one message of each;
-only after all of them comes the next wait.
+In the order of rclcpp: what is ready is decided when a wait ends, timers first, then subscriptions,
+then services, clients and intra-process buffers; only when nothing of it may be executed comes the
+next wait. One thread at a time looks for something ready or waits; the others are blocked.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
-
-from msgflow.sim.callbacks import TimerObject, run_subscription, run_timer
-from msgflow.sim.machine import RunningProcess, Thread
-from msgflow.sim.system import MICROSECOND
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from msgflow.sim import system
+    from msgflow.sim.callbacks import TimerObject
+    from msgflow.sim.executor_thread import ExecutorThread
+    from msgflow.sim.transport import SubscriptionObject
+    from msgflow.sim.world import World
 
-    from msgflow.sim.transport import Middleware, SubscriptionObject
-
-# Guard conditions and graph events wake executors that have nothing to do.
-_SPURIOUS_WAKE_UP = 0.1
-# Some of these look like data on a subscription, which then is not there.
+# Some guard conditions look like data on a subscription, which then is not there.
 _FAILED_TAKE = 0.02
 
-_WAIT = "wait"
-_PROCESS = "process"
-_EXECUTE = "execute"
-_NO_TIMEOUT = -1
+_HAVING_EVENTS = frozenset({"single_threaded", "multi_threaded", "nested"})
+_WITHOUT_CALLBACKS = frozenset({"wait_set"})
 
 
-class ExecutorThread(Thread):
-    """The main thread of a process once it spins.
+@dataclass(slots=True)
+class CallbackGroup:
+    """Callbacks that exclude each other, unless it is reentrant; `is_busy` while one runs."""
+
+    is_reentrant: bool = False
+    is_busy: bool = False
+
+
+class Entity(Protocol):
+    """Something that an executor executes."""
+
+    @property
+    def handle(self) -> int:
+        """The handle that rclcpp_executor_execute names."""
+
+    @property
+    def group(self) -> CallbackGroup:
+        """Its callback group."""
+
+    def is_ready(self, time: int) -> bool:
+        """Whether there is something to execute."""
+
+
+class Executor:
+    """What the threads of one executor share.
 
     Attributes:
-        timers: of all nodes of the process; likewise `subscriptions`.
+        timers: of its nodes; likewise `subscriptions` and `waitables` (services, clients, buffers).
+        has_events: it emits executor events.
+        has_callbacks: it calls callbacks, which emit events.
+        owner: the thread that looks for something ready, or waits; others are blocked meanwhile.
+        sleeper: the thread that waits.
+        thread_count: threads that spin it.
     """
 
-    def __init__(self, process: RunningProcess, middleware: Middleware) -> None:
-        super().__init__(process, process.pid)
+    def __init__(self, world: World, description: system.Executor, *, is_rclcpp: bool) -> None:
         self.timers: list[TimerObject] = []
         self.subscriptions: list[SubscriptionObject] = []
-        self._middleware = middleware
-        self._ready: deque[TimerObject | SubscriptionObject] = deque()
-        self._state: str | None = None
-        self._state_ns = 0
-        self._sleeping = False
-        self._asleep_since = 0
-        self._wake_at: int | None = None
-        # A resumption that was planned before another one replaced it is recognised by this.
-        self._plan = 0
-
-    def spin(self, time: int) -> None:
-        """Begin to execute at `time`."""
-        self._resume_at(time, self._continue)
+        self.waitables: list[Entity] = []
+        self.has_events = is_rclcpp and description.kind in _HAVING_EVENTS
+        self.has_callbacks = is_rclcpp and description.kind not in _WITHOUT_CALLBACKS
+        self.owner: ExecutorThread | None = None
+        self.sleeper: ExecutorThread | None = None
+        self.thread_count = description.thread_count
+        self._world = world
+        self._ready: deque[Entity] = deque()
+        self._blocked: deque[ExecutorThread] = deque()
 
     def wake(self, time: int) -> None:
         """Something has arrived at `time`: end the wait, if there is one."""
-        if not self._sleeping:
-            return
-        start = max(time, self._asleep_since)
-        wake_at = start + 6 * MICROSECOND + self.world.tail(5 * MICROSECOND)
-        if self._wake_at is None or wake_at < self._wake_at:
-            self._wake_at = wake_at
-            self._resume_at(wake_at, self._wait_ended)
+        if self.sleeper is not None:
+            self.sleeper.wake(time)
 
-    def finish(self) -> None:
-        """Write down the last state, whose end was not seen."""
-        if self._state is not None:
-            self._add_state(None)
+    def block(self, thread: ExecutorThread) -> None:
+        """Let a thread wait until it owns the executor."""
+        self._blocked.append(thread)
 
-    def _resume_at(self, time: int, action: Callable[[int, int], None]) -> None:
-        self._plan += 1
-        self.world.at(time, action, self._plan)
+    def release(self, time: int) -> None:
+        """The owner has what it wanted: the next thread may look."""
+        self.owner = None
+        if self._blocked:
+            self.owner = self._blocked.popleft()
+            self.owner.go_on(time + 1_500 + int(self._world.random() * 4_000))
 
-    def _wait_ended(self, time: int, plan: int) -> None:
-        """The wait is over: see what is ready and execute the first of it."""
-        if plan != self._plan:
-            return
-        if later := self.take_cpu(time):
-            self._resume_at(later, self._wait_ended)
-            return
-        self._sleeping = False
-        self._collect(time)
-        self._enter(_PROCESS, time)
-        if self._ready:
-            self._execute(time)
-            return
-        time += 900 + int(self.world.random() * 3_000)
-        self._enter(_PROCESS, time)
-        self._wait(time)
+    def forget(self, entity: Entity) -> None:
+        """An entity does not exist any more."""
+        for entities in (self.subscriptions, self.waitables, self._ready):
+            if entity in entities:
+                entities.remove(entity)  # type: ignore[arg-type]
 
-    def _continue(self, time: int, plan: int) -> None:
-        """After an execution: go on with what is ready, or wait."""
-        if plan != self._plan:
-            return
-        if later := self.take_cpu(time):
-            self._resume_at(later, self._continue)
-            return
-        self._enter(_PROCESS, time)
-        if self._ready:
-            self._execute(time)
-        else:
-            self._wait(time)
-
-    def _collect(self, time: int) -> None:
+    def collect(self, time: int) -> None:
+        """A wait is over: see what is ready."""
         ready = self._ready
+        ready.clear()
         ready.extend(timer for timer in self.timers if timer.due <= time)
         ready.extend(subscription for subscription in self.subscriptions if subscription.queue)
-        if not ready and self.subscriptions and self.world.random() < _FAILED_TAKE:
+        if self.waitables:
+            ready.extend(entity for entity in self.waitables if entity.is_ready(time))
+        if not ready and self.subscriptions and self._world.random() < _FAILED_TAKE:
             ready.append(self.subscriptions[-1])
 
-    def _wait(self, time: int) -> None:
-        random = self.world.random
-        time += 300 + int(random() * 2_500)
-        self._enter(_WAIT, time)
-        asleep = time + 400
-        self.keep_cpu(asleep)
-        self._sleeping = True
-        self._asleep_since = asleep
-        self._wake_at = None
-        due = min((timer.due for timer in self.timers), default=None)
-        if any(subscription.queue for subscription in self.subscriptions):
+    def pick(self) -> Entity | None:
+        """What to execute next; None if there is nothing, or if its groups are busy."""
+        for position, entity in enumerate(self._ready):
+            group = entity.group
+            if group.is_reentrant or not group.is_busy:
+                del self._ready[position]
+                return entity
+        return None
+
+    def next_wake_up(self, asleep: int) -> int | None:
+        """When a wait that begins at `asleep` ends at the latest, None if it may be for ever."""
+        due = min((timer.due for timer in self.timers if _is_free(timer)), default=None)
+        if any(each.queue and _is_free(each) for each in self.subscriptions) or any(
+            entity.is_ready(asleep) and _is_free(entity) for entity in self.waitables
+        ):
             due = asleep
-        if due is not None:
-            self.wake(due)
-        if random() < _SPURIOUS_WAKE_UP:
-            self.wake(asleep + 15 * MICROSECOND)
+        return due
 
-    def _enter(self, state: str, time: int, handle: int = 0) -> None:
-        """Emit the event that begins a state, and write down the state that it ends."""
-        tracepoints = self.machine.tracepoints
-        if state is _PROCESS:
-            self.emit(tracepoints.rclcpp_executor_get_next_ready, time, self.context)
-        elif state is _WAIT:
-            self.emit(tracepoints.rclcpp_executor_wait_for_work, time, self.context, _NO_TIMEOUT)
-        else:
-            self.emit(tracepoints.rclcpp_executor_execute, time, self.context, handle)
-        now = time + self.machine.epoch
-        if self._state is not None:
-            self._add_state(now)
-        self._state = state
-        self._state_ns = now
 
-    def _add_state(self, end_ns: int | None) -> None:
-        self.world.truth.executor_state.add(
-            self.machine.hostname, self.process.pid, self.tid, self._state_ns, end_ns, self._state
-        )
-
-    def _execute(self, time: int) -> None:
-        entity = self._ready.popleft()
-        time += 800 + int(self.world.random() * 3_500)
-        self._enter(_EXECUTE, time, entity.handle)
-        if isinstance(entity, TimerObject):
-            end = run_timer(self, self._middleware, entity, time)
-        else:
-            end = run_subscription(self, self._middleware, entity, time)
-        end += 400 + int(self.world.random() * 2_000)
-        self.keep_cpu(end)
-        self._resume_at(end, self._continue)
+def _is_free(entity: Entity) -> bool:
+    group = entity.group
+    return group.is_reentrant or not group.is_busy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import TYPE_CHECKING
 
 from msgflow.sim.ctf import thread_context
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from msgflow.sim import system
+    from msgflow.sim.executor_thread import ExecutorThread
     from msgflow.sim.recorder import Recorder
     from msgflow.sim.recording import Recording
     from msgflow.sim.world import World
@@ -32,8 +34,16 @@ class Machine:
         free_at: for each CPU the time from which on it is free.
     """
 
-    def __init__(self, hostname: str, epoch: int, recorder: Recorder, recording: Recording) -> None:
+    def __init__(
+        self,
+        hostname: str,
+        epoch: int,
+        recorder: Recorder,
+        recording: Recording,
+        stamp_resolution: int = 1,
+    ) -> None:
         self.hostname = hostname
+        self._stamp_resolution = stamp_resolution
         self.epoch = epoch
         self.recorder = recorder
         self.layout = recorder.layout
@@ -45,7 +55,8 @@ class Machine:
 
     def stamp_ns(self, time: int) -> int:
         """What the clock that makes source stamps shows at `time` (ns since the epoch)."""
-        return time + self._stamp_epoch + time * self._slew_ppb // 1_000_000_000
+        now = time + self._stamp_epoch + time * self._slew_ppb // 1_000_000_000
+        return now - now % self._stamp_resolution
 
 
 class RunningProcess:
@@ -56,6 +67,9 @@ class RunningProcess:
         machine: where it runs.
         number: its number among all processes.
         memory: its addresses.
+        threads: those that execute callbacks.
+        is_stopped: it has ended, or ends as soon as its threads have executed what they execute.
+        is_stepwise: it may end in the middle of a callback.
     """
 
     def __init__(
@@ -66,6 +80,10 @@ class RunningProcess:
         self.description = description
         self.number = number
         self.pid = description.pid
+        self.is_rclcpp = description.client_library == "rclcpp"
+        self.threads: list[ExecutorThread] = []
+        self.is_stopped = False
+        self.is_stepwise = description.is_killed
         self.memory = AddressSpace(f"{seed}/{description.pid}")
         self._participant = (
             bytes((1, 15))
@@ -86,6 +104,11 @@ class RunningProcess:
         return self._participant + entity + self.memory.garbage(8)
 
 
+# What a thread does, in steps: it yields the time of the next one, or None to wait for a wake-up,
+# and is sent the time at which it goes on; the result is the time at which it has ended.
+Steps = Generator[int | None, int, int]
+
+
 class Thread:
     """A thread: it gets a CPU for a stretch of time and emits events while it has it.
 
@@ -93,6 +116,7 @@ class Thread:
         process: to which it belongs.
         context: its part of each record.
         emit: `emit(tracepoint, time, context, *values)` on the CPU it has.
+        running: identifiers of the callback instances that go on, the innermost last.
     """
 
     def __init__(self, process: RunningProcess, tid: int) -> None:
@@ -103,6 +127,10 @@ class Thread:
         self.context = thread_context(process.pid, tid, process.description.name)
         self.cpu = process.number % len(self.machine.emitters)
         self.emit: Callable[..., None] = self.machine.emitters[self.cpu]
+        self.running: list[int] = []
+        self._steps: Steps | None = None
+        # A step that was planned before another one replaced it is recognised by this.
+        self._plan = 0
 
     def take_cpu(self, time: int) -> int:
         """Get a CPU at `time`: 0, or if none is free the time when one will be.
@@ -126,3 +154,45 @@ class Thread:
         self.machine.free_at[self.cpu] = until
         if until > self.world.end:
             self.world.end = until
+
+    def hold(self, time: int) -> int:
+        """Keep the CPU up to the next step at `time`; returns that, to be yielded."""
+        self.keep_cpu(time + 1)
+        return time
+
+    def begin(self, time: int, steps: Steps) -> None:
+        """Let the thread do something from `time` on."""
+        self._steps = steps
+        self._plan += 1
+        self.world.at(time, self._first_step, self._plan)
+
+    def go_on(self, time: int) -> None:
+        """Plan the next step for `time`, in the place of any other."""
+        self._plan += 1
+        self.world.at(time, self._step, self._plan)
+
+    def cut(self) -> None:
+        """End in the middle of whatever the thread does."""
+        self._plan += 1
+        if self._steps is not None:
+            self._steps.close()
+            self._steps = None
+
+    def _first_step(self, _: int, plan: int) -> None:
+        if plan != self._plan or self._steps is None:
+            return
+        following = next(self._steps)
+        if following is not None:
+            self.go_on(following)
+
+    def _step(self, time: int, plan: int) -> None:
+        if plan != self._plan or self._steps is None:
+            return
+        try:
+            following = self._steps.send(time)
+        except StopIteration:
+            self._steps = None
+            return
+        if following is not None:
+            self._plan += 1
+            self.world.at(following, self._step, self._plan)

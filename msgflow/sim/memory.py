@@ -15,14 +15,21 @@ class AddressSpace:
 
     def __init__(self, seed: str) -> None:
         self._random = Random(seed)
+        self._freed: list[int] = []
         self._heap = 0x5500_0000_0000 + (self._random.getrandbits(36) << 4 & ~0xFFF)
         self._main_stack = 0x7FFC_0000_0000 + (self._random.getrandbits(31) & ~0xF)
         self._thread_stack = 0x7F00_0000_0000 + (self._random.getrandbits(38) & ~0xFFF)
 
     def allocate(self) -> int:
-        """Address of a new object on the heap."""
+        """Address of a new object on the heap; the one that was freed last is used again."""
+        if self._freed:
+            return self._freed.pop()
         self._heap += _ALIGNMENT * self._random.randrange(2, 200)
         return self._heap
+
+    def free(self, address: int) -> None:
+        """An object on the heap exists no more."""
+        self._freed.append(address)
 
     def on_stack(self) -> int:
         """Address of a local variable of the main thread."""

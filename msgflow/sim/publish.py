@@ -14,10 +14,13 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class CallbackInstance:
-    """A run of a callback that is going on; what it publishes is caused by it."""
+    """A run of a callback that is going on; what it publishes is caused by it.
 
-    callback_instance_id: int
-    start_ns: int
+    Without `callback_instance_id`, what is done with a message that was taken without a callback.
+    """
+
+    callback_instance_id: int | None
+    start_ns: int | None
     root: Root | None
     path: tuple[str, ...]
     take_id: int | None
@@ -30,10 +33,12 @@ def publish(
     publisher: PublisherObject,
     time: int,
     instance: CallbackInstance | None,
+    message: Message | None = None,
 ) -> int:
     """Publish one message from `time` on; returns the time at which the call returns.
 
-    Without `instance` it happens outside any callback.
+    Without `instance` it happens outside any callback. `message` is one that has been published
+    to the subscriptions of the process already.
     """
     world = thread.world
     random = world.random
@@ -42,40 +47,46 @@ def publish(
     epoch = machine.epoch
     emit = thread.emit
     context = thread.context
+    if message is None:
+        message = Message(next(world.publication_ids), publisher, thread.tid, instance)
 
-    rclcpp_ns: int | None = None
     rcl = time
     if publisher.is_rclcpp:
         emit(tracepoints.rclcpp_publish, time, context, publisher.handle, publisher.message)
-        rclcpp_ns = time + epoch
+        message.rclcpp_ns = time + epoch
         rcl += 250 + int(random() * 900)
     emit(tracepoints.rcl_publish, rcl, context, publisher.handle, publisher.message)
-    written = write(thread, publisher.rmw_handle, publisher.message, rcl, publisher.size_bytes)
-    rmw, stamp_ns = written.rmw, written.stamp_ns
-    publication_id = next(world.publication_ids)
-    written.add_to_truth(thread, publication_id)
-    topic = publisher.topic
-    hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
-    rcl_ns, rmw_ns = rcl + epoch, rmw + epoch
-    is_internal = publisher.is_internal
-    truth = world.truth
-    truth.publication.add(
-        publication_id, hostname, pid, tid, publisher.node, topic,
-        publisher.init_handle, publisher.rmw_handle, rclcpp_ns, rcl_ns, rmw_ns, stamp_ns,
-        None if instance is None else instance.callback_instance_id, is_internal,
-    )  # fmt: skip
-    root: Root | None = None
-    path: tuple[str, ...] = ()
-    if instance is not None:
-        truth.causal.add(
-            instance.callback_instance_id, publication_id, hostname, pid, tid, "direct",
-            instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
-            rcl_ns, rmw_ns, is_internal,
-        )  # fmt: skip
-        root, path = instance.root, (*instance.path, topic)
-    if publisher.matches:
-        message = Message(
-            publication_id, publisher, tid, rclcpp_ns, rcl_ns, rmw, rmw_ns, stamp_ns, root, path
-        )
-        middleware.send(written.end, message)
+    size_bytes = publisher.description.size_bytes
+    written = write(thread, publisher.rmw_handle, publisher.message, rcl, size_bytes)
+    rmw, message.stamp_ns = written.rmw, written.stamp_ns
+    message.rcl_ns, message.rmw, message.rmw_ns = rcl + epoch, rmw, rmw + epoch
+    written.add_to_truth(thread, message.publication_id)
+    write_publication(thread, publisher, message, instance)
+    middleware.send(written.end, message)
     return written.end + 3_000 + int(random() * 6_000)
+
+
+def write_publication(
+    thread: Thread,
+    publisher: PublisherObject,
+    message: Message,
+    instance: CallbackInstance | None,
+) -> None:
+    """Write down a publication and what has caused it."""
+    hostname, pid, tid = thread.machine.hostname, thread.process.pid, thread.tid
+    truth, topic, is_internal = thread.world.truth, publisher.topic, publisher.is_internal
+    truth.publication.add(
+        message.publication_id, hostname, pid, tid, publisher.node, topic,
+        publisher.init_handle, publisher.rmw_handle, message.rclcpp_ns, message.rcl_ns,
+        message.rmw_ns, message.stamp_ns,
+        None if instance is None else instance.callback_instance_id, is_internal,
+        message.intra_ns,
+    )  # fmt: skip
+    if instance is None:
+        return
+    truth.causal.add(
+        instance.callback_instance_id, message.publication_id, hostname, pid, tid,
+        "take_adjacent" if instance.callback_instance_id is None else "direct",
+        instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
+        message.rcl_ns, message.rmw_ns, is_internal,
+    )  # fmt: skip

@@ -62,5 +62,18 @@ def subscription_callback(node_name: str, message_type: str) -> str:
     )
 
 
+def service_callback(node_name: str) -> str:
+    """Symbol of a service's callback, a bound member function of the node."""
+    node = _class_name(node_name)
+    request, response = (
+        f"std::shared_ptr<std_srvs::srv::Trigger_{part}_<std::allocator<void> > >"
+        for part in ("Request", "Response")
+    )
+    return (
+        f"std::_Bind<void ({node}::*({node}*, std::_Placeholder<1>, std::_Placeholder<2>))"
+        f"({request}, {response})>"
+    )
+
+
 def _class_name(node_name: str) -> str:
     return "".join(part.capitalize() for part in node_name.split("_")) + "Node"

@@ -5,87 +5,98 @@ All durations are nanoseconds. A scenario is immutable; `dataclasses.replace` ma
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 from msgflow.errors import UsageError
+from msgflow.sim.entity import (
+    MICROSECOND,
+    MILLISECOND,
+    SECOND,
+    Call,
+    Client,
+    Publisher,
+    Service,
+    Subscription,
+    Timer,
+    Work,
+)
 from msgflow.sim.recording import PERFECT, Recording
 
-MICROSECOND = 1_000
-MILLISECOND = 1_000_000
-SECOND = 1_000_000_000
+__all__ = [
+    "MICROSECOND",
+    "MILLISECOND",
+    "SECOND",
+    "Executor",
+    "Group",
+    "Host",
+    "Node",
+    "Process",
+    "Publisher",
+    "Scenario",
+    "Subscription",
+    "Timer",
+    "Work",
+]
+
+# Threads of a process are numbered from its id on; the middleware's has the last number.
+_THREADS_PER_PROCESS = 9
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
-    """How long a callback computes: `typical_ns` plus up to `spread_ns`, at times `slow_ns` more.
+class Group:
+    """A callback group of a node.
 
     Attributes:
-        typical_ns: shortest duration.
-        spread_ns: width of the even spread above it.
-        slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
-        slow_ns: greatest additional duration of a slow run; it is at least half of that.
+        name: what entities call it.
+        is_reentrant: its callbacks may run at the same time, also the same one twice.
+        executor: number of the executor that spins it; None: that of the node.
     """
 
-    typical_ns: int = 20 * MICROSECOND
-    spread_ns: int = 30 * MICROSECOND
-    slow_probability: float = 0.0
-    slow_ns: int = 0
+    name: str
+    is_reentrant: bool = False
+    executor: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Publisher:
-    """A publisher of a node: topic (fully expanded), history depth, size of its messages."""
-
-    topic: str
-    depth: int = 10
-    size_bytes: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Subscription:
-    """A subscription of a node and what its callback does.
+class Executor:
+    """An executor of a process.
 
     Attributes:
-        topic: topic, fully expanded.
-        publishes: topics that each run of the callback publishes on, in this order.
-        work: how long the callback computes.
-        depth: history depth (keep last).
-        message_type: C++ name of the message, part of the callback's symbol.
-        logs: each run of the callback logs once, which publishes on /rosout.
+        kind: 'single_threaded', 'multi_threaded', 'static_single_threaded' (without executor
+            events), 'wait_set' (user code that waits and takes by itself: neither executor events
+            nor callbacks), 'nested' (nobody spins it but callbacks that wait for something).
+        thread_count: its threads; the first one of the first executor is the main thread.
     """
 
-    topic: str
-    publishes: tuple[str, ...] = ()
-    work: Work = Work()
-    depth: int = 10
-    message_type: str = "std_msgs::msg::String"
-    logs: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Timer:
-    """A timer of a node and what its callback does; see `Subscription`."""
-
-    period_ns: int
-    publishes: tuple[str, ...] = ()
-    work: Work = Work()
-    logs: bool = False
-
-    def __post_init__(self) -> None:
-        if self.period_ns <= 0:
-            raise UsageError(f"the period of a timer must be positive — {self.period_ns} ns")
+    kind: str = "single_threaded"
+    thread_count: int = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A node: its objects are created in the order publishers, subscriptions, timers."""
+    """A node: its objects are created in the order publishers, subscriptions, timers.
+
+    Attributes:
+        name: name without namespace.
+        namespace: its namespace.
+        publishers: its publishers; likewise subscriptions, timers, services, clients.
+        groups: its callback groups besides the default one.
+        executor: number of the executor that spins it.
+        has_parameters: parameter services and events, which helper nodes do without.
+        is_managed: it has a lifecycle (`Transition`).
+    """
 
     name: str
     namespace: str = "/"
     publishers: tuple[Publisher, ...] = ()
     subscriptions: tuple[Subscription, ...] = ()
     timers: tuple[Timer, ...] = ()
+    services: tuple[Service, ...] = ()
+    clients: tuple[Client, ...] = ()
+    groups: tuple[Group, ...] = ()
+    executor: int = 0
+    has_parameters: bool = True
+    is_managed: bool = False
 
     @property
     def full_name(self) -> str:
@@ -95,15 +106,20 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """A process: its nodes are spun by one single-threaded executor in the main thread.
+    """A process: executors spin its nodes, by default a single-threaded one in the main thread.
 
     Attributes:
         name: name of the executable; the trace shows its first 15 characters.
         hostname: the host it runs on.
-        pid: process id, also the id of the main thread; at least 10 apart on one host, since
-            the middleware's thread has the id `pid + 9`.
+        pid: process id, also the id of the main thread; at least 10 apart on one host for
+            processes that run at the same time, since threads have the ids up to `pid + 9`.
         nodes: created in this order.
         start_ns: when it starts, after the begin of tracing.
+        executors: its executors.
+        stop_ns: when it ends; None: after the end of tracing. A process that ends frees its id,
+            so that another life of it may follow, at the same addresses.
+        is_killed: it ends at once, in the middle of whatever it does.
+        client_library: 'rclcpp' or 'rclpy', which has no events of its own.
     """
 
     name: str
@@ -111,15 +127,28 @@ class Process:
     pid: int
     nodes: tuple[Node, ...]
     start_ns: int = 0
+    executors: tuple[Executor, ...] = (Executor(),)
+    stop_ns: int | None = None
+    is_killed: bool = False
+    client_library: str = "rclcpp"
 
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """A machine with a boot and a clock of its own, `clock_offset_ns` ahead of the true time."""
+    """A machine with a boot and a clock of its own, `clock_offset_ns` ahead of the true time.
+
+    Attributes:
+        hostname: its name.
+        cpu_count: how many threads run at the same time.
+        clock_offset_ns: how far ahead its clock is.
+        stamp_resolution_ns: what source stamps are a multiple of: a coarse clock gives messages
+            that follow each other closely the same stamp.
+    """
 
     hostname: str
     cpu_count: int = 4
     clock_offset_ns: int = 0
+    stamp_resolution_ns: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,18 +187,51 @@ class Scenario:
                 raise UsageError(f"unknown host {process.hostname} — process {process.name}")
             for node in process.nodes:
                 _check_topics(node)
-        threads = Counter(
-            (process.hostname, thread)
-            for process in self.processes
-            for thread in (process.pid, process.pid + 9)
-        )
-        if any(count > 1 for count in threads.values()):
-            raise UsageError(f"process ids are too close on one host — scenario {self.name}")
+            _check_executors(process)
+        _check_ids(self)
+
+
+def _check_ids(scenario: Scenario) -> None:
+    """No thread has an id that another one has at the same time."""
+    latest: dict[tuple[str, int], int | None] = {}
+    for process in sorted(scenario.processes, key=lambda each: each.start_ns):
+        for tid in range(process.pid, process.pid + _THREADS_PER_PROCESS + 1):
+            key = (process.hostname, tid)
+            if key in latest:
+                end = latest[key]
+                if end is None or end >= process.start_ns:
+                    raise UsageError(
+                        f"process ids are too close on one host — scenario {scenario.name}"
+                    )
+            latest[key] = process.stop_ns
+
+
+def _check_executors(process: Process) -> None:
+    count = len(process.executors)
+    used = {node.executor for node in process.nodes}
+    used |= {group.executor or 0 for node in process.nodes for group in node.groups}
+    if bad := sorted(number for number in used if not 0 <= number < count):
+        raise UsageError(f"no executor {bad[0]} — process {process.name}")
+    threads = sum(each.thread_count for each in process.executors if each.kind != "nested")
+    if not 1 <= threads < _THREADS_PER_PROCESS:
+        raise UsageError(f"a process has 1 to 8 threads of executors — process {process.name}")
 
 
 def _check_topics(node: Node) -> None:
     own = {publisher.topic for publisher in node.publishers}
-    callbacks: tuple[Subscription | Timer, ...] = (*node.subscriptions, *node.timers)
-    used = {topic for callback in callbacks for topic in callback.publishes}
+    callbacks: tuple[Subscription | Timer | Service, ...] = (
+        *node.subscriptions,
+        *node.timers,
+        *node.services,
+    )
+    used = {topic for callback in (*callbacks, *node.clients) for topic in callback.publishes}
     if missing := sorted(used - own):
         raise UsageError(f"no publisher of {', '.join(missing)} — node {node.full_name}")
+    clients = {client.service for client in node.clients}
+    actions = (action for callback in callbacks for action in callback.does)
+    calls = {action.service for action in actions if isinstance(action, Call)}
+    if missing := sorted(calls - clients):
+        raise UsageError(f"no client of {', '.join(missing)} — node {node.full_name}")
+    groups = {"", *(group.name for group in node.groups)}
+    if missing := sorted({each.group for each in (*callbacks, *node.clients)} - groups):
+        raise UsageError(f"no callback group {missing[0]} — node {node.full_name}")

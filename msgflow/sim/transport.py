@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from dataclasses import dataclass
+from collections import Counter, defaultdict, deque
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from msgflow.sim.system import MICROSECOND, MILLISECOND
+from msgflow.sim.entity import MICROSECOND, MILLISECOND
 
 if TYPE_CHECKING:
-    from msgflow.sim.executor import ExecutorThread
-    from msgflow.sim.machine import RunningProcess
-    from msgflow.sim.system import Subscription
+    from collections.abc import Callable, Iterator
+
+    from msgflow.sim.entity import Publisher, Subscription, Work
+    from msgflow.sim.executor import CallbackGroup, Executor
+    from msgflow.sim.intra import IntraBuffer, RingBuffer
+    from msgflow.sim.machine import RunningProcess, Steps
+    from msgflow.sim.publish import CallbackInstance
     from msgflow.sim.world import World
 
 
@@ -27,23 +31,90 @@ class Root:
     start_ns: int
 
 
-@dataclass(slots=True)
 class Message:
-    """One publication, on its way. Names in `_ns` are stamps of the publisher's host."""
+    """One publication, on its way. Names in `_ns` are stamps of the publisher's host.
 
-    publication_id: int
-    publisher: PublisherObject
-    tid: int
-    rclcpp_ns: int | None
-    rcl_ns: int
-    rmw: int
-    rmw_ns: int
-    stamp_ns: int
-    root: Root | None
-    path: tuple[str, ...]
+    Attributes:
+        root: where its flow began, if in a timer; `path` are the topics since then.
+        rmw: time of rmw_publish; `intra` that of rclcpp_intra_publish.
+    """
+
+    __slots__ = (
+        "intra", "intra_ns", "path", "publication_id", "publisher", "rcl_ns", "rclcpp_ns", "rmw",
+        "rmw_ns", "root", "stamp_ns", "tid",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        publication_id: int,
+        publisher: PublisherObject,
+        tid: int,
+        instance: CallbackInstance | None,
+        *,
+        intra: int | None = None,
+        intra_ns: int | None = None,
+    ) -> None:
+        self.publication_id = publication_id
+        self.publisher = publisher
+        self.tid = tid
+        self.root: Root | None = None
+        self.path: tuple[str, ...] = ()
+        if instance is not None:
+            self.root, self.path = instance.root, (*instance.path, publisher.topic)
+        self.intra = intra
+        self.intra_ns = intra_ns
+        self.rclcpp_ns: int | None = None
+        self.rcl_ns: int | None = None
+        self.rmw: int | None = None
+        self.rmw_ns: int | None = None
+        self.stamp_ns: int | None = None
+
+    @property
+    def time(self) -> int:
+        """When it was published."""
+        time = self.rmw if self.intra is None else self.intra
+        assert time is not None
+        return time
+
+    def is_copy_for(self, subscription: SubscriptionObject) -> bool:
+        """Whether the subscription gets it through a buffer in the process as well."""
+        return (
+            self.intra is not None
+            and subscription.intra is not None
+            and subscription.process is self.publisher.process
+        )
 
 
 @dataclass(slots=True)
+class UserCode:
+    """What a callback does.
+
+    Attributes:
+        work: how long it computes.
+        publishers: where it publishes, in this order.
+        log: the publisher of /rosout, if it logs.
+        deeds: what it does then, each `deed(thread, middleware, time, instance)`.
+        is_stepwise: other threads must be able to act between its publications.
+        is_callback: it runs in a callback that is traced.
+    """
+
+    work: Work
+    publishers: tuple[PublisherObject, ...]
+    log: PublisherObject | None
+    deeds: tuple[Callable[..., Steps], ...] = ()
+    is_stepwise: bool = False
+    is_callback: bool = True
+
+
+@dataclass(slots=True)
+class IntraProcess:
+    """The intra-process side of a publisher: whom it reaches; `kept` for those that come late."""
+
+    targets: list[IntraBuffer]
+    kept: RingBuffer | None
+
+
+@dataclass(slots=True, eq=False)
 class PublisherObject:
     """A publisher as it exists in its process.
 
@@ -52,7 +123,8 @@ class PublisherObject:
         handle: the handle that rcl_publish names.
         is_rclcpp: publishing passes through rclcpp (not for /rosout).
         matches: one per subscription of the topic.
-        size_bytes: size of its messages, of which the duration of writing depends.
+        history: what is kept for subscriptions that come late (transient local).
+        sent: everything so far, while further subscriptions of the topic are still to come.
     """
 
     process: RunningProcess
@@ -66,36 +138,55 @@ class PublisherObject:
     is_internal: bool
     created: int
     matches: list[Match]
-    size_bytes: int = 0
+    description: Publisher
+    intra: IntraProcess | None = None
+    history: deque[Message] | None = None
+    sent: list[Message] = field(default_factory=list)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class SubscriptionObject:
-    """A subscription as it exists in its process, with the queue of its reader."""
+    """A subscription as it exists in its process, with the queue of its reader; `ended` or not."""
 
     process: RunningProcess
-    thread: ExecutorThread
+    executor: Executor
+    group: CallbackGroup
     description: Subscription
     node: str
     handle: int
     rmw_handle: int
     callback: int
     message: int
-    publishers: tuple[PublisherObject, ...]
-    log: PublisherObject | None
+    code: UserCode
+    is_rclcpp: bool
     is_internal: bool
     is_sink: bool
     created: int
-    queue: deque[Message]
+    queue: deque[Message] = field(default_factory=deque)
+    addresses: tuple[int, ...] = ()
+    intra: IntraBuffer | None = None
+    ended: int | None = None
+
+    def is_ready(self, time: int) -> bool:
+        """Whether a message is there."""
+        return bool(self.queue)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Match:
-    """A publisher and a subscription that know each other from `since` on."""
+    """A publisher and a subscription that know each other from `since` on.
+
+    Attributes:
+        is_intra: they are in one process and pass messages there.
+        missed: what was published before and may still be delivered (transient local).
+    """
 
     subscription: SubscriptionObject
     since: int
     latency: Latency
+    is_intra: bool
+    loss: float
+    missed: list[Message] | None = None
     last_arrival: int = 0
 
 
@@ -125,7 +216,7 @@ class Middleware:
     """Carries messages from publishers to the queues of the subscriptions that are matched.
 
     Messages of one publisher arrive in order at each subscription. What was published before the
-    two had discovered each other is not delivered (durability volatile).
+    two had discovered each other is not delivered, unless both are transient local.
 
     Attributes:
         full_queues: how often a message arrived at a queue that held as many as its depth says.
@@ -133,9 +224,17 @@ class Middleware:
         undelivered: how many messages were not delivered to a subscription, by reason.
     """
 
-    def __init__(self, world: World, *, overwrites: bool) -> None:
+    def __init__(self, world: World, *, overwrites: bool, expected: Counter[str]) -> None:
+        """Begin without any objects.
+
+        Args:
+            world: where it is.
+            overwrites: a full queue drops its oldest message.
+            expected: subscriptions that there will be, by topic.
+        """
         self._world = world
         self._overwrites = overwrites
+        self._expected = expected
         self.full_queues = 0
         self.failed_takes = 0
         self.undelivered: dict[str, int] = {}
@@ -145,6 +244,8 @@ class Middleware:
     def add_publisher(self, publisher: PublisherObject) -> None:
         """A publisher was created: match it with the subscriptions there are."""
         self._publishers[publisher.topic].append(publisher)
+        if publisher.description.transient_local:
+            publisher.history = deque(maxlen=publisher.description.depth)
         for subscription in self._subscriptions[publisher.topic]:
             self._match(publisher, subscription)
 
@@ -152,50 +253,127 @@ class Middleware:
         """A subscription was created: match it with the publishers there are."""
         topic = subscription.description.topic
         self._subscriptions[topic].append(subscription)
+        self._expected[topic] -= 1
         for publisher in self._publishers[topic]:
             self._match(publisher, subscription)
 
+    def end_subscription(self, subscription: SubscriptionObject, time: int) -> None:
+        """A subscription is destroyed: what waits for it is lost."""
+        subscription.ended = time
+        while subscription.queue:
+            self.drop(subscription.queue.popleft(), subscription, "subscription_ended")
+        if subscription.intra is not None:
+            ring = subscription.intra.ring.messages
+            while ring:
+                self._drop(ring.popleft(), subscription, "subscription_ended")
+            for publisher in self._publishers[subscription.description.topic]:
+                if publisher.intra is not None and subscription.intra in publisher.intra.targets:
+                    publisher.intra.targets.remove(subscription.intra)
+
+    def kept_in(self, process: RunningProcess, topic: str) -> Iterator[RingBuffer]:
+        """What publishers of a process keep for subscriptions in it that come late."""
+        for publisher in self._publishers[topic]:
+            intra = publisher.intra
+            if publisher.process is process and intra is not None and intra.kept is not None:
+                yield intra.kept
+
+    def end_process(self, process: RunningProcess, time: int) -> None:
+        """All subscriptions of a process end, and nothing is kept by its publishers."""
+        for subscriptions in self._subscriptions.values():
+            for subscription in subscriptions:
+                if subscription.process is process and subscription.ended is None:
+                    self.end_subscription(subscription, time)
+        for publishers in self._publishers.values():
+            for publisher in publishers:
+                if publisher.process is process:
+                    publisher.history = None
+
     def send(self, time: int, message: Message) -> None:
         """Send a message at `time` to whom the publisher knows."""
-        world = self._world
-        for match in message.publisher.matches:
-            if match.since > time:
-                self._undelivered(message, match.subscription, "before_discovery")
+        world, publisher = self._world, message.publisher
+        self.remember(message)
+        if publisher.history is not None:
+            publisher.history.append(message)
+        for match in publisher.matches:
+            if match.subscription.ended is not None or match.since > time:
+                self.miss(message, match, time)
                 continue
-            latency = match.latency
-            arrival = time + latency.base + world.tail(latency.tail)
-            if arrival <= match.last_arrival:
-                arrival = match.last_arrival + 1
-            match.last_arrival = arrival
-            world.at(arrival, self.arrive, (match.subscription, message))
+            if match.loss and world.random() < match.loss:
+                self.drop(message, match.subscription, "lost_in_transport")
+                continue
+            self._deliver(time, message, match)
+
+    def remember(self, message: Message) -> None:
+        """Keep a message as long as there are subscriptions to come that have missed it."""
+        publisher = message.publisher
+        if self._expected[publisher.topic] and not publisher.is_internal:
+            publisher.sent.append(message)
+
+    def miss(self, message: Message, match: Match, time: int) -> None:
+        """A message was published at `time` for somebody who does not listen then."""
+        subscription = match.subscription
+        if subscription.ended is not None:
+            self.drop(message, subscription, "subscription_ended")
+        elif match.missed is not None and match.since > time:
+            match.missed.append(message)
+        else:
+            self.drop(message, subscription, _early(message, subscription))
 
     def arrive(self, time: int, delivery: tuple[SubscriptionObject, Message]) -> None:
         """Put a message into the queue of a subscription and wake the executor."""
         subscription, message = delivery
+        if subscription.ended is not None:
+            self.drop(message, subscription, "subscription_ended")
+            return
         queue = subscription.queue
         if len(queue) >= subscription.description.depth:
             self.full_queues += 1
             if self._overwrites:
-                self._undelivered(queue.popleft(), subscription, "overwritten")
+                self.drop(queue.popleft(), subscription, "overwritten")
         queue.append(message)
-        subscription.thread.wake(time)
+        subscription.executor.wake(time)
+
+    def next_message(self, subscription: SubscriptionObject, time: int) -> Message | None:
+        """Take the oldest message that may still be taken at `time`."""
+        queue = subscription.queue
+        expired = []
+        found = None
+        while queue and found is None:
+            message = queue.popleft()
+            lifespan = message.publisher.description.lifespan_ns
+            if lifespan is None or time <= message.time + lifespan:
+                found = message
+            else:
+                expired.append(message)
+        for message in expired:
+            self.drop(message, subscription, "take_failed" if found is None else "expired")
+        return found
 
     def finish(self) -> None:
         """Write down what was on its way or waiting at the end."""
         for subscription, message in self._world.left(self.arrive):
-            self._undelivered(message, subscription, "pending_at_end")
+            self.drop(
+                message,
+                subscription,
+                "pending_at_end" if subscription.ended is None else "subscription_ended",
+            )
         for subscriptions in self._subscriptions.values():
             for subscription in subscriptions:
                 for message in subscription.queue:
-                    self._undelivered(message, subscription, "pending_at_end")
+                    self.drop(message, subscription, "pending_at_end")
+                if subscription.intra is not None:
+                    for message in subscription.intra.ring.messages:
+                        self._drop(message, subscription, "pending_at_end")
+        for match in self._world.left(self._replay):
+            for message in match.missed:
+                self.drop(message, match.subscription, "pending_at_end")
 
-    def _match(self, publisher: PublisherObject, subscription: SubscriptionObject) -> None:
-        latency = latency_between(publisher.process, subscription.process)
-        since = max(publisher.created, subscription.created) + latency.discovery
-        since += int(self._world.random() * latency.discovery_spread)
-        publisher.matches.append(Match(subscription, since, latency))
+    def drop(self, message: Message, target: SubscriptionObject, reason: str) -> None:
+        """A message does not reach a subscription; a copy of one that reaches it does not count."""
+        if not message.is_copy_for(target):
+            self._drop(message, target, reason)
 
-    def _undelivered(self, message: Message, target: SubscriptionObject, reason: str) -> None:
+    def _drop(self, message: Message, target: SubscriptionObject, reason: str) -> None:
         publisher = message.publisher
         self.undelivered[reason] = self.undelivered.get(reason, 0) + 1
         self._world.truth.undelivered.add(
@@ -212,3 +390,57 @@ class Middleware:
             reason,
             publisher.is_internal,
         )
+
+    def _deliver(self, time: int, message: Message, match: Match) -> None:
+        latency = match.latency
+        arrival = time + latency.base + self._world.tail(latency.tail)
+        if arrival <= match.last_arrival:
+            arrival = match.last_arrival + 1
+        match.last_arrival = arrival
+        self._world.at(arrival, self.arrive, (match.subscription, message))
+
+    def _match(self, publisher: PublisherObject, subscription: SubscriptionObject) -> None:
+        latency = latency_between(publisher.process, subscription.process)
+        since = max(publisher.created, subscription.created) + latency.discovery
+        since += int(self._world.random() * latency.discovery_spread)
+        since += subscription.description.discovery_ns
+        buffer, intra = subscription.intra, publisher.intra
+        is_intra = (
+            buffer is not None and intra is not None and publisher.process is subscription.process
+        )
+        match = Match(subscription, since, latency, is_intra, subscription.description.loss)
+        publisher.matches.append(match)
+        if buffer is not None and intra is not None and is_intra and subscription.ended is None:
+            intra.targets.append(buffer)
+            kept = intra.kept.messages if intra.kept is not None else ()
+            for message in publisher.sent:
+                if message not in kept:
+                    self._drop(message, subscription, "before_subscription")
+        keeps = publisher.history is not None and subscription.description.transient_local
+        if keeps and subscription.ended is None:
+            match.missed = list(publisher.sent)
+            self._world.at(since, self._replay, match)
+        else:
+            for message in publisher.sent:
+                self.drop(message, subscription, "before_subscription")
+        if not self._expected[publisher.topic]:
+            publisher.sent.clear()
+
+    def _replay(self, time: int, match: Match) -> None:
+        """The two have discovered each other: deliver what the publisher has kept."""
+        missed = match.missed or []
+        match.missed = None
+        subscription = match.subscription
+        for message in missed:
+            kept = message.publisher.history
+            if subscription.ended is not None:
+                self.drop(message, subscription, "subscription_ended")
+            elif kept is not None and message in kept:
+                self._deliver(time, message, match)
+            else:
+                self.drop(message, subscription, _early(message, subscription))
+
+
+def _early(message: Message, subscription: SubscriptionObject) -> str:
+    before = message.time < subscription.created
+    return "before_subscription" if before else "before_discovery"

@@ -23,22 +23,25 @@ def _schema(**types: pa.DataType) -> pa.Schema:
 
 _ID, _TIME, _COUNT = pa.int64(), pa.int64(), pa.int64()
 _TEXT, _NUMBER, _HANDLE, _FLAG = pa.string(), pa.int32(), pa.uint64(), pa.bool_()
+_GID = pa.binary(16)
 
 _SCHEMAS: Mapping[str, pa.Schema] = {
     "publication": _schema(
         publication_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, topic_name=_TEXT,
         publisher_handle=_HANDLE, rmw_publisher_handle=_HANDLE, rclcpp_ns=_TIME, rcl_ns=_TIME,
         rmw_ns=_TIME, source_timestamp_ns=_TIME, callback_instance_id=_ID, is_internal=_FLAG,
+        intra_ns=_TIME,
     ),
     "take": _schema(
         take_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, topic_name=_TEXT,
         subscription_handle=_HANDLE, rmw_ns=_TIME, rcl_ns=_TIME, rclcpp_ns=_TIME,
         source_timestamp_ns=_TIME, publication_id=_ID, callback_instance_id=_ID,
-        is_internal=_FLAG,
+        is_internal=_FLAG, method=_TEXT, dequeue_ns=_TIME,
     ),
     "callback_instance": _schema(
         callback_instance_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, kind=_TEXT,
         callback_handle=_HANDLE, start_ns=_TIME, end_ns=_TIME, take_id=_ID,
+        is_intra_process=_FLAG, parent_id=_ID,
     ),
     "transport": _schema(
         publication_id=_ID, take_id=_ID, topic_name=_TEXT,
@@ -47,7 +50,8 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         source_timestamp_ns=_TIME,
         take_host=_TEXT, take_pid=_NUMBER, take_tid=_NUMBER,
         take_rmw_ns=_TIME, take_rcl_ns=_TIME, take_rclcpp_ns=_TIME,
-        latency_ns=_COUNT, is_internal=_FLAG,
+        latency_ns=_COUNT, is_internal=_FLAG, method=_TEXT, publication_intra_ns=_TIME,
+        take_dequeue_ns=_TIME, is_replay=_FLAG,
     ),
     "undelivered": _schema(
         publication_id=_ID, topic_name=_TEXT,
@@ -69,6 +73,23 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     ),
     "executor_state": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, start_ns=_TIME, end_ns=_TIME, state=_TEXT
+    ),
+    "request": _schema(
+        request_id=_ID, service_name=_TEXT, client_gid=_GID, sequence_number=_COUNT,
+        client_host=_TEXT, client_pid=_NUMBER, client_tid=_NUMBER, client_node=_TEXT,
+        client_handle=_HANDLE, sent_ns=_TIME, sender_callback_instance_id=_ID,
+        service_host=_TEXT, service_pid=_NUMBER, service_tid=_NUMBER, service_node=_TEXT,
+        service_handle=_HANDLE, taken_ns=_TIME, callback_instance_id=_ID,
+    ),
+    "response": _schema(
+        request_id=_ID, service_name=_TEXT, client_gid=_GID, sequence_number=_COUNT,
+        source_timestamp_ns=_TIME,
+        service_host=_TEXT, service_pid=_NUMBER, service_tid=_NUMBER, sent_ns=_TIME,
+        client_host=_TEXT, client_pid=_NUMBER, client_tid=_NUMBER, taken_ns=_TIME,
+    ),
+    "lifecycle_transition": _schema(
+        host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, at_ns=_TIME, start_state=_TEXT,
+        goal_state=_TEXT,
     ),
     "trace": _schema(host=_TEXT, pid=_NUMBER, path=_TEXT, clock_error_ns=_COUNT),
     "dds_event": _schema(
@@ -132,6 +153,9 @@ class Truth:
         self.causal = self.tables["causal"]
         self.end_to_end = self.tables["end_to_end"]
         self.executor_state = self.tables["executor_state"]
+        self.request = self.tables["request"]
+        self.response = self.tables["response"]
+        self.lifecycle_transition = self.tables["lifecycle_transition"]
         self.trace = self.tables["trace"]
         self.dds_event = self.tables["dds_event"]
         self.declared = self.tables["declared"]

@@ -1,0 +1,140 @@
+"""What callbacks do besides publishing: call services, spin, take by themselves, change state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
+
+from msgflow.sim.entity import Call, Poll, Spin, Transition
+from msgflow.sim.services import ClientObject, call
+from msgflow.sim.take import take
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from msgflow.sim.entity import Action
+    from msgflow.sim.executor import Executor
+    from msgflow.sim.executor_thread import ExecutorThread
+    from msgflow.sim.machine import Steps
+    from msgflow.sim.publish import CallbackInstance
+    from msgflow.sim.transport import Middleware, SubscriptionObject
+
+_LONGEST_WAIT_NS = 1_000_000_000
+_TRANSITIONS = {
+    "unconfigured": ("configuring", "inactive"),
+    "inactive": ("activating", "active"),
+    "active": ("deactivating", "inactive"),
+}
+
+
+@dataclass(slots=True)
+class Lifecycle:
+    """The state machine of a managed node."""
+
+    node: str
+    handle: int
+    state: str = "unconfigured"
+
+
+@dataclass(slots=True)
+class NodeObjects:
+    """What actions of the callbacks of a node refer to."""
+
+    executors: Sequence[Executor]
+    clients: dict[str, ClientObject] = field(default_factory=dict)
+    polled: dict[str, SubscriptionObject] = field(default_factory=dict)
+    lifecycle: Lifecycle | None = None
+
+
+def deeds(actions: Sequence[Action], objects: NodeObjects) -> tuple[Callable[..., Steps], ...]:
+    """Actions as `deed(thread, middleware, time, instance)`."""
+    return tuple(partial(_DEEDS[type(action)], action, objects) for action in actions)
+
+
+def _call(
+    action: Call,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    _: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    client = objects.clients[action.service]
+    time = call(thread, client, time, instance)
+    if action.spins is None:
+        return time
+    number = client.sequence_number
+    return (
+        yield from thread.spin(
+            objects.executors[action.spins],
+            time,
+            time + _LONGEST_WAIT_NS,
+            lambda: client.answered >= number,
+        )
+    )
+
+
+def _spin(
+    action: Spin,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    _: Middleware,
+    time: int,
+    __: CallbackInstance | None,
+) -> Steps:
+    if len(thread.running) > action.depth:
+        return time
+    return (
+        yield from thread.spin(objects.executors[action.executor], time, time + action.duration_ns)
+    )
+
+
+def _poll(
+    action: Poll,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    middleware: Middleware,
+    time: int,
+    _: CallbackInstance | None,
+) -> Steps:
+    subscription = objects.polled[action.topic]
+    taken, time = take(thread, middleware, subscription, time)
+    if taken is not None:
+        taken.write(thread, subscription, None)
+    return time + 500
+    yield  # It takes no step, but is called as one that does.
+
+
+def _transition(
+    _: Transition,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    __: Middleware,
+    time: int,
+    ___: CallbackInstance | None,
+) -> Steps:
+    lifecycle = objects.lifecycle
+    assert lifecycle is not None
+    machine = thread.machine
+    for state in _TRANSITIONS[lifecycle.state]:
+        time += 4_000 + int(thread.world.random() * 20_000)
+        thread.emit(
+            machine.tracepoints.rcl_lifecycle_transition, time, thread.context,
+            lifecycle.handle, lifecycle.state, state,
+        )  # fmt: skip
+        thread.world.truth.lifecycle_transition.add(
+            machine.hostname, thread.process.pid, thread.tid, lifecycle.node,
+            time + machine.epoch, lifecycle.state, state,
+        )  # fmt: skip
+        lifecycle.state = state
+    return time + 1_000
+    yield  # It takes no step, but is called as one that does.
+
+
+_DEEDS: Mapping[type, Callable[..., Steps]] = {
+    Call: _call,
+    Spin: _spin,
+    Poll: _poll,
+    Transition: _transition,
+}

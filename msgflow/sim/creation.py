@@ -1,0 +1,337 @@
+"""Objects of a process come into being: the events of their initialisation, in order.
+
+What DDS and the middleware layer do for each is in `Creator` too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from msgflow.sim import entity, symbols
+from msgflow.sim.actions import Lifecycle, NodeObjects, deeds
+from msgflow.sim.callbacks import TimerObject
+from msgflow.sim.entity import MICROSECOND
+from msgflow.sim.executor import CallbackGroup, Executor
+from msgflow.sim.intra import IntraBuffer, RingBuffer, put
+from msgflow.sim.services import ClientObject, ServiceNetwork, ServiceObject
+from msgflow.sim.transport import (
+    IntraProcess,
+    Middleware,
+    PublisherObject,
+    SubscriptionObject,
+    UserCode,
+)
+from msgflow.sim.write import entity_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from msgflow.sim import system
+    from msgflow.sim.discovery import Discovery
+    from msgflow.sim.machine import Thread
+
+ROSOUT = "/rosout"
+PARAMETER_EVENTS = "/parameter_events"
+INTERNAL_TOPICS = frozenset({ROSOUT, PARAMETER_EVENTS})
+_WRITER, _READER = 3, 4
+
+
+@dataclass(slots=True)
+class NodeContext:
+    """A node that exists: what its other objects are created with."""
+
+    description: system.Node
+    handle: int
+    groups: Mapping[str, tuple[CallbackGroup, Executor]]
+    objects: NodeObjects
+    publishers: dict[str, PublisherObject] = field(default_factory=dict)
+    rosout: PublisherObject | None = None
+
+    @classmethod
+    def of(cls, node: system.Node, handle: int, executors: Sequence[Executor]) -> NodeContext:
+        """A node without objects."""
+        groups = {"": (CallbackGroup(), executors[node.executor])}
+        for group in node.groups:
+            number = node.executor if group.executor is None else group.executor
+            groups[group.name] = (CallbackGroup(group.is_reentrant), executors[number])
+        return cls(node, handle, groups, NodeObjects(executors))
+
+
+class Creator:
+    """Creates objects of a process on one of its threads; `time` is how far it has come."""
+
+    def __init__(
+        self, thread: Thread, middleware: Middleware, discovery: Discovery, network: ServiceNetwork
+    ) -> None:
+        self.time = 0
+        self.thread = thread
+        self.middleware = middleware
+        self._discovery = discovery
+        self._network = network
+        self._process = thread.process
+        self._memory = thread.process.memory
+        self._tracepoints = thread.machine.tracepoints
+        self._announcer = self._memory.allocate()
+        self._announcement = self._memory.on_stack()
+        # DDS has writers of its own, which tell others what there is.
+        self._discovery_writers = tuple(self._memory.allocate() for _ in range(3))
+
+    def on(self, thread: Thread) -> Creator:
+        """One that creates objects of the same process on another thread."""
+        other = object.__new__(Creator)
+        other.__dict__.update(self.__dict__)
+        other.thread = thread
+        return other
+
+    def emit(self, name: str, *values: object) -> None:
+        """Emit an event a little later than the one before."""
+        thread = self.thread
+        self.time += 300 + int(thread.world.random() * 1_500)
+        thread.emit(getattr(self._tracepoints, name), self.time, thread.context, *values)
+
+    def _emit_of_rclcpp(self, name: str, *values: object) -> None:
+        if self._process.is_rclcpp:
+            self.emit(name, *values)
+
+    def work(self, duration: int) -> None:
+        """Let time pass."""
+        self.time += duration // 2 + int(self.thread.world.random() * duration)
+
+    def announce(self) -> None:
+        """Tell other processes what there is."""
+        self.time = self._discovery.announce(
+            self.thread, self._announcer, self._announcement, self.time + 500
+        )
+
+    def discovery(self, rmw_handle: int) -> None:
+        """The middleware's own publisher and its subscription of this handle."""
+        self._writer(self._announcer, "ros_discovery_info")
+        self._reader(rmw_handle, "ros_discovery_info")
+
+    def publisher(
+        self, node: NodeContext, description: entity.Publisher, *, is_rclcpp: bool = True
+    ) -> PublisherObject:
+        """A publisher; those that are not of rclcpp have a handle that is copied later."""
+        self.work(250 * MICROSECOND)
+        self.announce()
+        memory, topic = self._memory, description.topic
+        address: Callable[[], int] = memory.allocate if is_rclcpp else memory.on_stack
+        rmw_handle, init_handle = memory.allocate(), address()
+        self._writer(rmw_handle, f"rt{topic}")
+        self.emit(
+            "rcl_publisher_init", init_handle, node.handle, rmw_handle, topic, description.depth
+        )
+        handle = init_handle
+        while not is_rclcpp and handle == init_handle:
+            handle = memory.on_stack()
+        intra = None
+        if description.intra_process:
+            intra = IntraProcess([], None)
+            if description.transient_local:
+                intra.kept = RingBuffer(memory.allocate(), description.depth)
+                self.emit("rclcpp_construct_ring_buffer", intra.kept.handle, description.depth)
+                self.emit("rclcpp_buffer_to_ipb", intra.kept.handle, memory.allocate())
+        publisher = PublisherObject(
+            self._process, node.description.full_name, topic, init_handle, handle, rmw_handle,
+            memory.on_stack(),
+            is_rclcpp and self._process.is_rclcpp and description.kind != "serialized",
+            topic in INTERNAL_TOPICS, self.time, [], description, intra,
+        )  # fmt: skip
+        self.middleware.add_publisher(publisher)
+        return publisher
+
+    def subscription(
+        self, node: NodeContext, description: entity.Subscription, symbol: str
+    ) -> SubscriptionObject:
+        """A subscription, which its executor spins from now on."""
+        self.work(400 * MICROSECOND)
+        self.announce()
+        memory, topic = self._memory, description.topic
+        rmw_handle, handle = memory.allocate(), memory.allocate()
+        subscription, callback = memory.allocate(), memory.allocate()
+        group, executor = node.groups[description.group]
+        self._reader(rmw_handle, f"rt{topic}")
+        self.emit(
+            "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
+        )
+        code = self._code(node, description, executor)
+        created = SubscriptionObject(
+            self._process, executor, group, description, node.description.full_name, handle,
+            rmw_handle, callback, memory.allocate(), code,
+            self._process.is_rclcpp and description.kind != "serialized",
+            topic in INTERNAL_TOPICS, not code.publishers, self.time,
+        )  # fmt: skip
+        if description.intra_process:
+            created.intra = self._buffer(created, symbol)
+        self._emit_of_rclcpp("rclcpp_subscription_init", handle, subscription)
+        self._emit_of_rclcpp("rclcpp_subscription_callback_added", subscription, callback)
+        self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
+        created.created = self.time
+        created.addresses = (callback, subscription, handle, rmw_handle)
+        if description.polled:
+            node.objects.polled[topic] = created
+        else:
+            executor.subscriptions.append(created)
+        if created.intra is not None:
+            executor.waitables.append(created.intra)
+        self.middleware.add_subscription(created)
+        if created.intra is not None and description.transient_local:
+            self._replay(created.intra, topic)
+        return created
+
+    def end_subscription(self, subscription: SubscriptionObject) -> None:
+        """Destroy a subscription."""
+        self.middleware.end_subscription(subscription, self.time)
+        subscription.executor.forget(subscription)
+        if subscription.intra is not None:
+            subscription.executor.forget(subscription.intra)
+        for address in subscription.addresses:
+            self._memory.free(address)
+        self.time += 20 * MICROSECOND
+        self.announce()
+
+    def service(self, node: NodeContext, description: entity.Service, symbol: str) -> ServiceObject:
+        """A service; it answers once it has been given to `spin_service`."""
+        self.work(250 * MICROSECOND)
+        self.announce()
+        memory, name = self._memory, description.name
+        handle, callback = memory.allocate(), memory.allocate()
+        for event, dds_topic in (
+            ("create_reader", f"rq{name}Request"), ("create_writer", f"rr{name}Reply")
+        ):  # fmt: skip
+            kind = _WRITER if event == "create_writer" else _READER
+            self._entity(event, memory.allocate(), dds_topic, self._process.gid(kind))
+        rmw_handle = memory.allocate()
+        self.emit("rcl_service_init", handle, node.handle, rmw_handle, name)
+        self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
+        self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
+        group, executor = node.groups[description.group]
+        code = self._code(node, description, executor)
+        return ServiceObject(
+            self._network, self._process, executor, group, node.description.full_name, name,
+            handle, rmw_handle, callback, memory.on_stack(), code,
+        )  # fmt: skip
+
+    def spin_service(self, service: ServiceObject) -> None:
+        """Let the executor answer requests."""
+        service.executor.waitables.append(service)
+        self._network.add(service)
+
+    def client(self, node: NodeContext, description: entity.Client) -> None:
+        """A client."""
+        self.work(250 * MICROSECOND)
+        self.announce()
+        memory, name = self._memory, description.service
+        handle, rmw_handle = memory.allocate(), memory.allocate()
+        gid = self._process.gid(_READER)
+        self._entity(
+            "create_writer", memory.allocate(), f"rq{name}Request", self._process.gid(_WRITER)
+        )
+        self._entity("create_reader", memory.allocate(), f"rr{name}Reply", gid)
+        self.emit("rmw_client_init", rmw_handle, gid[:16])
+        self.emit("rcl_client_init", handle, node.handle, rmw_handle, name)
+        group, executor = node.groups[description.group]
+        code = UserCode(
+            entity.Work(), tuple(node.publishers[topic] for topic in description.publishes), None
+        )
+        client = ClientObject(
+            self._network, self._process, executor, group, node.description.full_name, name,
+            handle, rmw_handle, gid[:16], memory.on_stack(), code,
+        )  # fmt: skip
+        node.objects.clients[name] = client
+        executor.waitables.append(client)
+
+    def timer(self, node: NodeContext, description: entity.Timer) -> None:
+        """A timer, which its executor calls."""
+        self.work(20 * MICROSECOND)
+        handle, callback = self._memory.allocate(), self._memory.allocate()
+        period = description.period_ns
+        self.emit("rcl_timer_init", handle, period)
+        due = self.time + period
+        symbol = symbols.timer_callback(node.description.name)
+        self._emit_of_rclcpp("rclcpp_timer_callback_added", handle, callback)
+        self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
+        self._emit_of_rclcpp("rclcpp_timer_link_node", handle, node.handle)
+        group, executor = node.groups[description.group]
+        code = self._code(node, description, executor)
+        name = node.description.full_name
+        executor.timers.append(TimerObject(name, handle, callback, period, code, group, due))
+
+    def lifecycle(self, node: NodeContext) -> None:
+        """The state machine of a managed node."""
+        node.objects.lifecycle = Lifecycle(node.description.full_name, self._memory.allocate())
+        self.emit("rcl_lifecycle_state_machine_init", node.handle, node.objects.lifecycle.handle)
+
+    def _code(
+        self,
+        node: NodeContext,
+        description: entity.Subscription | entity.Timer | entity.Service,
+        executor: Executor,
+    ) -> UserCode:
+        publishers = tuple(node.publishers[topic] for topic in description.publishes)
+        actions = deeds(description.does, node.objects)
+        return UserCode(
+            description.work,
+            publishers,
+            node.rosout if description.logs else None,
+            actions,
+            bool(actions)
+            or self._process.is_stepwise
+            or any(publisher.intra is not None for publisher in publishers),
+            executor.has_callbacks,
+        )
+
+    def _buffer(self, subscription: SubscriptionObject, symbol: str) -> IntraBuffer:
+        """The intra-process object of a subscription, which has a callback of its own."""
+        memory = self._memory
+        capacity = subscription.description.depth
+        ring = RingBuffer(memory.allocate(), capacity)
+        ipb, intra, callback = memory.allocate(), memory.allocate(), memory.allocate()
+        self.emit("rclcpp_construct_ring_buffer", ring.handle, capacity)
+        self.emit("rclcpp_buffer_to_ipb", ring.handle, ipb)
+        self.emit("rclcpp_ipb_to_subscription", ipb, intra)
+        self.emit("rclcpp_subscription_callback_added", intra, callback)
+        self.emit("rclcpp_callback_register", callback, symbol)
+        self.emit("rclcpp_subscription_init", subscription.handle, intra)
+        return IntraBuffer(subscription, ring, callback)
+
+    def _replay(self, buffer: IntraBuffer, topic: str) -> None:
+        """Publishers of the process have kept messages for a subscription that comes late."""
+        for kept in self.middleware.kept_in(self._process, topic):
+            for message in kept.messages:
+                self.time += 400
+                put(self.thread, self.middleware, buffer, message, self.time)
+
+    def _writer(self, rmw_handle: int, dds_topic: str) -> None:
+        """A publisher of the middleware layer and its DDS writer."""
+        gid = self._process.gid(_WRITER)
+        self._entity("create_writer", entity_of(rmw_handle), dds_topic, gid)
+        self.emit("rmw_publisher_init", rmw_handle, gid)
+
+    def _reader(self, rmw_handle: int, dds_topic: str) -> None:
+        """A subscription of the middleware layer and its DDS reader."""
+        gid = self._process.gid(_READER)
+        self._entity("create_reader", entity_of(rmw_handle), dds_topic, gid)
+        self.emit("rmw_subscription_init", rmw_handle, gid)
+
+    def _entity(self, event: str, handle: int, dds_topic: str, gid: bytes) -> None:
+        """DDS creates a writer or reader and says so with a writer that nobody has created."""
+        stamp_ns = self.thread.machine.stamp_ns(self.time + 250)
+        writer = self._discovery_writers[1 if event == "create_writer" else 2]
+        self.emit("dds_write", writer, 0, stamp_ns)
+        if self._tracepoints.dds_write.pack is not None:
+            self._add_write_to_truth(stamp_ns)
+        self.emit(f"dds_{event}", handle, dds_topic, gid[:12], gid[12:16], gid[:16])
+
+    def _add_write_to_truth(self, stamp_ns: int) -> None:
+        """DDS has published for itself, of which nothing but its own event tells."""
+        thread = self.thread
+        truth = thread.world.truth
+        place = (thread.machine.hostname, thread.process.pid, thread.tid)
+        publication_id = next(thread.world.publication_ids)
+        truth.publication.add(
+            publication_id, *place, None, None, None, None, None, None, None, stamp_ns, None, True,
+            None,
+        )  # fmt: skip
+        truth.dds_event.add(publication_id, *place, "dds:write", self.time + thread.machine.epoch)

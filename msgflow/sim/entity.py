@@ -1,0 +1,174 @@
+"""What nodes consist of: publishers, subscriptions, timers, services, clients, and what they do.
+
+Data only, no behaviour. All durations are nanoseconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from msgflow.errors import UsageError
+
+MICROSECOND = 1_000
+MILLISECOND = 1_000_000
+SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """How long a callback computes: `typical_ns` plus up to `spread_ns`, at times `slow_ns` more.
+
+    Attributes:
+        typical_ns: shortest duration.
+        spread_ns: width of the even spread above it.
+        slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
+        slow_ns: greatest additional duration of a slow run; it is at least half of that.
+    """
+
+    typical_ns: int = 20 * MICROSECOND
+    spread_ns: int = 30 * MICROSECOND
+    slow_probability: float = 0.0
+    slow_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Send a request to a service.
+
+    Attributes:
+        service: name of the service; the node has a client of it.
+        spins: number of the executor that is spun in the callback until the response is there;
+            None if the callback does not wait for it.
+    """
+
+    service: str
+    spins: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Spin:
+    """Spin an executor of the process inside the callback for `duration_ns`.
+
+    Callbacks that it executes run nested; one that spins itself does so up to `depth` times.
+    """
+
+    executor: int
+    duration_ns: int
+    depth: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Poll:
+    """Take one message of a polled subscription of the node, if there is one."""
+
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """Take a managed node to its next state: configured, active, inactive, active, and so on."""
+
+
+Action = Call | Spin | Poll | Transition
+
+
+@dataclass(frozen=True, slots=True)
+class Publisher:
+    """A publisher of a node.
+
+    Attributes:
+        topic: topic, fully expanded.
+        depth: history depth.
+        size_bytes: size of its messages.
+        kind: 'typed', 'generic', 'serialized' or 'loaned', which pass different layers.
+        intra_process: subscriptions of the process that want it get messages without DDS.
+        transient_local: the last `depth` messages are kept for subscriptions that come late.
+        lifespan_ns: a message that waits for longer cannot be taken any more.
+    """
+
+    topic: str
+    depth: int = 10
+    size_bytes: int = 0
+    kind: str = "typed"
+    intra_process: bool = False
+    transient_local: bool = False
+    lifespan_ns: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Subscription:
+    """A subscription of a node and what its callback does.
+
+    Attributes:
+        topic: topic, fully expanded.
+        publishes: topics that each run of the callback publishes on, in this order.
+        work: how long the callback computes.
+        depth: history depth (keep last).
+        message_type: C++ name of the message, part of the callback's symbol.
+        logs: each run of the callback logs once, which publishes on /rosout.
+        does: what each run does after it has published.
+        group: name of its callback group; the node's default one if empty.
+        kind: 'typed', 'serialized' or 'loaned', which pass different layers.
+        intra_process: see `Publisher`.
+        transient_local: messages from before its creation are wanted, where publishers keep them.
+        loss: share of the messages (0..1) that get lost on their way (best effort).
+        discovery_ns: how much longer than usual its discovery takes.
+        polled: no executor takes its messages, but `Poll` does.
+        created_ns: when a thread of the user creates it, after the begin of tracing; None: with
+            the other objects of the node.
+        destroyed_ns: when that thread destroys it; its addresses are free then.
+    """
+
+    topic: str
+    publishes: tuple[str, ...] = ()
+    work: Work = Work()
+    depth: int = 10
+    message_type: str = "std_msgs::msg::String"
+    logs: bool = False
+    does: tuple[Action, ...] = ()
+    group: str = ""
+    kind: str = "typed"
+    intra_process: bool = False
+    transient_local: bool = False
+    loss: float = 0.0
+    discovery_ns: int = 0
+    polled: bool = False
+    created_ns: int | None = None
+    destroyed_ns: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Timer:
+    """A timer of a node and what its callback does; see `Subscription`."""
+
+    period_ns: int
+    publishes: tuple[str, ...] = ()
+    work: Work = Work()
+    logs: bool = False
+    does: tuple[Action, ...] = ()
+    group: str = ""
+
+    def __post_init__(self) -> None:
+        if self.period_ns <= 0:
+            raise UsageError(f"the period of a timer must be positive — {self.period_ns} ns")
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A service of a node and what its callback does; see `Subscription`."""
+
+    name: str
+    publishes: tuple[str, ...] = ()
+    work: Work = Work()
+    logs: bool = False
+    does: tuple[Action, ...] = ()
+    group: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Client:
+    """A client of a service; the thread that takes a response then publishes, in no callback."""
+
+    service: str
+    publishes: tuple[str, ...] = ()
+    group: str = ""

@@ -1,0 +1,178 @@
+"""A thread that spins an executor, as rclcpp does it.
+
+The loop: get_next_ready; if there was nothing wait_for_work and get_next_ready once more; execute.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.sim.callbacks import TimerObject, run_buffer, run_subscription, run_timer
+from msgflow.sim.entity import MICROSECOND
+from msgflow.sim.intra import IntraBuffer
+from msgflow.sim.machine import RunningProcess, Steps, Thread
+from msgflow.sim.services import ClientObject, ServiceObject, run_client, run_service
+from msgflow.sim.transport import SubscriptionObject
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from msgflow.sim.executor import Entity, Executor
+    from msgflow.sim.transport import Middleware
+
+# Guard conditions and graph events wake executors that have nothing to do.
+_SPURIOUS_WAKE_UP = 0.1
+
+_WAIT = "wait"
+_PROCESS = "process"
+_EXECUTE = "execute"
+_NO_TIMEOUT = -1
+_RUN: Mapping[type, Callable[..., Steps]] = {
+    TimerObject: run_timer,
+    SubscriptionObject: run_subscription,
+    ServiceObject: run_service,
+    ClientObject: run_client,
+    IntraBuffer: run_buffer,
+}
+# Others are executed without rclcpp_executor_execute.
+_ANNOUNCED = (TimerObject, SubscriptionObject)
+
+
+class ExecutorThread(Thread):
+    """A thread of a process that executes callbacks."""
+
+    def __init__(self, process: RunningProcess, tid: int, middleware: Middleware) -> None:
+        super().__init__(process, tid)
+        process.threads.append(self)
+        self._middleware = middleware
+        self._state: str | None = None
+        self._state_ns = 0
+        self._is_idle = False
+        self._asleep_since = 0
+        self._wake_at: int | None = None
+        self._depth = 0
+
+    def wake(self, time: int) -> None:
+        """Something has arrived at `time` for the executor that the thread waits in."""
+        start = max(time, self._asleep_since)
+        wake_at = start + 6 * MICROSECOND + self.world.tail(5 * MICROSECOND)
+        if self._wake_at is None or wake_at < self._wake_at:
+            self._wake_at = wake_at
+            self.go_on(wake_at)
+
+    def stop(self) -> None:
+        """The process ends: a thread that waits ends at once, others when they have executed."""
+        if self._is_idle or self.process.is_stepwise:
+            self.cut()
+
+    def finish(self) -> None:
+        """Write down what has begun and whose end was not seen."""
+        self.cut()
+        if self._state is not None:
+            self._add_state(None)
+
+    def spin(
+        self,
+        executor: Executor,
+        time: int,
+        until: int | None = None,
+        is_done: Callable[[], bool] | None = None,
+    ) -> Steps:
+        """Execute what is ready from `time` on; returns the time at which the spinning ended.
+
+        Ends when the process does, at `until`, or when `is_done` after an execution. Within a
+        callback the thread has a CPU already, and has one in the end.
+        """
+        if is_done is None and until is None:
+            time = yield time
+            while later := self.take_cpu(time):
+                time = yield later
+        while not self.process.is_stopped:
+            if (until is not None and time >= until) or (is_done is not None and is_done()):
+                break
+            if executor.owner is not None and executor.owner is not self:
+                executor.block(self)
+                self._is_idle = True
+                time = yield None
+                self._is_idle = False
+                while later := self.take_cpu(time):
+                    time = yield later
+                continue
+            executor.owner = self
+            self._enter(executor, _PROCESS, time)
+            entity = executor.pick()
+            if entity is None:
+                self._fall_asleep(executor, time, until)
+                time = yield None
+                while later := self.take_cpu(time):
+                    time = yield later
+                self._is_idle = False
+                executor.sleeper = None
+                executor.collect(time)
+                self._enter(executor, _PROCESS, time)
+                entity = executor.pick()
+                if entity is None:
+                    executor.release(time)
+                    time += 900 + int(self.world.random() * 3_000)
+                    continue
+            executor.release(time)
+            time = yield from self._execute(executor, entity, time)
+        return time
+
+    def _execute(self, executor: Executor, entity: Entity, time: int) -> Steps:
+        time += 800 + int(self.world.random() * 3_500)
+        group = entity.group
+        group.is_busy = True
+        if isinstance(entity, _ANNOUNCED):
+            self._enter(executor, _EXECUTE, time, entity.handle)
+        end = yield from _RUN[type(entity)](self, self._middleware, entity, time)
+        end += 400 + int(self.world.random() * 2_000)
+        self.keep_cpu(end)
+        time = yield end
+        group.is_busy = False
+        if executor.thread_count > 1 and not group.is_reentrant:
+            executor.wake(time)
+        while later := self.take_cpu(time):
+            time = yield later
+        return time
+
+    def _fall_asleep(self, executor: Executor, time: int, until: int | None) -> None:
+        random = self.world.random
+        time += 300 + int(random() * 2_500)
+        timeout = _NO_TIMEOUT if until is None else max(0, until - time)
+        self._enter(executor, _WAIT, time, timeout)
+        asleep = time + 400
+        self.keep_cpu(asleep)
+        executor.sleeper = self
+        self._is_idle = True
+        self._asleep_since = asleep
+        self._wake_at = None
+        due = executor.next_wake_up(asleep)
+        if until is not None and (due is None or until < due):
+            due = until
+        if due is not None:
+            self.wake(due)
+        if random() < _SPURIOUS_WAKE_UP:
+            self.wake(asleep + 15 * MICROSECOND)
+
+    def _enter(self, executor: Executor, state: str, time: int, argument: int = 0) -> None:
+        """Emit the event that begins a state, and write down the state that it ends."""
+        if not executor.has_events:
+            return
+        tracepoints = self.machine.tracepoints
+        if state is _PROCESS:
+            self.emit(tracepoints.rclcpp_executor_get_next_ready, time, self.context)
+        elif state is _WAIT:
+            self.emit(tracepoints.rclcpp_executor_wait_for_work, time, self.context, argument)
+        else:
+            self.emit(tracepoints.rclcpp_executor_execute, time, self.context, argument)
+        now = time + self.machine.epoch
+        if self._state is not None:
+            self._add_state(now)
+        self._state = state
+        self._state_ns = now
+
+    def _add_state(self, end_ns: int | None) -> None:
+        self.world.truth.executor_state.add(
+            self.machine.hostname, self.process.pid, self.tid, self._state_ns, end_ns, self._state
+        )

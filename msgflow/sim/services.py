@@ -1,0 +1,216 @@
+"""Services and clients: requests, the callbacks that answer them, and responses.
+
+No executor event tells of them. A response is taken by an executor of the client, which calls the
+user's code without a callback that is traced.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from msgflow.sim.callbacks import execute, run_callback
+from msgflow.sim.transport import UserCode, latency_between
+
+if TYPE_CHECKING:
+    from msgflow.sim.executor import CallbackGroup, Executor
+    from msgflow.sim.machine import RunningProcess, Steps, Thread
+    from msgflow.sim.publish import CallbackInstance
+    from msgflow.sim.transport import Middleware
+    from msgflow.sim.truth import Truth
+    from msgflow.sim.world import World
+
+
+@dataclass(slots=True, eq=False)
+class Request:
+    """A request and its response; `caller` is the callback instance that sent it.
+
+    Names in `_ns` are times on the clock of the host where it happened.
+    """
+
+    request_id: int
+    client: ClientObject
+    sequence_number: int
+    caller: int | None
+    sent_tid: int
+    sent_ns: int
+    service: ServiceObject | None = None
+    taken_tid: int | None = None
+    taken_ns: int | None = None
+    callback_instance_id: int | None = None
+    stamp_ns: int | None = None
+    answered_ns: int | None = None
+    received_tid: int | None = None
+    received_ns: int | None = None
+
+
+@dataclass(slots=True, eq=False)
+class ServiceObject:
+    """A service as it exists in its process."""
+
+    network: ServiceNetwork
+    process: RunningProcess
+    executor: Executor
+    group: CallbackGroup
+    node: str
+    name: str
+    handle: int
+    rmw_handle: int
+    callback: int
+    message: int
+    code: UserCode
+    requests: deque[Request] = field(default_factory=deque)
+
+    def is_ready(self, time: int) -> bool:
+        """Whether a request is there."""
+        return bool(self.requests)
+
+
+@dataclass(slots=True, eq=False)
+class ClientObject:
+    """A client as it exists in its process; `answered` is the number of the last response taken."""
+
+    network: ServiceNetwork
+    process: RunningProcess
+    executor: Executor
+    group: CallbackGroup
+    node: str
+    name: str
+    handle: int
+    rmw_handle: int
+    gid: bytes
+    message: int
+    code: UserCode
+    sequence_number: int = 0
+    answered: int = 0
+    responses: deque[Request] = field(default_factory=deque)
+
+    def is_ready(self, time: int) -> bool:
+        """Whether a response is there."""
+        return bool(self.responses)
+
+
+class ServiceNetwork:
+    """Carries requests to the service of that name, and responses back."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._services: dict[str, ServiceObject] = {}
+        self._requests: list[Request] = []
+
+    def add(self, service: ServiceObject) -> None:
+        """A service was created."""
+        self._services[service.name] = service
+
+    def send_request(self, time: int, request: Request) -> None:
+        """Send a request, to nobody if there is no such service."""
+        self._requests.append(request)
+        service = self._services.get(request.client.name)
+        if service is not None and not service.process.is_stopped:
+            arrival = self._arrival(time, request.client.process, service.process)
+            self._world.at(arrival, self._arrive, (service.requests, service.executor, request))
+
+    def send_response(self, time: int, service: ServiceObject, request: Request) -> None:
+        """Send a response to the client."""
+        client = request.client
+        arrival = self._arrival(time, service.process, client.process)
+        self._world.at(arrival, self._arrive, (client.responses, client.executor, request))
+
+    def finish(self) -> None:
+        """Write down what became of each request."""
+        for request in self._requests:
+            write_request(self._world.truth, request)
+
+    def _arrive(self, time: int, delivery: tuple[deque[Request], Executor, Request]) -> None:
+        queue, executor, request = delivery
+        queue.append(request)
+        executor.wake(time)
+
+    def _arrival(self, time: int, source: RunningProcess, target: RunningProcess) -> int:
+        latency = latency_between(source, target)
+        return time + latency.base + self._world.tail(latency.tail)
+
+
+def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstance | None) -> int:
+    """Send a request; returns the time at which the call returns."""
+    random, machine = thread.world.random, thread.machine
+    client.sequence_number += 1
+    sent = time + 400 + int(random() * 1_500)
+    thread.emit(
+        machine.tracepoints.rmw_send_request, sent, thread.context,
+        client.rmw_handle, client.message, client.sequence_number,
+    )  # fmt: skip
+    request = Request(
+        next(thread.world.request_ids), client, client.sequence_number,
+        None if cause is None else cause.callback_instance_id, thread.tid, sent + machine.epoch,
+    )  # fmt: skip
+    client.network.send_request(sent, request)
+    return sent + 2_000 + int(random() * 4_000)
+
+
+def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, time: int) -> Steps:
+    """Take a request, run the callback, send the response; returns the time when that is done."""
+    machine = thread.machine
+    random, tracepoints, epoch = thread.world.random, machine.tracepoints, machine.epoch
+    time += 1_000 + int(random() * 5_000)
+    request = service.requests.popleft()
+    client = request.client
+    thread.emit(
+        tracepoints.rmw_take_request, time, thread.context,
+        service.rmw_handle, service.message, client.gid, request.sequence_number, 1,
+    )  # fmt: skip
+    request.service, request.taken_tid, request.taken_ns = service, thread.tid, time + epoch
+    request.callback_instance_id = next(thread.world.callback_instance_ids)
+    end = yield from run_callback(
+        thread, middleware, service.code, time + 600 + int(random() * 1_500),
+        service.callback, service.node, "service", None,
+        instance_id=request.callback_instance_id,
+    )  # fmt: skip
+    stamp = end + 300 + int(random() * 500)
+    sent = stamp + 60 + int(random() * 300)
+    request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + epoch
+    thread.emit(
+        tracepoints.rmw_send_response, sent, thread.context,
+        service.rmw_handle, service.message, client.gid, request.sequence_number,
+        request.stamp_ns,
+    )  # fmt: skip
+    service.network.send_response(sent, service, request)
+    return sent + 1_500
+
+
+def run_client(thread: Thread, middleware: Middleware, client: ClientObject, time: int) -> Steps:
+    """Take a response and do what is to be done with it, in no callback that is traced."""
+    random, machine = thread.world.random, thread.machine
+    time += 1_000 + int(random() * 5_000)
+    request = client.responses.popleft()
+    thread.emit(
+        machine.tracepoints.rmw_take_response, time, thread.context,
+        client.rmw_handle, client.message, request.sequence_number, request.stamp_ns, 1,
+    )  # fmt: skip
+    request.received_tid, request.received_ns = thread.tid, time + machine.epoch
+    client.answered = request.sequence_number
+    return (yield from execute(thread, middleware, client.code, time + 1_000, None))
+
+
+def write_request(truth: Truth, request: Request) -> None:
+    """Write down a request and, if there was one, the response."""
+    client, service = request.client, request.service
+    place: tuple[str | None, int | None, str | None, int | None] = (None, None, None, None)
+    if service is not None:
+        process = service.process
+        place = (process.machine.hostname, process.pid, service.node, service.handle)
+    host, pid, node, handle = place
+    client_host, client_pid = client.process.machine.hostname, client.process.pid
+    truth.request.add(
+        request.request_id, client.name, client.gid, request.sequence_number,
+        client_host, client_pid, request.sent_tid, client.node, client.handle, request.sent_ns,
+        request.caller, host, pid, request.taken_tid, node, handle, request.taken_ns,
+        request.callback_instance_id,
+    )  # fmt: skip
+    if request.answered_ns is not None:
+        truth.response.add(
+            request.request_id, client.name, client.gid, request.sequence_number,
+            request.stamp_ns, host, pid, request.taken_tid, request.answered_ns,
+            client_host, client_pid, request.received_tid, request.received_ns,
+        )  # fmt: skip

@@ -1,0 +1,111 @@
+"""One message is handed over to a subscription: the layers of a take, and the truth about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.sim.write import read
+
+if TYPE_CHECKING:
+    from msgflow.sim.machine import Thread
+    from msgflow.sim.transport import Message, Middleware, SubscriptionObject
+
+
+@dataclass(slots=True)
+class Taken:
+    """A message that has been taken.
+
+    Attributes:
+        take_id: of the truth.
+        message: what was taken.
+        time: when it was (rmw_take or dequeue, or when it would have been emitted).
+        rmw_ns: its events; None where there is none.
+        is_copy: the same message comes through an intra-process buffer; this one is ignored.
+        is_replay: kept by the publisher from before the subscription was there.
+    """
+
+    take_id: int
+    message: Message
+    time: int
+    method: str
+    rmw_ns: int | None
+    rcl_ns: int | None = None
+    rclcpp_ns: int | None = None
+    dequeue_ns: int | None = None
+    is_copy: bool = False
+    is_replay: bool = False
+
+    def write(
+        self, thread: Thread, subscription: SubscriptionObject, instance_id: int | None
+    ) -> None:
+        """Write down the take and its link."""
+        machine, message = thread.machine, self.message
+        hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
+        publisher, truth = message.publisher, thread.world.truth
+        is_internal = subscription.is_internal
+        stamp_ns = None if self.method == "ring_buffer" else message.stamp_ns
+        truth.take.add(
+            self.take_id, hostname, pid, tid, subscription.node, publisher.topic,
+            subscription.handle, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, stamp_ns,
+            message.publication_id, instance_id, is_internal, self.method, self.dequeue_ns,
+        )  # fmt: skip
+        since = message.intra if self.method == "ring_buffer" else message.rmw
+        assert since is not None
+        truth.transport.add(
+            message.publication_id, self.take_id, publisher.topic,
+            publisher.process.machine.hostname, publisher.process.pid, message.tid,
+            message.rclcpp_ns, message.rcl_ns, message.rmw_ns, stamp_ns,
+            hostname, pid, tid, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, self.time - since,
+            is_internal, self.method, message.intra_ns, self.dequeue_ns, self.is_replay,
+        )  # fmt: skip
+
+    def reach_sink(self, thread: Thread, subscription: SubscriptionObject, end: int | None) -> None:
+        """Write down the flow that ends here, if it began in a timer and has ended."""
+        root, machine = self.message.root, thread.machine
+        if root is None or end is None:
+            return
+        thread.world.truth.end_to_end.add(
+            root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns,
+            self.message.path, machine.hostname, thread.process.pid, thread.tid,
+            subscription.node, self.take_id, self.time + machine.epoch, end + machine.epoch,
+            end - root.start,
+        )  # fmt: skip
+
+
+def take(
+    thread: Thread, middleware: Middleware, subscription: SubscriptionObject, time: int
+) -> tuple[Taken | None, int]:
+    """Take the oldest message that can be taken; None and the time of the attempt if none can.
+
+    Else the message and the time of the last event of the take.
+    """
+    world, machine = thread.world, thread.machine
+    random, epoch = world.random, machine.epoch
+    tracepoints = machine.tracepoints
+    emit, context = thread.emit, thread.context
+    buffer = subscription.message
+    reading = time + 2_000 + int(random() * 8_000)
+    message = middleware.next_message(subscription, reading)
+    if message is None:
+        middleware.failed_takes += 1
+        return None, read(thread, subscription.rmw_handle, buffer, reading, 0, 0)
+    taken = Taken(
+        next(world.take_ids), message, reading, "callback_only", None,
+        is_copy=message.is_copy_for(subscription),
+        is_replay=message.time < subscription.created,
+    )  # fmt: skip
+    if subscription.description.kind == "loaned":
+        # A loan is taken from the middleware without any event.
+        return taken, reading
+    assert message.stamp_ns is not None
+    rmw = read(thread, subscription.rmw_handle, buffer, reading, message.stamp_ns, 1)
+    taken.method, taken.time, taken.rmw_ns = "rmw", rmw, rmw + epoch
+    last = rmw + 200 + int(random() * 900)
+    emit(tracepoints.rcl_take, last, context, buffer)
+    taken.rcl_ns = last + epoch
+    if subscription.is_rclcpp:
+        last += 150 + int(random() * 600)
+        emit(tracepoints.rclcpp_take, last, context, buffer)
+        taken.rclcpp_ns = last + epoch
+    return taken, last
