@@ -6,6 +6,17 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from msgflow.sim.robot import demo
+from msgflow.sim.scenario import (
+    delivery,
+    executors,
+    intra_process,
+    layers,
+    lives,
+    nested,
+    services,
+    stamps,
+    transforms,
+)
 from msgflow.sim.system import (
     MILLISECOND,
     Host,
@@ -23,7 +34,25 @@ if TYPE_CHECKING:
 
 def scenarios() -> Mapping[str, Scenario]:
     """Every built-in scenario by name."""
-    built_in = (_pipeline(), _fan_out(), _two_hosts(), demo())
+    built_in = (
+        _pipeline(),
+        _fan_out(),
+        _two_hosts(),
+        demo(),
+        executors.multi_threaded(),
+        executors.executors(),
+        nested.nested(),
+        intra_process.intra_process(),
+        intra_process.mixed_intra_process(),
+        delivery.overload(),
+        delivery.losses(),
+        transforms.transforms(),
+        services.services(),
+        lives.restarts(),
+        stamps.equal_stamps(),
+        layers.python(),
+        layers.layers(),
+    )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})
 
 

@@ -122,5 +122,5 @@ def put(
     """Put a message into the buffer of a subscription and wake its executor."""
     replaced = buffer.ring.enqueue(thread, time, message)
     if replaced is not None:
-        middleware.drop(replaced, buffer.subscription, "overwritten")
+        middleware.lose(replaced, buffer.subscription, "overwritten")
     buffer.subscription.executor.wake(time)

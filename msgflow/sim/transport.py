@@ -265,7 +265,7 @@ class Middleware:
         if subscription.intra is not None:
             ring = subscription.intra.ring.messages
             while ring:
-                self._drop(ring.popleft(), subscription, "subscription_ended")
+                self.lose(ring.popleft(), subscription, "subscription_ended")
             for publisher in self._publishers[subscription.description.topic]:
                 if publisher.intra is not None and subscription.intra in publisher.intra.targets:
                     publisher.intra.targets.remove(subscription.intra)
@@ -363,17 +363,18 @@ class Middleware:
                     self.drop(message, subscription, "pending_at_end")
                 if subscription.intra is not None:
                     for message in subscription.intra.ring.messages:
-                        self._drop(message, subscription, "pending_at_end")
+                        self.lose(message, subscription, "pending_at_end")
         for match in self._world.left(self._replay):
             for message in match.missed:
                 self.drop(message, match.subscription, "pending_at_end")
 
     def drop(self, message: Message, target: SubscriptionObject, reason: str) -> None:
-        """A message does not reach a subscription; a copy of one that reaches it does not count."""
+        """As `lose`, for what DDS carries: copies of messages in buffers do not count."""
         if not message.is_copy_for(target):
-            self._drop(message, target, reason)
+            self.lose(message, target, reason)
 
-    def _drop(self, message: Message, target: SubscriptionObject, reason: str) -> None:
+    def lose(self, message: Message, target: SubscriptionObject, reason: str) -> None:
+        """A message does not reach a subscription."""
         publisher = message.publisher
         self.undelivered[reason] = self.undelivered.get(reason, 0) + 1
         self._world.truth.undelivered.add(
@@ -415,7 +416,7 @@ class Middleware:
             kept = intra.kept.messages if intra.kept is not None else ()
             for message in publisher.sent:
                 if message not in kept:
-                    self._drop(message, subscription, "before_subscription")
+                    self.lose(message, subscription, "before_subscription")
         keeps = publisher.history is not None and subscription.description.transient_local
         if keeps and subscription.ended is None:
             match.missed = list(publisher.sent)

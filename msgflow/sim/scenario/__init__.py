@@ -1,0 +1,1 @@
+"""Systems to simulate, as data: each module has those that show one idea."""

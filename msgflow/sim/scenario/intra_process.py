@@ -1,0 +1,88 @@
+"""Messages that stay in their process, alone or beside DDS."""
+
+from __future__ import annotations
+
+from msgflow.sim.entity import MILLISECOND, SECOND, Publisher, Subscription, Timer, Work
+from msgflow.sim.system import Executor, Host, Node, Process, Scenario
+
+_TOPICS = ("/image", "/image_info")
+_CAMERA = Node(
+    "camera",
+    publishers=tuple(Publisher(topic, intra_process=True) for topic in _TOPICS),
+    timers=(Timer(8 * MILLISECOND, _TOPICS),),
+)
+_FILTER = Node(
+    "filter",
+    publishers=(Publisher("/filtered", intra_process=True),),
+    subscriptions=(
+        Subscription("/image", ("/filtered",), Work(MILLISECOND), intra_process=True),
+        Subscription("/image_info", intra_process=True),
+    ),
+)
+# Too slow for what it gets: its buffer holds three messages, of which old ones are overwritten.
+_SLOW = Node(
+    "slow",
+    executor=1,
+    subscriptions=(
+        Subscription("/image", work=Work(30 * MILLISECOND), depth=3, intra_process=True),
+    ),
+)
+_DISPLAY = Node(
+    "display", executor=1, subscriptions=(Subscription("/filtered", intra_process=True),)
+)
+
+
+def intra_process() -> Scenario:
+    """Ring buffers, with a reader that is too slow, and nothing of it through DDS."""
+    return Scenario(
+        name="intra_process",
+        description="Nodes of one process exchange messages through ring buffers only.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process(
+                "container", "alpha", 1101, (_FILTER, _SLOW, _DISPLAY, _CAMERA),
+                executors=(Executor(), Executor()),
+            ),
+        ),
+        duration_ns=3 * SECOND,
+    )  # fmt: skip
+
+
+def mixed_intra_process() -> Scenario:
+    """The same messages also go to another process, hence also back to the own one by DDS."""
+    late = 1_200 * MILLISECOND
+    map_server = Node(
+        "map_server",
+        publishers=(Publisher("/map", depth=3, intra_process=True, transient_local=True),),
+        timers=(Timer(150 * MILLISECOND, ("/map",)),),
+    )
+    listener = Node(
+        "listener",
+        subscriptions=(
+            Subscription("/map", depth=5, intra_process=True, transient_local=True),
+            Subscription(
+                "/map", depth=5, intra_process=True, transient_local=True, created_ns=late
+            ),
+        ),
+    )
+    recorder = Node(
+        "recorder",
+        subscriptions=(
+            *(Subscription(topic) for topic in (*_TOPICS, "/filtered")),
+            Subscription("/map", transient_local=True, created_ns=late),
+        ),
+    )
+    return Scenario(
+        name="mixed_intra_process",
+        description="Messages go through ring buffers and DDS; late subscriptions get old ones.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process(
+                "container", "alpha", 1101,
+                (_FILTER, _DISPLAY, listener, _CAMERA, map_server),
+                executors=(Executor(), Executor("multi_threaded", 2)),
+            ),
+            Process("recorder", "alpha", 1201, (recorder,), start_ns=3 * MILLISECOND),
+        ),
+        duration_ns=3 * SECOND,
+    )  # fmt: skip
