@@ -157,7 +157,7 @@ class Creator:
         )
         code = self._code(node, description, executor)
         created = SubscriptionObject(
-            self._process, executor, group, description, node.description.full_name, handle,
+            next(self.thread.world.subscription_ids), self._process, executor, group, description, node.description.full_name, handle,
             rmw_handle, callback, memory.allocate(), code,
             self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS, not code.publishers, self.time,

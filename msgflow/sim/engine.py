@@ -11,6 +11,7 @@ from uuid import UUID
 
 from msgflow.errors import UsageError
 from msgflow.sim.builtin import scenarios
+from msgflow.sim.creation import PARAMETER_EVENTS
 from msgflow.sim.ctf import TraceIdentity
 from msgflow.sim.discovery import Discovery
 from msgflow.sim.layout import layouts
@@ -182,12 +183,12 @@ def _start(
 
 def _subscriptions(scenario: Scenario) -> Counter[str]:
     """How many subscriptions of each topic there will be."""
-    return Counter(
-        subscription.topic
-        for process in scenario.processes
-        for node in process.nodes
-        for subscription in node.subscriptions
-    )
+    expected: Counter[str] = Counter()
+    for process in scenario.processes:
+        for node in process.nodes:
+            expected.update(subscription.topic for subscription in node.subscriptions)
+            expected[PARAMETER_EVENTS] += process.client_library == "rclcpp"
+    return expected
 
 
 def _empty_directory(directory: Path) -> Path:

@@ -49,6 +49,7 @@ class Taken:
             self.take_id, hostname, pid, tid, subscription.node, publisher.topic,
             subscription.handle, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, stamp_ns,
             message.publication_id, instance_id, is_internal, self.method, self.dequeue_ns,
+            subscription.subscription_id,
         )  # fmt: skip
         since = message.intra if self.method == "ring_buffer" else message.rmw
         assert since is not None

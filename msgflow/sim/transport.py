@@ -148,6 +148,7 @@ class PublisherObject:
 class SubscriptionObject:
     """A subscription as it exists in its process, with the queue of its reader; `ended` or not."""
 
+    subscription_id: int
     process: RunningProcess
     executor: Executor
     group: CallbackGroup
@@ -306,7 +307,7 @@ class Middleware:
     def remember(self, message: Message) -> None:
         """Keep a message as long as there are subscriptions to come that have missed it."""
         publisher = message.publisher
-        if self._expected[publisher.topic] and not publisher.is_internal:
+        if self._expected[publisher.topic]:
             publisher.sent.append(message)
 
     def miss(self, message: Message, match: Match, time: int) -> None:
@@ -359,6 +360,7 @@ class Middleware:
             )
         for subscriptions in self._subscriptions.values():
             for subscription in subscriptions:
+                self._write(subscription)
                 for message in subscription.queue:
                     self.drop(message, subscription, "pending_at_end")
                 if subscription.intra is not None:
@@ -390,7 +392,17 @@ class Middleware:
             target.handle,
             reason,
             publisher.is_internal,
+            target.subscription_id,
         )
+
+    def _write(self, subscription: SubscriptionObject) -> None:
+        machine, ended = subscription.process.machine, subscription.ended
+        self._world.truth.subscription.add(
+            subscription.subscription_id, machine.hostname, subscription.process.pid,
+            subscription.node, subscription.description.topic, subscription.handle,
+            subscription.rmw_handle, subscription.created + machine.epoch,
+            None if ended is None else ended + machine.epoch, subscription.is_internal,
+        )  # fmt: skip
 
     def _deliver(self, time: int, message: Message, match: Match) -> None:
         latency = match.latency

@@ -36,7 +36,7 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         take_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, topic_name=_TEXT,
         subscription_handle=_HANDLE, rmw_ns=_TIME, rcl_ns=_TIME, rclcpp_ns=_TIME,
         source_timestamp_ns=_TIME, publication_id=_ID, callback_instance_id=_ID,
-        is_internal=_FLAG, method=_TEXT, dequeue_ns=_TIME,
+        is_internal=_FLAG, method=_TEXT, dequeue_ns=_TIME, subscription_id=_ID,
     ),
     "callback_instance": _schema(
         callback_instance_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, kind=_TEXT,
@@ -58,7 +58,12 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         publication_host=_TEXT, publication_pid=_NUMBER, publication_tid=_NUMBER,
         publication_rmw_ns=_TIME, source_timestamp_ns=_TIME,
         subscription_host=_TEXT, subscription_pid=_NUMBER, subscription_handle=_HANDLE,
-        reason=_TEXT, is_internal=_FLAG,
+        reason=_TEXT, is_internal=_FLAG, subscription_id=_ID,
+    ),
+    "subscription": _schema(
+        subscription_id=_ID, host=_TEXT, pid=_NUMBER, node=_TEXT, topic_name=_TEXT,
+        subscription_handle=_HANDLE, rmw_subscription_handle=_HANDLE, created_ns=_TIME,
+        ended_ns=_TIME, is_internal=_FLAG,
     ),
     "causal": _schema(
         callback_instance_id=_ID, publication_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER,
@@ -153,6 +158,7 @@ class Truth:
         self.causal = self.tables["causal"]
         self.end_to_end = self.tables["end_to_end"]
         self.executor_state = self.tables["executor_state"]
+        self.subscription = self.tables["subscription"]
         self.request = self.tables["request"]
         self.response = self.tables["response"]
         self.lifecycle_transition = self.tables["lifecycle_transition"]

@@ -26,8 +26,8 @@ class World:
         random: next even number in 0..1. Nothing else is drawn from, so that one seed gives one
             course of events.
         truth: where what happens is written down.
-        publication_ids: numbers for publications; likewise for takes, callback instances
-            and requests.
+        publication_ids: numbers for publications; likewise for takes, callback instances,
+            requests and subscriptions.
         end: time of the last event of any thread so far.
     """
 
@@ -38,6 +38,7 @@ class World:
         self.take_ids = count()
         self.callback_instance_ids = count()
         self.request_ids = count()
+        self.subscription_ids = count()
         self.end = 0
         self._agenda: list[tuple[int, int, Action, Any]] = []
         self._order = count()
