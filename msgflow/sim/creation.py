@@ -20,8 +20,8 @@ from msgflow.sim.transport import (
     Middleware,
     PublisherObject,
     SubscriptionObject,
-    UserCode,
 )
+from msgflow.sim.user_code import UserCode
 from msgflow.sim.write import entity_of
 
 if TYPE_CHECKING:
@@ -157,8 +157,8 @@ class Creator:
         )
         code = self._code(node, description, executor)
         created = SubscriptionObject(
-            next(self.thread.world.subscription_ids), self._process, executor, group, description, node.description.full_name, handle,
-            rmw_handle, callback, memory.allocate(), code,
+            next(self.thread.world.subscription_ids), self._process, executor, group, description,
+            node.description.full_name, handle, rmw_handle, callback, memory.allocate(), code,
             self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS, not code.publishers, self.time,
         )  # fmt: skip

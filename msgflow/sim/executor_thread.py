@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from msgflow.sim.callbacks import TimerObject, run_buffer, run_subscription, run_timer
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.intra import IntraBuffer
-from msgflow.sim.machine import RunningProcess, Steps, Thread
+from msgflow.sim.machine import Run, RunningProcess, Steps, Thread
 from msgflow.sim.services import ClientObject, ServiceObject, run_client, run_service
+from msgflow.sim.states import ExecutorStates
 from msgflow.sim.transport import SubscriptionObject
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ _WAIT = "wait"
 _PROCESS = "process"
 _EXECUTE = "execute"
 _NO_TIMEOUT = -1
-_RUN: Mapping[type, Callable[..., Steps]] = {
+_RUN: Mapping[type, Callable[..., Run]] = {
     TimerObject: run_timer,
     SubscriptionObject: run_subscription,
     ServiceObject: run_service,
@@ -45,12 +46,12 @@ class ExecutorThread(Thread):
         super().__init__(process, tid)
         process.threads.append(self)
         self._middleware = middleware
-        self._state: str | None = None
-        self._state_ns = 0
+        self._states = ExecutorStates(
+            self.world.truth.executor_state, self.machine.hostname, process.pid, tid
+        )
         self._is_idle = False
         self._asleep_since = 0
         self._wake_at: int | None = None
-        self._depth = 0
 
     def wake(self, time: int) -> None:
         """Something has arrived at `time` for the executor that the thread waits in."""
@@ -68,8 +69,7 @@ class ExecutorThread(Thread):
     def finish(self) -> None:
         """Write down what has begun and whose end was not seen."""
         self.cut()
-        if self._state is not None:
-            self._add_state(None)
+        self._states.finish()
 
     def spin(
         self,
@@ -116,25 +116,26 @@ class ExecutorThread(Thread):
                     time += 900 + int(self.world.random() * 3_000)
                     continue
             executor.release(time)
-            time = yield from self._execute(executor, entity, time)
+            end = self._execute(executor, entity, time)
+            if not isinstance(end, int):
+                end = yield from end
+            end += 400 + int(self.world.random() * 2_000)
+            self.keep_cpu(end)
+            time = yield end
+            entity.group.is_busy = False
+            if executor.thread_count > 1 and not entity.group.is_reentrant:
+                executor.wake(time)
+            while later := self.take_cpu(time):
+                time = yield later
         return time
 
-    def _execute(self, executor: Executor, entity: Entity, time: int) -> Steps:
+    def _execute(self, executor: Executor, entity: Entity, time: int) -> Run:
         time += 800 + int(self.world.random() * 3_500)
-        group = entity.group
-        group.is_busy = True
-        if isinstance(entity, _ANNOUNCED):
+        entity.group.is_busy = True
+        kind = type(entity)
+        if kind in _ANNOUNCED:
             self._enter(executor, _EXECUTE, time, entity.handle)
-        end = yield from _RUN[type(entity)](self, self._middleware, entity, time)
-        end += 400 + int(self.world.random() * 2_000)
-        self.keep_cpu(end)
-        time = yield end
-        group.is_busy = False
-        if executor.thread_count > 1 and not group.is_reentrant:
-            executor.wake(time)
-        while later := self.take_cpu(time):
-            time = yield later
-        return time
+        return _RUN[kind](self, self._middleware, entity, time)
 
     def _fall_asleep(self, executor: Executor, time: int, until: int | None) -> None:
         random = self.world.random
@@ -156,7 +157,7 @@ class ExecutorThread(Thread):
             self.wake(asleep + 15 * MICROSECOND)
 
     def _enter(self, executor: Executor, state: str, time: int, argument: int = 0) -> None:
-        """Emit the event that begins a state, and write down the state that it ends."""
+        """Emit the event that begins a state, and write it down."""
         if not executor.has_events:
             return
         tracepoints = self.machine.tracepoints
@@ -166,13 +167,4 @@ class ExecutorThread(Thread):
             self.emit(tracepoints.rclcpp_executor_wait_for_work, time, self.context, argument)
         else:
             self.emit(tracepoints.rclcpp_executor_execute, time, self.context, argument)
-        now = time + self.machine.epoch
-        if self._state is not None:
-            self._add_state(now)
-        self._state = state
-        self._state_ns = now
-
-    def _add_state(self, end_ns: int | None) -> None:
-        self.world.truth.executor_state.add(
-            self.machine.hostname, self.process.pid, self.tid, self._state_ns, end_ns, self._state
-        )
+        self._states.add(time + self.machine.epoch, state)

@@ -108,6 +108,14 @@ class RunningProcess:
 # and is sent the time at which it goes on; the result is the time at which it has ended.
 Steps = Generator[int | None, int, int]
 
+# What is done without a step in between has ended at a known time.
+Run = int | Steps
+
+
+def settle(run: Run) -> Steps:
+    """Go through the steps, if there are any."""
+    return run if isinstance(run, int) else (yield from run)
+
 
 class Thread:
     """A thread: it gets a CPU for a stretch of time and emits events while it has it.

@@ -10,8 +10,10 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from msgflow.sim.callbacks import execute, run_callback
-from msgflow.sim.transport import UserCode, latency_between
+from msgflow.sim.callbacks import run_callback
+from msgflow.sim.machine import Run, settle
+from msgflow.sim.transport import latency_between
+from msgflow.sim.user_code import UserCode, execute
 
 if TYPE_CHECKING:
     from msgflow.sim.executor import CallbackGroup, Executor
@@ -162,10 +164,11 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     )  # fmt: skip
     request.service, request.taken_tid, request.taken_ns = service, thread.tid, time + epoch
     request.callback_instance_id = next(thread.world.callback_instance_ids)
-    end = yield from run_callback(
-        thread, middleware, service.code, time + 600 + int(random() * 1_500),
-        service.callback, service.node, "service", None,
-        instance_id=request.callback_instance_id,
+    end = yield from settle(
+        run_callback(
+            thread, middleware, service.code, time + 600 + int(random() * 1_500),
+            service.callback, service.node, "service", instance_id=request.callback_instance_id,
+        )
     )  # fmt: skip
     stamp = end + 300 + int(random() * 500)
     sent = stamp + 60 + int(random() * 300)
@@ -179,7 +182,7 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     return sent + 1_500
 
 
-def run_client(thread: Thread, middleware: Middleware, client: ClientObject, time: int) -> Steps:
+def run_client(thread: Thread, middleware: Middleware, client: ClientObject, time: int) -> Run:
     """Take a response and do what is to be done with it, in no callback that is traced."""
     random, machine = thread.world.random, thread.machine
     time += 1_000 + int(random() * 5_000)
@@ -190,7 +193,7 @@ def run_client(thread: Thread, middleware: Middleware, client: ClientObject, tim
     )  # fmt: skip
     request.received_tid, request.received_ns = thread.tid, time + machine.epoch
     client.answered = request.sequence_number
-    return (yield from execute(thread, middleware, client.code, time + 1_000, None))
+    return execute(thread, middleware, client.code, time + 1_000, None)
 
 
 def write_request(truth: Truth, request: Request) -> None:

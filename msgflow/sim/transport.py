@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 from msgflow.sim.entity import MICROSECOND, MILLISECOND
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
-    from msgflow.sim.entity import Publisher, Subscription, Work
+    from msgflow.sim.entity import Publisher, Subscription
     from msgflow.sim.executor import CallbackGroup, Executor
     from msgflow.sim.intra import IntraBuffer, RingBuffer
-    from msgflow.sim.machine import RunningProcess, Steps
+    from msgflow.sim.machine import RunningProcess
     from msgflow.sim.publish import CallbackInstance
+    from msgflow.sim.user_code import UserCode
     from msgflow.sim.world import World
 
 
@@ -83,27 +84,6 @@ class Message:
             and subscription.intra is not None
             and subscription.process is self.publisher.process
         )
-
-
-@dataclass(slots=True)
-class UserCode:
-    """What a callback does.
-
-    Attributes:
-        work: how long it computes.
-        publishers: where it publishes, in this order.
-        log: the publisher of /rosout, if it logs.
-        deeds: what it does then, each `deed(thread, middleware, time, instance)`.
-        is_stepwise: other threads must be able to act between its publications.
-        is_callback: it runs in a callback that is traced.
-    """
-
-    work: Work
-    publishers: tuple[PublisherObject, ...]
-    log: PublisherObject | None
-    deeds: tuple[Callable[..., Steps], ...] = ()
-    is_stepwise: bool = False
-    is_callback: bool = True
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 _ROWS_PER_GROUP = 8_192
@@ -123,6 +123,10 @@ class TruthTable:
         if len(self._rows) == _ROWS_PER_GROUP:
             self._flush()
 
+    def add_columns(self, *columns: Sequence[object] | pa.Array) -> None:
+        """Write many rows: the values of each column."""
+        self._write(columns)
+
     def close(self) -> None:
         """Complete the file."""
         self._flush()
@@ -131,14 +135,16 @@ class TruthTable:
     def _flush(self) -> None:
         if not self._rows:
             return
-        columns = zip(*self._rows, strict=True)
+        self._write(tuple(zip(*self._rows, strict=True)))
+        self._rows.clear()
+
+    def _write(self, columns: Sequence[Sequence[object] | pa.Array]) -> None:
         arrays = [
-            pa.array(column, type=field.type)
+            column if isinstance(column, pa.Array) else pa.array(column, type=field.type)
             for column, field in zip(columns, self._schema, strict=True)
         ]
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
-        self.count += len(self._rows)
-        self._rows.clear()
+        self.count += len(columns[0])
 
 
 class Truth:

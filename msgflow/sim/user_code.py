@@ -1,0 +1,83 @@
+"""What user code does in a callback, or instead of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.sim.intra import publish_intra
+from msgflow.sim.publish import CallbackInstance, publish
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from msgflow.sim.entity import Work
+    from msgflow.sim.machine import Run, Steps, Thread
+    from msgflow.sim.transport import Middleware, PublisherObject
+
+
+@dataclass(slots=True)
+class UserCode:
+    """What a callback does.
+
+    Attributes:
+        work: how long it computes.
+        publishers: where it publishes, in this order.
+        log: the publisher of /rosout, if it logs.
+        deeds: what it does then, each `deed(thread, middleware, time, instance)`.
+        is_stepwise: other threads must be able to act between its publications.
+        is_callback: it runs in a callback that is traced.
+    """
+
+    work: Work
+    publishers: tuple[PublisherObject, ...]
+    log: PublisherObject | None
+    deeds: tuple[Callable[..., Steps], ...] = ()
+    is_stepwise: bool = False
+    is_callback: bool = True
+
+
+def execute(
+    thread: Thread,
+    middleware: Middleware,
+    code: UserCode,
+    start: int,
+    instance: CallbackInstance | None,
+) -> Run:
+    """Run user code: compute, publish, do, log; returns the time at which it ends."""
+    random = thread.world.random
+    work = code.work
+    duration = work.typical_ns + int(random() * work.spread_ns)
+    if work.slow_probability and random() < work.slow_probability:
+        duration += int((1 + random()) * work.slow_ns / 2)
+    time = start + 200 + duration * 4 // 5
+    rest = 200 + duration // 5
+    if code.is_stepwise:
+        return _step(thread, middleware, code, time, rest, instance)
+    for publisher in code.publishers:
+        time = publish(thread, middleware, publisher, time, instance)
+    if code.log is not None:
+        time = publish(thread, middleware, code.log, time, instance)
+    return time + rest
+
+
+def _step(
+    thread: Thread,
+    middleware: Middleware,
+    code: UserCode,
+    time: int,
+    rest: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    for publisher in code.publishers:
+        time = yield thread.hold(time)
+        if publisher.intra is not None:
+            time = yield from publish_intra(thread, middleware, publisher, time, instance)
+        else:
+            time = publish(thread, middleware, publisher, time, instance)
+    for deed in code.deeds:
+        time = yield thread.hold(time)
+        time = yield from deed(thread, middleware, time, instance)
+    if code.log is not None:
+        time = publish(thread, middleware, code.log, time, instance)
+    return (yield thread.hold(time + rest))
