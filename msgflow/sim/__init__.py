@@ -15,29 +15,52 @@ publication — one row per publication:
     rcl_publisher_init), rmw_publisher_handle, rclcpp_ns, rcl_ns, rmw_ns (its events, NULL where
     there is none: /rosout does not pass rclcpp, ros_discovery_info only rmw),
     source_timestamp_ns, callback_instance_id (the callback that published, else NULL),
-    is_internal. node and publisher_handle are NULL for ros_discovery_info.
-take — one row per successful take of an executor:
+    is_internal, intra_ns (rclcpp_intra_publish; such a publication has the others only if a
+    subscription needs DDS). node and publisher_handle are NULL for ros_discovery_info.
+take — one row per message that was handed over to a subscription:
     take_id, host, pid, tid, node, topic_name, subscription_handle, rmw_ns, rcl_ns, rclcpp_ns,
-    source_timestamp_ns, publication_id, callback_instance_id, is_internal
-callback_instance — one row per run of a callback:
-    callback_instance_id, host, pid, tid, node, kind ('timer', 'subscription'), callback_handle,
-    start_ns, end_ns, take_id (NULL for timers)
+    source_timestamp_ns, publication_id, callback_instance_id (NULL: taken without a callback),
+    is_internal, method ('rmw', 'ring_buffer', 'callback_only': without an event of its own),
+    dequeue_ns (from a ring buffer), subscription_id. A message that comes through a ring buffer
+    and DDS is taken twice; the second one has no callback.
+callback_instance — one row per run of a callback that is traced:
+    callback_instance_id, host, pid, tid, node, kind ('timer', 'subscription', 'service'),
+    callback_handle, start_ns, end_ns (NULL: it never ended), take_id (NULL but for
+    subscriptions), is_intra_process, parent_id (the callback that it runs nested in)
 transport — one row per take with its publication:
     publication_id, take_id, topic_name, publication_{host,pid,tid,rclcpp_ns,rcl_ns,rmw_ns},
     source_timestamp_ns, take_{host,pid,tid,rmw_ns,rcl_ns,rclcpp_ns}, latency_ns (rmw_publish to
-    rmw_take), is_internal
-undelivered — one row per publication and subscription that existed then but never took it:
+    rmw_take, or rclcpp_intra_publish to dequeue), is_internal, method (as of the take),
+    publication_intra_ns, take_dequeue_ns, is_replay (kept by the publisher from before the
+    subscription was there), is_self_loop (the node's own message, or on /tf that of its process)
+subscription — one row per subscription, at whatever address:
+    subscription_id, host, pid, node, topic_name, subscription_handle, rmw_subscription_handle,
+    created_ns, ended_ns (NULL: not before the end of tracing), is_internal
+undelivered — one row per publication and subscription of the topic that no callback and no user
+got, whenever they existed; with the takes they account for every such pair:
     publication_id, topic_name, publication_{host,pid,tid,rmw_ns}, source_timestamp_ns,
-    subscription_{host,pid,handle}, reason ('before_discovery', 'overwritten', 'pending_at_end'),
-    is_internal
-causal — one row per publication made inside a callback:
-    callback_instance_id, publication_id, host, pid, tid, kind ('direct'), callback_start_ns,
-    take_id, take_rmw_ns (NULL for timers), topic_name, publication_rcl_ns, publication_rmw_ns,
-    is_internal
+    subscription_{host,pid,handle}, reason, is_internal, subscription_id. Reasons:
+    'before_subscription', 'before_discovery', 'lost_in_transport', 'overwritten' (in a queue or a
+    ring buffer), 'take_failed' (expired, and the take found nothing), 'expired' (and the take
+    found a newer message), 'subscription_ended', 'pending_at_end'
+causal — one row per publication made inside a callback, or with a message taken without one:
+    callback_instance_id, publication_id, host, pid, tid, kind ('direct'; 'take_adjacent' without
+    a callback), callback_start_ns, take_id, take_rmw_ns (NULL for timers), topic_name,
+    publication_rcl_ns, publication_rmw_ns, is_internal
+request — one row per request:
+    request_id, service_name, client_gid, sequence_number, client_{host,pid,tid,node,handle},
+    sent_ns, sender_callback_instance_id, service_{host,pid,tid,node,handle}, taken_ns,
+    callback_instance_id (of the service; NULL like the rest if nobody took it)
+response — one row per request that was answered:
+    request_id, service_name, client_gid, sequence_number, source_timestamp_ns,
+    service_{host,pid,tid}, sent_ns, client_{host,pid,tid}, taken_ns
+lifecycle_transition — one row per change of state of a managed node:
+    host, pid, tid, node, at_ns, start_state, goal_state
 end_to_end — one row per flow from a run of a timer's callback to a subscription whose callback
-publishes nothing (logging does not count):
+publishes nothing (logging does not count), self loops left out:
     root_callback_instance_id, root_{host,pid,tid,start_ns}, path (topics in order),
-    sink_{host,pid,tid,node,take_id,take_ns,end_ns} (take_ns: rmw_take; end_ns: callback_end),
+    sink_{host,pid,tid,node,take_id,take_ns,end_ns} (take_ns: rmw_take or dequeue; end_ns:
+    callback_end),
     latency_ns (callback_start of the root to callback_end of the sink)
 executor_state — one row per executor event, lasting until the next one of the thread:
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
@@ -53,31 +76,42 @@ from __future__ import annotations
 
 from msgflow.sim.builtin import scenarios
 from msgflow.sim.engine import Simulation, simulate
+from msgflow.sim.entity import (
+    Call,
+    Client,
+    Poll,
+    Publisher,
+    Service,
+    Spin,
+    Subscription,
+    Timer,
+    Transition,
+    Work,
+)
 from msgflow.sim.layout import layouts
 from msgflow.sim.long_recording import long_recording
 from msgflow.sim.recording import Buffers, Recording
-from msgflow.sim.system import (
-    Host,
-    Node,
-    Process,
-    Publisher,
-    Scenario,
-    Subscription,
-    Timer,
-    Work,
-)
+from msgflow.sim.system import Executor, Group, Host, Node, Process, Scenario
 
 __all__ = [
     "Buffers",
+    "Call",
+    "Client",
+    "Executor",
+    "Group",
     "Host",
     "Node",
+    "Poll",
     "Process",
     "Publisher",
     "Recording",
     "Scenario",
+    "Service",
     "Simulation",
+    "Spin",
     "Subscription",
     "Timer",
+    "Transition",
     "Work",
     "layouts",
     "long_recording",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from msgflow.sim.entity import MILLISECOND, Publisher, Subscription, Timer
 from msgflow.sim.robot import demo
 from msgflow.sim.scenario import (
     delivery,
@@ -17,16 +18,7 @@ from msgflow.sim.scenario import (
     stamps,
     transforms,
 )
-from msgflow.sim.system import (
-    MILLISECOND,
-    Host,
-    Node,
-    Process,
-    Publisher,
-    Scenario,
-    Subscription,
-    Timer,
-)
+from msgflow.sim.system import Host, Node, Process, Scenario
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

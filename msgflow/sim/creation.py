@@ -72,6 +72,8 @@ class Creator:
         self._process = thread.process
         self._memory = thread.process.memory
         self._tracepoints = thread.machine.tracepoints
+        # Since Jazzy generic publishers, serialised and loaned messages have events.
+        self._is_every_kind_traced = thread.machine.layout.is_stamped_by_rmw
         self._announcer = self._memory.allocate()
         self._announcement = self._memory.on_stack()
         # DDS has writers of its own, which tell others what there is.
@@ -137,6 +139,7 @@ class Creator:
             memory.on_stack(),
             is_rclcpp and self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS, self.time, [], description, intra,
+            description.kind != "typed" and not self._is_every_kind_traced,
         )  # fmt: skip
         self.middleware.add_publisher(publisher)
         return publisher
@@ -168,6 +171,10 @@ class Creator:
         self._emit_of_rclcpp("rclcpp_subscription_callback_added", subscription, callback)
         self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
         created.created = self.time
+        # Nothing tells of a loan; of serialised messages nothing did in old releases.
+        is_hidden = description.kind == "serialized" and not self._is_every_kind_traced
+        created.is_silent = description.kind == "loaned" or is_hidden
+        code.is_callback &= not is_hidden
         created.addresses = (callback, subscription, handle, rmw_handle)
         if description.polled:
             node.objects.polled[topic] = created

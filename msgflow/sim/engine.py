@@ -14,13 +14,13 @@ from msgflow.sim.builtin import scenarios
 from msgflow.sim.creation import PARAMETER_EVENTS
 from msgflow.sim.ctf import TraceIdentity
 from msgflow.sim.discovery import Discovery
+from msgflow.sim.entity import SECOND
 from msgflow.sim.layout import layouts
 from msgflow.sim.machine import Machine, RunningProcess
 from msgflow.sim.meta import write_meta
 from msgflow.sim.recorder import Recorder
 from msgflow.sim.services import ServiceNetwork
 from msgflow.sim.startup import Startup
-from msgflow.sim.system import SECOND, Host, Scenario
 from msgflow.sim.transport import Middleware
 from msgflow.sim.truth import Truth
 from msgflow.sim.world import World
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from msgflow.sim.recording import Recording
+    from msgflow.sim.system import Host, Scenario
 
 # 2025-03-14 09:26:53.589793238 UTC: when every simulated trace begins.
 _EPOCH_NS = 1_741_944_413_589_793_238

@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
+from msgflow.sim.entity import MILLISECOND, SECOND, Publisher, Subscription, Timer, Work
 from msgflow.sim.recording import Recording
-from msgflow.sim.system import (
-    MILLISECOND,
-    SECOND,
-    Host,
-    Node,
-    Process,
-    Publisher,
-    Scenario,
-    Subscription,
-    Timer,
-    Work,
-)
+from msgflow.sim.system import Host, Node, Process, Scenario
 
 _HOST = "robot"
 _IMAGE_BYTES = 10_000_000

@@ -50,6 +50,11 @@ def publish(
     if message is None:
         message = Message(next(world.publication_ids), publisher, thread.tid, instance)
 
+    if publisher.is_silent:
+        message.rmw, message.stamp_ns = time + 600, machine.stamp_ns(time + 500)
+        write_publication(thread, publisher, message, instance)
+        middleware.send(message.rmw, message)
+        return time + 5_000
     rcl = time
     if publisher.is_rclcpp:
         emit(tracepoints.rclcpp_publish, time, context, publisher.handle, publisher.message)

@@ -2,18 +2,8 @@
 
 from __future__ import annotations
 
-from msgflow.sim.system import (
-    MICROSECOND,
-    MILLISECOND,
-    Host,
-    Node,
-    Process,
-    Publisher,
-    Scenario,
-    Subscription,
-    Timer,
-    Work,
-)
+from msgflow.sim.entity import MICROSECOND, MILLISECOND, Publisher, Subscription, Timer, Work
+from msgflow.sim.system import Host, Node, Process, Scenario
 
 _BASE = "robot-base"
 _COMPUTER = "robot-computer"

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 from msgflow.errors import UsageError
 from msgflow.sim.entity import (
-    MICROSECOND,
-    MILLISECOND,
     SECOND,
     Call,
     Client,
@@ -18,25 +16,8 @@ from msgflow.sim.entity import (
     Service,
     Subscription,
     Timer,
-    Work,
 )
 from msgflow.sim.recording import PERFECT, Recording
-
-__all__ = [
-    "MICROSECOND",
-    "MILLISECOND",
-    "SECOND",
-    "Executor",
-    "Group",
-    "Host",
-    "Node",
-    "Process",
-    "Publisher",
-    "Scenario",
-    "Subscription",
-    "Timer",
-    "Work",
-]
 
 # Threads of a process are numbered from its id on; the middleware's has the last number.
 _THREADS_PER_PROCESS = 9

@@ -59,12 +59,13 @@ class Taken:
             message.rclcpp_ns, message.rcl_ns, message.rmw_ns, stamp_ns,
             hostname, pid, tid, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, self.time - since,
             is_internal, self.method, message.intra_ns, self.dequeue_ns, self.is_replay,
+            message.is_self_loop(subscription),
         )  # fmt: skip
 
     def reach_sink(self, thread: Thread, subscription: SubscriptionObject, end: int | None) -> None:
-        """Write down the flow that ends here, if it began in a timer and has ended."""
+        """Write down the flow that ends here, if it began in a timer and is no self loop."""
         root, machine = self.message.root, thread.machine
-        if root is None or end is None:
+        if root is None or end is None or self.message.is_self_loop(subscription):
             return
         thread.world.truth.end_to_end.add(
             root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns,
@@ -96,8 +97,7 @@ def take(
         is_copy=message.is_copy_for(subscription),
         is_replay=message.time < subscription.created,
     )  # fmt: skip
-    if subscription.description.kind == "loaned":
-        # A loan is taken from the middleware without any event.
+    if subscription.is_silent:
         return taken, reading
     assert message.stamp_ns is not None
     rmw = read(thread, subscription.rmw_handle, buffer, reading, message.stamp_ns, 1)

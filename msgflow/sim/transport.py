@@ -77,6 +77,15 @@ class Message:
         assert time is not None
         return time
 
+    def is_self_loop(self, subscription: SubscriptionObject) -> bool:
+        """Whether the node takes its own message, or on /tf the listener in its process does."""
+        publisher = self.publisher
+        if publisher.process is not subscription.process:
+            return False
+        listens = subscription.node.startswith("/transform_listener_impl")
+        is_transform = publisher.topic in {"/tf", "/tf_static"}
+        return publisher.node == subscription.node or (is_transform and listens)
+
     def is_copy_for(self, subscription: SubscriptionObject) -> bool:
         """Whether the subscription gets it through a buffer in the process as well."""
         return (
@@ -102,6 +111,7 @@ class PublisherObject:
         init_handle: the handle that rcl_publisher_init names.
         handle: the handle that rcl_publish names.
         is_rclcpp: publishing passes through rclcpp (not for /rosout).
+        is_silent: its release of ROS 2 has no events for this kind of publisher.
         matches: one per subscription of the topic.
         history: what is kept for subscriptions that come late (transient local).
         sent: everything so far, while further subscriptions of the topic are still to come.
@@ -120,13 +130,17 @@ class PublisherObject:
     matches: list[Match]
     description: Publisher
     intra: IntraProcess | None = None
+    is_silent: bool = False
     history: deque[Message] | None = None
     sent: list[Message] = field(default_factory=list)
 
 
 @dataclass(slots=True, eq=False)
 class SubscriptionObject:
-    """A subscription as it exists in its process, with the queue of its reader; `ended` or not."""
+    """A subscription as it exists in its process, with the queue of its reader; `ended` or not.
+
+    `is_silent`: its release of ROS 2 has no events for this kind of take.
+    """
 
     subscription_id: int
     process: RunningProcess
@@ -144,6 +158,7 @@ class SubscriptionObject:
     is_sink: bool
     created: int
     queue: deque[Message] = field(default_factory=deque)
+    is_silent: bool = False
     addresses: tuple[int, ...] = ()
     intra: IntraBuffer | None = None
     ended: int | None = None

@@ -51,7 +51,7 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         take_host=_TEXT, take_pid=_NUMBER, take_tid=_NUMBER,
         take_rmw_ns=_TIME, take_rcl_ns=_TIME, take_rclcpp_ns=_TIME,
         latency_ns=_COUNT, is_internal=_FLAG, method=_TEXT, publication_intra_ns=_TIME,
-        take_dequeue_ns=_TIME, is_replay=_FLAG,
+        take_dequeue_ns=_TIME, is_replay=_FLAG, is_self_loop=_FLAG,
     ),
     "undelivered": _schema(
         publication_id=_ID, topic_name=_TEXT,
