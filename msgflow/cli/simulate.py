@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+_RECORDING = "How it is recorded"
+_SECOND = 1_000_000_000
+
 
 def command(
     scenario: Annotated[
@@ -20,17 +23,137 @@ def command(
         float, typer.Option("--factor", min=0, help="Length, as a multiple of the scenario's own")
     ] = 1,
     seed: Annotated[int, typer.Option("--seed", help="Of the random numbers")] = 0,
+    layout: Annotated[
+        str | None,
+        typer.Option(
+            "--layout",
+            metavar="NAME",
+            help="Release of ROS 2, as galactic or jazzy, also with instrumented DDS, as "
+            "humble-fastdds; the scenario's own by default",
+            autocompletion=lambda: _layouts(),
+        ),
+    ] = None,
+    start_late: Annotated[
+        float,
+        typer.Option(
+            "--start-late",
+            metavar="SECONDS",
+            min=0,
+            help="Recording starts that late: no initialisation events",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
+    dual_session: Annotated[
+        bool,
+        typer.Option(
+            "--dual-session",
+            help="A snapshot has the initialisation events from before the late start",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = False,
+    pause: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--pause",
+            metavar="BEGIN END",
+            help="Nothing is recorded between these times, in seconds",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = None,
+    rotate: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--rotate",
+            metavar="SECONDS",
+            help="The trace goes on in a further chunk of the archive from this time on; may be "
+            "repeated",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = None,
+    per_process: Annotated[
+        bool,
+        typer.Option("--per-process", help="One trace per process", rich_help_panel=_RECORDING),
+    ] = False,
+    lose_events: Annotated[
+        float,
+        typer.Option(
+            "--lose-events",
+            metavar="SHARE",
+            min=0,
+            max=1,
+            help="Share of the packets behind which events are lost",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
+    lose_packets: Annotated[
+        float,
+        typer.Option(
+            "--lose-packets",
+            metavar="SHARE",
+            min=0,
+            max=1,
+            help="Share of the packets that are missing",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
+    cut: Annotated[
+        int,
+        typer.Option(
+            "--cut",
+            metavar="STREAMS",
+            min=0,
+            help="So many streams of each trace end in the middle of a packet",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
+    slew: Annotated[
+        float,
+        typer.Option(
+            "--slew",
+            metavar="PPM",
+            help="How much faster source stamps run than the clock of the trace",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
 ) -> None:
     """Write the trace of a simulated ROS 2 system, and the links that really happened."""
     from msgflow.cli.output import count, print_status
-    from msgflow.sim import simulate
+    from msgflow.sim import Buffers, Recording, simulate
 
-    done = simulate(scenario, directory, factor=factor, seed=seed)
+    recording = Recording(
+        start_ns=_nanoseconds(start_late),
+        is_dual_session=dual_session,
+        pauses=() if pause is None else ((_nanoseconds(pause[0]), _nanoseconds(pause[1])),),
+        rotations=tuple(sorted(_nanoseconds(time) for time in rotate or ())),
+        buffers=Buffers.PER_PROCESS if per_process else Buffers.PER_USER,
+        lost_event_share=lose_events,
+        lost_packet_share=lose_packets,
+        cut_streams=cut,
+        slew_ppm=slew,
+    )
+    done = simulate(
+        scenario,
+        directory,
+        factor=factor,
+        seed=seed,
+        layout=layout,
+        recording=None if recording == Recording() else recording,
+    )
     traces = count(len(done.trace_directories), "trace")
     print_status(f"{traces}, {count(done.event_count, 'event')} written to {directory}")
+
+
+def _nanoseconds(seconds: float) -> int:
+    return round(seconds * _SECOND)
 
 
 def _scenarios() -> list[str]:
     from msgflow.sim import scenarios
 
     return list(scenarios())
+
+
+def _layouts() -> list[str]:
+    from msgflow.sim import layouts
+
+    return list(layouts())

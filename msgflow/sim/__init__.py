@@ -4,6 +4,10 @@
 (`directory/HOSTNAME/ust/uid/1000/64-bit`), and the truth into `directory/truth`: what happened, not
 what can be seen. `scenarios()` lists what can be simulated; a `Scenario` of your own works as well.
 
+`layout` names the release of ROS 2 whose events the trace has, see `layouts()`. `recording` is what
+recording does to them: it starts late, pauses, loses events or packets, is rotated, … A recording
+never changes what happens, a layout only when stamps are made and what that shifts.
+
 Truth tables (Parquet). `host` is a hostname; `pid` and `tid` are those of the trace. Columns in
 `_ns` are ns since the epoch on the trace clock of the host in question, hence equal to time stamps
 of events in its trace, except `latency_ns`, which is a true duration, free of clock offsets.
@@ -62,11 +66,20 @@ publishes nothing (logging does not count), self loops left out:
     sink_{host,pid,tid,node,take_id,take_ns,end_ns} (take_ns: rmw_take or dequeue; end_ns:
     callback_end),
     latency_ns (callback_start of the root to callback_end of the sink)
+dds_event — one row per `dds:*` event of a publication, whether or not the layout has it:
+    publication_id, host, pid, tid, event, ts_ns
+declared — one row per field of an event of the layout (field is NULL for an event without fields):
+    event, field
+trace — one row per trace:
+    host, pid (NULL: of all processes), path, clock_error_ns (what its time stamps are ahead of the
+    times in these tables)
+unrecorded — one row per event of the layout that happened and is not in a trace:
+    host, pid, tid, event, ts_ns, cause ('late start', 'pause', 'loss', 'packets', 'truncation')
 executor_state — one row per executor event, lasting until the next one of the thread:
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
     'wait' for wait_for_work, 'execute' for execute)
 
-meta.json: scenario, description, layout, seed, factor, clock_offset_ns, hosts (hostname → trace,
+meta.json: scenario, description, layout, seed, factor, clock_offset_ns, hosts (hostname → traces,
 begin_of_tracing_ns, cpu_count, events by name), processes, rows of each table, length_ns (from the
 begin to the end of tracing), failed_takes (of executors), full_queues (arrivals at a queue that was
 full), undelivered (reason → count).

@@ -55,24 +55,34 @@ class Recording:
     def __post_init__(self) -> None:
         for share in (self.lost_event_share, self.lost_packet_share):
             if not 0 <= share <= 1:
-                raise UsageError(f"not a share between 0 and 1 — {share}")
+                raise UsageError(f"not a share — {share}", "give a number between 0 and 1")
         if not abs(self.slew_ppm) < 1000:
-            raise UsageError(f"no clock is that much faster or slower — {self.slew_ppm} ppm")
+            raise UsageError(
+                f"no clock runs {self.slew_ppm} ppm too fast", "give less than 1000 ppm"
+            )
         if min(self.start_ns, self.cut_streams, self.unfinished_streams, self.clock_error_ns) < 0:
-            raise UsageError(f"a negative number makes no sense here — {self}")
+            raise UsageError("a negative time or count makes no sense", "give 0 or more")
         if self.longest_loss < 1:
-            raise UsageError(f"at least one event is lost — {self.longest_loss}")
-        times = [self.start_ns]
-        if bad := [pause for pause in self.pauses if pause[0] >= pause[1]]:
-            raise UsageError(f"a pause must end after it has begun — {bad[0]}")
-        for begin, end in sorted((*self.pauses, *((time, time) for time in self.rotations))):
-            times += [begin, end]
-        if times != sorted(times):
-            raise UsageError("pauses and rotations must follow the start and each other")
+            raise UsageError("a loss takes at least one event", "give 1 or more")
+        self._check_times()
         if self.is_dual_session and (self.start_ns == 0 or self.buffers is Buffers.PER_PROCESS):
             raise UsageError(
                 "a dual session needs a late start and buffers per user",
                 "give the time at which the second session starts",
+            )
+
+    def _check_times(self) -> None:
+        if bad := [pause for pause in self.pauses if pause[0] >= pause[1]]:
+            raise UsageError(
+                f"a pause must end after it has begun — {bad[0]}", "give its begin first"
+            )
+        times = [self.start_ns]
+        for begin, end in sorted((*self.pauses, *((time, time) for time in self.rotations))):
+            times += [begin, end]
+        if times != sorted(times):
+            raise UsageError(
+                "pauses and rotations must follow the start and each other",
+                "give times that do not overlap",
             )
 
     @property

@@ -63,6 +63,9 @@ def test_version(msgflow: Msgflow) -> None:
         (("sql", "SELECT 1", "-f", "x"), "give SQL, or a file with -f", "msgflow sql"),
         (("sql", "-f", "none.sql"), "no such file or directory — none.sql", ""),
         (("simulate", "nothing", "out"), "nothing", ""),
+        (("simulate", "pipeline", "out", "--layout", "turtle"), "layout — turtle", "galactic"),
+        (("simulate", "pipeline", "out", "--pause", "2", "1"), "must end after", "begin first"),
+        (("simulate", "pipeline", "out", "--dual-session"), "needs a late start", "session starts"),
     ],
 )
 def test_usage_errors(msgflow: Msgflow, arguments: tuple[str, ...], error: str, hint: str) -> None:
@@ -227,3 +230,19 @@ def test_simulate(msgflow: Msgflow) -> None:
     assert result.stdout == ""
     assert result.stderr.startswith("1 trace, ")
     assert list(Path("out").rglob("metadata"))
+
+
+def test_simulate_a_layout_and_a_recording_with_faults(msgflow: Msgflow) -> None:
+    arguments = ("--factor", 0.03, "--layout", "humble-fastdds", "--start-late", 0.05)
+    result = msgflow(
+        "simulate", "pipeline", "out", *arguments, "--pause", 0.1, 0.15, "--rotate", 0.2,
+        "--rotate", 0.25, "--lose-events", 0.1, "--lose-packets", 0.1, "--per-process",
+        "--cut", 1, "--slew", 20,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    # Three processes in three chunks each.
+    assert result.stderr.startswith("9 traces, ")
+    assert len(list(Path("out").glob("alpha/archives/*/ust/pid/*/metadata"))) == 9
+    counts = msgflow("events", "out", "--count").stdout
+    assert "dds:write_pre" in counts
+    assert "rcl_init" not in counts

@@ -1,0 +1,191 @@
+"""Recordings with faults: what is missing from the trace is what the truth says is missing."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import Counter
+from dataclasses import replace
+
+import duckdb
+import pyarrow.parquet as pq
+import pytest
+
+from msgflow.errors import UsageError
+from msgflow.sim import Buffers, Recording, simulate
+
+SECOND = 1_000_000_000
+LENGTH = 0.3
+FAULTS = {
+    "late": Recording(start_ns=SECOND // 3),
+    "loss": Recording(lost_event_share=0.5),
+    "packets": Recording(lost_packet_share=0.3),
+    "pause": Recording(pauses=((SECOND // 4, SECOND // 3), (SECOND // 2, SECOND * 2 // 3))),
+    "unfinished": Recording(unfinished_streams=2),
+    "dual": Recording(start_ns=SECOND // 3, is_dual_session=True),
+    "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
+    "per_process": Recording(buffers=Buffers.PER_PROCESS),
+}
+CAUSES = {
+    "late": "late start",
+    "loss": "loss",
+    "packets": "packets",
+    "pause": "pause",
+    "unfinished": "truncation",
+    "dual": "late start",
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Simulates the pipeline with a fault, or without, once."""
+    done = {}
+
+    def make(name):
+        if name not in done:
+            directory = tmp_path_factory.mktemp("recording") / name
+            recording = FAULTS.get(name, Recording())
+            done[name] = simulate("pipeline", directory, factor=LENGTH, recording=recording)
+        return done[name]
+
+    return make
+
+
+def _events(bt2, simulation):
+    """Events with place and time, and how many were discarded as babeltrace 2 says."""
+    events, discarded, packets = Counter(), 0, 0
+    for message in bt2.TraceCollectionMessageIterator(str(simulation.directory)):
+        kind = type(message).__name__
+        if kind == "_EventMessageConst":
+            context = message.event.common_context_field
+            key = (int(context["vpid"]), int(context["vtid"]), message.event.name)
+            events[*key, message.default_clock_snapshot.ns_from_origin] += 1
+        elif kind == "_DiscardedEventsMessageConst":
+            discarded += message.count or 0
+        elif kind == "_DiscardedPacketsMessageConst":
+            packets += message.count
+    return events, discarded, packets
+
+
+@pytest.mark.parametrize("name", list(FAULTS))
+def test_the_truth_names_exactly_what_is_missing(bt2, made, name):
+    simulation = made(name)
+    events, discarded, packets = _events(bt2, simulation)
+    everything, none, _ = _events(bt2, made("perfect"))
+    missing = duckdb.sql(f"FROM '{simulation.truth['unrecorded']}'").project(
+        "pid, tid, event, ts_ns, cause"
+    )
+    rows = missing.fetchall()
+    assert none == 0
+    assert everything - events == Counter(row[:4] for row in rows)
+    assert not events - everything
+    assert sum(events.values()) == simulation.event_count
+    assert {row[4] for row in rows} == ({CAUSES[name]} if name in CAUSES else set())
+    # LTTng counts what it discards while it records, and numbers packets.
+    assert (discarded > 0) is (name == "loss")
+    assert discarded <= len(rows)
+    assert (packets > 0) is (name == "packets")
+
+
+def test_counters_rise_with_every_loss(made):
+    simulation = made("loss")
+    header = struct.Struct("<I16sIQQQQQQQI")
+    total = 0
+    for stream in simulation.trace_directories[0].glob("ros2_*"):
+        data, offset, last = stream.read_bytes(), 0, 0
+        while offset < len(data):
+            *_, begin, end, _, size, _, discarded, _ = header.unpack_from(data, offset)
+            assert begin < end
+            assert discarded >= last
+            offset, last = offset + size // 8, discarded
+        total += last
+    ((count,),) = duckdb.sql(f"SELECT count(*) FROM '{simulation.truth['unrecorded']}'").fetchall()
+    assert total == count > 50
+
+
+def test_a_snapshot_has_the_initialisation_events(made):
+    snapshot, runtime = made("dual").trace_directories
+    assert snapshot.parts[-5:-3] == ("snapshot", "ust")
+    assert runtime.parts[-5:-3] == ("runtime", "ust")
+    simulation = made("dual")
+    counts = json.loads(simulation.meta.read_text())["hosts"]["alpha"]["events"]
+    perfect = json.loads(made("perfect").meta.read_text())["hosts"]["alpha"]["events"]
+    for event in ("rcl_node_init", "rcl_publisher_init", "rclcpp_subscription_callback_added"):
+        assert counts[f"ros2:{event}"] == perfect[f"ros2:{event}"]
+    assert counts["ros2:callback_start"] < perfect["ros2:callback_start"]
+
+
+def test_a_rotated_trace_is_one_trace_in_chunks(made):
+    directories = made("rotated").trace_directories
+    assert [path.parts[-6] for path in directories] == ["archives"] * 3
+    assert len({path.joinpath("metadata").read_bytes() for path in directories}) == 1
+    assert all(any(path.glob("ros2_*")) for path in directories)
+
+
+def test_each_process_has_a_trace_and_a_clock_offset_of_its_own(bt2, tmp_path):
+    recording = Recording(buffers=Buffers.PER_PROCESS, clock_error_ns=4_000)
+    simulation = simulate("pipeline", tmp_path / "out", factor=0.02, recording=recording)
+    names = sorted(path.name.split("-")[0] for path in simulation.trace_directories)
+    assert names == ["relay", "sink", "source"]
+    offsets = {}
+    for message in bt2.TraceCollectionMessageIterator(str(simulation.directory)):
+        if type(message).__name__ == "_StreamBeginningMessageConst":
+            clock = message.stream.cls.default_clock_class
+            offset = clock.offset.seconds * SECOND + clock.offset.cycles
+            offsets[int(message.stream.trace.environment["vpid"])] = offset
+    errors = dict(
+        duckdb.sql(f"SELECT pid, clock_error_ns FROM '{simulation.truth['trace']}'").fetchall()
+    )
+    assert offsets.keys() == errors.keys() == {1101, 1201, 1301}
+    assert len({offsets[pid] - errors[pid] for pid in offsets}) == 1
+    assert len(set(offsets.values())) == 3
+
+
+def test_a_stream_may_end_within_a_packet(tmp_path):
+    simulation = simulate(
+        "pipeline", tmp_path / "out", factor=LENGTH, recording=Recording(cut_streams=1)
+    )
+    (directory,) = simulation.trace_directories
+    assert directory.joinpath("ros2_0").stat().st_size % 4096
+    assert not directory.joinpath("ros2_1").stat().st_size % 4096
+
+
+def test_source_stamps_run_away_from_the_clock_of_the_trace(tmp_path):
+    recording = Recording(realtime_offset_ns=5_000_000, slew_ppm=20)
+    simulation = simulate("pipeline", tmp_path / "out", factor=0.5, recording=recording)
+    ((first, last),) = duckdb.sql(
+        "SELECT min_by(source_timestamp_ns - rmw_ns, rmw_ns), "
+        "max_by(source_timestamp_ns - rmw_ns, rmw_ns) "
+        f"FROM '{simulation.truth['publication']}'"
+    ).fetchall()
+    assert first == pytest.approx(5_000_000, abs=1_000)
+    assert last - first == pytest.approx(5 * 20_000, abs=1_500)
+
+
+def test_faults_do_not_change_what_happens(made):
+    tables = {"publication", "take", "callback_instance", "undelivered", "executor_state"}
+    for name in tables:
+        perfect = pq.read_table(made("perfect").truth[name])
+        assert pq.read_table(made("loss").truth[name]) == perfect
+        assert pq.read_table(made("dual").truth[name]) == perfect
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"lost_event_share": 1.5}, "share"),
+        ({"lost_packet_share": -0.1}, "share"),
+        ({"pauses": ((2, 1),)}, "pause"),
+        ({"start_ns": 5, "pauses": ((1, 2),)}, "follow"),
+        ({"pauses": ((1, 5),), "rotations": (3,)}, "follow"),
+        ({"start_ns": -1}, "negative"),
+        ({"cut_streams": -1}, "negative"),
+        ({"longest_loss": 0}, "at least one"),
+        ({"is_dual_session": True}, "dual session"),
+        ({"slew_ppm": 5_000}, "ppm"),
+    ],
+)
+def test_refuses_what_cannot_be_recorded(wrong, message):
+    with pytest.raises(UsageError, match=message) as caught:
+        replace(Recording(), **wrong)
+    assert caught.value.hint
