@@ -147,7 +147,7 @@ class Creator:
     def subscription(
         self, node: NodeContext, description: entity.Subscription, symbol: str
     ) -> SubscriptionObject:
-        """A subscription, which its executor spins from now on."""
+        """A subscription, which gets messages once it has been given to `listen`."""
         self.work(400 * MICROSECOND)
         self.announce()
         memory, topic = self._memory, description.topic
@@ -176,16 +176,19 @@ class Creator:
         created.is_silent = description.kind == "loaned" or is_hidden
         code.is_callback &= not is_hidden
         created.addresses = (callback, subscription, handle, rmw_handle)
-        if description.polled:
-            node.objects.polled[topic] = created
-        else:
-            executor.subscriptions.append(created)
+        node.objects.polled[topic] = created
+        return created
+
+    def listen(self, created: SubscriptionObject) -> None:
+        """Let others know of a subscription, and its executor spin it."""
+        description = created.description
+        if not description.polled:
+            created.executor.subscriptions.append(created)
         if created.intra is not None:
-            executor.waitables.append(created.intra)
+            created.executor.waitables.append(created.intra)
         self.middleware.add_subscription(created)
         if created.intra is not None and description.transient_local:
-            self._replay(created.intra, topic)
-        return created
+            self._replay(created.intra, description.topic)
 
     def end_subscription(self, subscription: SubscriptionObject) -> None:
         """Destroy a subscription."""

@@ -171,9 +171,12 @@ def _start(
     discovery = Discovery()
     version = layouts()[scenario.layout].version
     processes = []
+    lives: Counter[tuple[str, int]] = Counter()
     for number, description in enumerate(scenario.processes):
         machine = machines[description.hostname]
-        process = RunningProcess(world, machine, description, number, course)
+        place = (description.hostname, description.pid)
+        process = RunningProcess(world, machine, description, number, course, lives[place])
+        lives[place] += 1
         startup = Startup(process, middleware, discovery, network, version)
         world.at(description.start_ns, startup.begin)
         if description.stop_ns is not None:

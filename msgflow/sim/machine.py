@@ -65,7 +65,7 @@ class RunningProcess:
     Attributes:
         description: what the scenario says about it.
         machine: where it runs.
-        number: its number among all processes.
+        number: its number among all processes; `life` counts those of this id before it.
         memory: its addresses.
         threads: those that execute callbacks.
         is_stopped: it has ended, or ends as soon as its threads have executed what they execute.
@@ -73,7 +73,13 @@ class RunningProcess:
     """
 
     def __init__(
-        self, world: World, machine: Machine, description: system.Process, number: int, seed: str
+        self,
+        world: World,
+        machine: Machine,
+        description: system.Process,
+        number: int,
+        seed: str,
+        life: int = 0,
     ) -> None:
         self.world = world
         self.machine = machine
@@ -85,11 +91,12 @@ class RunningProcess:
         self.is_stopped = False
         self.is_stepwise = description.is_killed
         self.memory = AddressSpace(f"{seed}/{description.pid}")
+        random = self.memory.garbage(2)
         self._participant = (
             bytes((1, 15))
             + machine.hostname.encode()[-2:].rjust(2, b"\x2a")
             + description.pid.to_bytes(2, "little")
-            + self.memory.garbage(2)
+            + bytes((random[0] ^ life, random[1]))
             + bytes((1, 0, 0, 0))
         )
         self._entities = 0

@@ -147,7 +147,9 @@ class Startup:
             self._publish(events)
             yield True
         if self._process.is_rclcpp:
-            creator.subscription(node, _PARAMETER_SUBSCRIPTION, symbols.PARAMETER_EVENTS)
+            creator.listen(
+                creator.subscription(node, _PARAMETER_SUBSCRIPTION, symbols.PARAMETER_EVENTS)
+            )
             yield True
         for _ in range(3 if events is not None else 0):
             assert events is not None
@@ -170,6 +172,7 @@ class Startup:
             created = None
             if subscription.created_ns is None:
                 created = creator.subscription(node, subscription, symbol)
+                creator.listen(created)
                 yield True
             self._user_thread.plan(node, subscription, symbol, created)
         for service in description.services:

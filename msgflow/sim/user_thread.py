@@ -22,7 +22,7 @@ class UserThread(Thread):
     def __init__(self, process: RunningProcess, creator: Creator) -> None:
         super().__init__(process, process.pid + _NUMBER)
         self._creator = creator.on(self)
-        self._plans: list[tuple[int, Callable[[], None]]] = []
+        self._plans: list[tuple[int, Callable[[], Callable[[], None]]]] = []
 
     def plan(
         self,
@@ -34,13 +34,14 @@ class UserThread(Thread):
         """Create a subscription, unless it exists, and destroy it, when it is time."""
         found = [existing]
 
-        def create() -> None:
-            found[0] = self._creator.subscription(node, description, symbol)
+        def create() -> Callable[[], None]:
+            created = found[0] = self._creator.subscription(node, description, symbol)
+            return lambda: self._creator.listen(created)
 
-        def destroy() -> None:
+        def destroy() -> Callable[[], None]:
             subscription = found[0]
             assert subscription is not None
-            self._creator.end_subscription(subscription)
+            return lambda: self._creator.end_subscription(subscription)
 
         if description.created_ns is not None:
             self._plans.append((description.created_ns, create))
@@ -53,12 +54,15 @@ class UserThread(Thread):
             self.begin(time, self._follow(time))
 
     def _follow(self, time: int) -> Steps:
-        for due, do in sorted(self._plans, key=lambda plan: plan[0]):
+        for due, begin in sorted(self._plans, key=lambda plan: plan[0]):
             time = yield max(due, time)
             while later := self.take_cpu(time):
                 time = yield later
             self._creator.time = time
-            do()
+            complete = begin()
+            # Others are to know of it when it is there, not earlier.
+            self._creator.time = yield self.hold(self._creator.time)
+            complete()
             time = self._creator.time + 1_000
             self.keep_cpu(time)
         return time

@@ -30,6 +30,9 @@ from msgflow.sim import (
 
 _DISTRIBUTION_PACKAGE = Path("/usr/lib/python3/dist-packages/bt2/__init__.py")
 _LENGTH = 0.15
+# Some things happen only later in a scenario.
+_LENGTHS = {"losses": 0.7, "restarts": 0.9, "mixed_intra_process": 0.5, "services": 0.4}
+BASIC = ("pipeline", "fan_out", "two_hosts", "demo")
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +131,9 @@ def recordings(bt2: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dic
     """Every built-in scenario, simulated and read once."""
     found = {}
     for name in scenarios():
-        simulation = simulate(name, tmp_path_factory.mktemp("sim") / name, factor=_LENGTH)
+        simulation = simulate(
+            name, tmp_path_factory.mktemp("sim") / name, factor=_LENGTHS.get(name, _LENGTH)
+        )
         found[name] = Recording(simulation, read_events(bt2, simulation.directory))
     return found
 
@@ -146,6 +151,12 @@ def recorded_jazzy() -> Path:
     if not path.is_dir():
         pytest.skip("the recorded traces (../shared/traces) are not here")
     return path
+
+
+@pytest.fixture(params=BASIC)
+def basic(request: pytest.FixtureRequest, recordings: dict[str, Recording]) -> Recording:
+    """Each scenario of plain executors, typed messages and queues that never are full."""
+    return recordings[request.param]
 
 
 @pytest.fixture

@@ -69,7 +69,8 @@ def test_time_passes_on_each_thread_and_cpu(recording):
     assert len(cpus) > len(recording.meta["hosts"])
 
 
-def test_executors_emit_in_the_order_of_rclcpp(recording):
+def test_executors_emit_in_the_order_of_rclcpp(basic):
+    recording = basic
     texts = defaultdict(str)
     for event in recording.events:
         if event.tid == event.pid:
@@ -81,7 +82,8 @@ def test_executors_emit_in_the_order_of_rclcpp(recording):
         assert _SPIN.fullmatch(spinning), spinning[:300]
 
 
-def test_threads_keep_their_names(recording):
+def test_threads_keep_their_names(basic):
+    recording = basic
     names = {(e.host, e.pid): e.procname for e in recording.events}
     assert {(e.host, e.pid, e.procname) for e in recording.events} == {
         (*key, name) for key, name in names.items()
