@@ -41,6 +41,7 @@ def scenarios() -> Mapping[str, Scenario]:
         transforms.transforms(),
         services.services(),
         lives.restarts(),
+        lives.container_restarts(),
         stamps.equal_stamps(),
         layers.python(),
         layers.layers(),

@@ -14,13 +14,14 @@ from msgflow.sim.transport import latency_between
 from msgflow.sim.write import read, write
 
 _TOPIC = "ros_discovery_info"
+_NUMBER = 9
 
 
 class DiscoveryListener(Thread):
     """The thread of a process that takes discovery messages."""
 
     def __init__(self, process: RunningProcess) -> None:
-        super().__init__(process, process.pid + 9)
+        super().__init__(process, process.description.tid(_NUMBER))
         self.rmw_handle = process.memory.allocate()
         self._message = process.memory.on_thread_stack()
         self._heard: deque[int] = deque()

@@ -83,7 +83,7 @@ class Startup:
 
     def _spin(self, time: int) -> None:
         """Let all threads of all executors spin; the first one is the main thread."""
-        tid = self._process.pid
+        number = 0
         for executor, description in zip(
             self._executors, self._process.description.executors, strict=True
         ):
@@ -91,10 +91,11 @@ class Startup:
                 continue
             for _ in range(description.thread_count):
                 thread = self.thread
-                if tid != self._process.pid:
+                if number:
+                    tid = self._process.description.tid(number)
                     thread = ExecutorThread(self._process, tid, self._middleware)
                 thread.begin(time, thread.spin(executor, time))
-                tid += 1
+                number += 1
                 time += 15 * MICROSECOND
         self._user_thread.begin_if_needed(time)
 

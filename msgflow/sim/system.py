@@ -93,7 +93,7 @@ class Process:
         name: name of the executable; the trace shows its first 15 characters.
         hostname: the host it runs on.
         pid: process id, also the id of the main thread; at least 10 apart on one host for
-            processes that run at the same time, since threads have the ids up to `pid + 9`.
+            processes that run at the same time, since threads have the ids that follow.
         nodes: created in this order.
         start_ns: when it starts, after the begin of tracing.
         executors: its executors.
@@ -101,6 +101,7 @@ class Process:
             so that another life of it may follow, at the same addresses.
         is_killed: it ends at once, in the middle of whatever it does.
         client_library: 'rclcpp' or 'rclpy', which has no events of its own.
+        threads_from: threads other than the main one have ids above this; the process id if None.
     """
 
     name: str
@@ -112,6 +113,13 @@ class Process:
     stop_ns: int | None = None
     is_killed: bool = False
     client_library: str = "rclcpp"
+    threads_from: int | None = None
+
+    def tid(self, number: int) -> int:
+        """Id of a thread; number 0 is the main one."""
+        if number == 0 or self.threads_from is None:
+            return self.pid + number
+        return self.threads_from + number
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,8 +184,8 @@ def _check_ids(scenario: Scenario) -> None:
     """No thread has an id that another one has at the same time."""
     latest: dict[tuple[str, int], int | None] = {}
     for process in sorted(scenario.processes, key=lambda each: each.start_ns):
-        for tid in range(process.pid, process.pid + _THREADS_PER_PROCESS + 1):
-            key = (process.hostname, tid)
+        for number in range(_THREADS_PER_PROCESS + 1):
+            key = (process.hostname, process.tid(number))
             if key in latest:
                 end = latest[key]
                 if end is None or end >= process.start_ns:

@@ -20,7 +20,7 @@ class UserThread(Thread):
     """A thread of a process that does at given times what was planned."""
 
     def __init__(self, process: RunningProcess, creator: Creator) -> None:
-        super().__init__(process, process.pid + _NUMBER)
+        super().__init__(process, process.description.tid(_NUMBER))
         self._creator = creator.on(self)
         self._plans: list[tuple[int, Callable[[], Callable[[], None]]]] = []
 

@@ -31,7 +31,13 @@ from msgflow.sim import (
 _DISTRIBUTION_PACKAGE = Path("/usr/lib/python3/dist-packages/bt2/__init__.py")
 _LENGTH = 0.15
 # Some things happen only later in a scenario.
-_LENGTHS = {"losses": 0.7, "restarts": 0.9, "mixed_intra_process": 0.5, "services": 0.4}
+_LENGTHS = {
+    "losses": 0.7,
+    "restarts": 0.9,
+    "container_restarts": 0.9,
+    "mixed_intra_process": 0.5,
+    "services": 0.4,
+}
 BASIC = ("pipeline", "fan_out", "two_hosts", "demo")
 
 

@@ -26,6 +26,7 @@ CASES = {
         """
         SELECT host, pid, tid, node, topic_name, subscription_handle, rmw_ns, source_timestamp_ns
         FROM truth_take
+        WHERE method = 'rmw'
         """,
         """
         SELECT p.hostname, p.pid, p.tid, n.full_name, s.topic_name, s.subscription_handle,
@@ -42,7 +43,7 @@ CASES = {
         SELECT c.host, c.pid, c.tid, c.node, c.kind, c.callback_handle, c.start_ns, c.end_ns,
             t.rmw_ns
         FROM truth_callback_instance AS c
-        LEFT JOIN truth_take AS t USING (take_id)
+        LEFT JOIN truth_take AS t ON c.take_id = t.take_id AND t.method = 'rmw'
         """,
         """
         SELECT p.hostname, p.pid, p.tid, n.full_name, c.kind, c.callback_handle, i.start_ns,
@@ -51,7 +52,7 @@ CASES = {
         JOIN place AS p USING (thread_id)
         JOIN callback AS c USING (callback_id)
         JOIN node AS n ON c.node_id = n.node_id
-        LEFT JOIN take AS t USING (take_id)
+        LEFT JOIN take AS t ON i.take_id = t.take_id AND t.method = 'rmw'
         """,
     ),
     "transport": (
@@ -59,6 +60,7 @@ CASES = {
         SELECT topic_name, publication_host, publication_pid, publication_tid, publication_rmw_ns,
             source_timestamp_ns, take_host, take_pid, take_tid, take_rmw_ns
         FROM truth_transport
+        WHERE method = 'rmw' AND publication_id NOT IN (FROM ambiguous)
         """,
         """
         SELECT u.topic_name, bp.hostname, bp.pid, bp.tid, b.rmw_ns, b.source_timestamp_ns,
@@ -77,6 +79,7 @@ CASES = {
         SELECT host, pid, tid, kind, callback_start_ns, take_rmw_ns, topic_name,
             publication_rcl_ns, publication_rmw_ns
         FROM truth_causal
+        WHERE kind = 'direct'
         """,
         """
         SELECT p.hostname, p.pid, p.tid, l.kind, i.start_ns, t.taken_ns, u.topic_name, b.rcl_ns,
@@ -86,7 +89,8 @@ CASES = {
         JOIN place AS p USING (thread_id)
         JOIN publication AS b USING (publication_id)
         JOIN publisher AS u USING (publisher_id)
-        LEFT JOIN take AS t ON i.take_id = t.take_id
+        LEFT JOIN take AS t ON i.take_id = t.take_id AND t.method = 'rmw'
+        WHERE l.kind = 'direct'
         """,
     ),
     "executor_state": (
@@ -97,58 +101,99 @@ CASES = {
         JOIN place AS p USING (thread_id)
         """,
     ),
-    "end_to_end": (
-        """
-        SELECT root_host, root_pid, root_tid, root_start_ns, path, sink_host, sink_pid, sink_tid,
-            sink_node, sink_take_ns, sink_end_ns
-        FROM truth_end_to_end
-        """,
-        """
-        SELECT rp.hostname, rp.pid, rp.tid, e.root_ns, h.topics, tp.hostname, tp.pid, tp.tid,
-            n.full_name, t.taken_ns, e.sink_ns
-        FROM end_to_end(
-            [1], NULL, NULL, 'callback_start', 'callback_end', 0, 9223372036854775807
-        ) AS e
-        JOIN flow_path([1], NULL, NULL) AS h USING (path_id)
-        JOIN callback_instance AS i
-            ON e.root_kind = 'callback_instance' AND e.root_id = i.callback_instance_id
-        JOIN place AS rp ON i.thread_id = rp.thread_id
-        JOIN take AS t ON e.take_id = t.take_id
-        JOIN place AS tp ON t.thread_id = tp.thread_id
-        JOIN subscription AS s ON t.subscription_id = s.subscription_id
-        JOIN node AS n ON s.node_id = n.node_id
-        WHERE e.status = 'reached'
-        """,
-    ),
 }
+END_TO_END = (
+    """
+    SELECT root_host, root_pid, root_tid, root_start_ns, path, sink_host, sink_pid, sink_tid,
+        sink_node, sink_take_ns, sink_end_ns
+    FROM truth_end_to_end
+    """,
+    """
+    SELECT rp.hostname, rp.pid, rp.tid, e.root_ns, h.topics, tp.hostname, tp.pid, tp.tid,
+        n.full_name, t.taken_ns, e.sink_ns
+    FROM end_to_end(
+        [1], NULL, NULL, 'callback_start', 'callback_end', 0, 9223372036854775807
+    ) AS e
+    JOIN flow_path([1], NULL, NULL) AS h USING (path_id)
+    JOIN callback_instance AS i
+        ON e.root_kind = 'callback_instance' AND e.root_id = i.callback_instance_id
+    JOIN callback AS c ON i.callback_id = c.callback_id AND c.kind = 'timer'
+    JOIN place AS rp ON i.thread_id = rp.thread_id
+    JOIN take AS t ON e.take_id = t.take_id
+    JOIN place AS tp ON t.thread_id = tp.thread_id
+    JOIN subscription AS s ON t.subscription_id = s.subscription_id
+    JOIN node AS n ON s.node_id = n.node_id
+    WHERE e.status = 'reached'
+    """,
+)
 PLACE = """
 CREATE TEMP VIEW IF NOT EXISTS place AS
 SELECT t.thread_id, h.hostname, p.pid, t.tid
 FROM thread AS t
 JOIN process AS p ON t.process_id = p.process_id
-JOIN host AS h ON p.host_id = h.host_id
+JOIN host AS h ON p.host_id = h.host_id;
+CREATE TEMP VIEW IF NOT EXISTS ambiguous AS
+SELECT unnest(list(publication_id))
+FROM truth_publication
+WHERE rmw_ns IS NOT NULL
+GROUP BY topic_name, source_timestamp_ns
+HAVING count(*) > 1
 """
 
 
 @pytest.mark.parametrize("table", CASES)
-def test_row_by_row(simulated: Ingested, table: str) -> None:
+def test_row_by_row(request: pytest.FixtureRequest, simulated: Ingested, table: str) -> None:
+    if "container_restarts" in request.node.name and table in {"causal", "executor_state"}:
+        # The threads of the lives of a process are taken for threads that go on.
+        request.applymarker(pytest.mark.xfail(reason="lives with equal thread ids", strict=True))
     simulated.connection.execute(PLACE)
-    assert simulated.rows(f"SELECT count(*) FROM truth_{table}") > [(0,)]
+    expected, _ = CASES[table]
+    assert simulated.rows(f"SELECT count(*) FROM ({expected})") > [(0,)]
     assert simulated.differences(*CASES[table]) == ([], [])
+
+
+def test_flows_row_by_row(complete: Ingested) -> None:
+    complete.connection.execute(PLACE)
+    assert complete.rows("SELECT count(*) FROM truth_end_to_end") > [(0,)]
+    assert complete.differences(*END_TO_END) == ([], [])
+
+
+def test_a_link_is_ambiguous_only_if_stamps_are_equal(simulated: Ingested) -> None:
+    simulated.connection.execute(PLACE)
+    columns = "topic_name, publication_rmw_ns, take_pid, take_rmw_ns"
+    truth = (
+        "FROM truth_transport WHERE method = 'rmw' AND publication_id IN (FROM ambiguous) "
+        "AND NOT is_internal"
+    )
+    # In the order of publication, which is right where every message was delivered.
+    assert simulated.differences(
+        f"SELECT {columns} {truth}",
+        """
+        SELECT u.topic_name, b.rmw_ns, p.pid, t.taken_ns
+        FROM link_transport AS l
+        JOIN publication AS b USING (publication_id)
+        JOIN publisher AS u USING (publisher_id)
+        JOIN take AS t USING (take_id)
+        JOIN place AS p ON t.thread_id = p.thread_id
+        WHERE l.method = 'exact' AND l.candidate_count > 1 AND NOT u.is_internal
+        """,
+    ) == ([], [])
 
 
 def test_latency_of_messages_on_one_clock(simulated: Ingested) -> None:
     """From the end of the publication to the take, as far as one clock can tell."""
     simulated.connection.execute(PLACE)
     assert simulated.differences(
-        "SELECT take_rmw_ns, take_rmw_ns - publication_rmw_ns FROM truth_transport",
-        "SELECT taken_ns, latency_ns FROM link_transport JOIN take USING (take_id)",
+        "SELECT take_rmw_ns, take_rmw_ns - publication_rmw_ns FROM truth_transport "
+        "WHERE method = 'rmw' AND publication_id NOT IN (FROM ambiguous)",
+        "SELECT taken_ns, latency_ns FROM link_transport AS l JOIN take USING (take_id) "
+        "WHERE l.method = 'exact' AND candidate_count = 1",
     ) == ([], [])
 
 
-def test_latency_of_flows(simulated: Ingested) -> None:
+def test_latency_of_flows(complete: Ingested) -> None:
     """The true duration is that of the trace, where begin and end are on one host."""
-    assert simulated.differences(
+    assert complete.differences(
         "SELECT latency_ns FROM truth_end_to_end WHERE root_host = sink_host",
         """
         SELECT latency_ns
@@ -157,6 +202,7 @@ def test_latency_of_flows(simulated: Ingested) -> None:
         ) AS e
         JOIN take AS t ON e.take_id = t.take_id
         JOIN callback_instance AS i ON root_id = i.callback_instance_id
+        JOIN callback AS c ON i.callback_id = c.callback_id AND c.kind = 'timer'
         JOIN process AS rp ON i.process_id = rp.process_id
         JOIN process AS tp ON t.process_id = tp.process_id
         WHERE root_kind = 'callback_instance' AND status = 'reached' AND rp.host_id = tp.host_id
@@ -164,12 +210,12 @@ def test_latency_of_flows(simulated: Ingested) -> None:
     ) == ([], [])
 
 
-def test_nothing_is_guessed_and_nothing_was_lost(simulated: Ingested) -> None:
+def test_nothing_is_guessed_and_nothing_was_lost(complete: Ingested) -> None:
     for view in ("node", "publisher", "subscription"):
-        assert simulated.rows(f"SELECT * FROM {view} WHERE is_inferred") == []
-    assert simulated.rows("SELECT * FROM take WHERE method <> 'rmw'") == []
-    assert simulated.rows("SELECT * FROM callback WHERE kind = 'unknown'") == []
-    assert simulated.rows("SELECT * FROM loss_interval") == []
+        assert complete.rows(f"SELECT * FROM {view} WHERE is_inferred") == []
+    assert complete.rows("SELECT * FROM take WHERE method <> 'rmw'") == []
+    assert complete.rows("SELECT * FROM callback WHERE kind = 'unknown'") == []
+    assert complete.rows("SELECT * FROM loss_interval") == []
 
 
 def test_a_take_without_publication_is_none_of_a_traced_publisher(simulated: Ingested) -> None:
