@@ -26,11 +26,12 @@ class Score:
 
     Attributes:
         kind: of link (`transport`, `direct`, …), or of row (`publication`, `take`, …).
-        is_built: msgflow has a definition for this kind.
         happened: true ones.
         decided: those of them that the trace decides, which must be found.
+        not_built: likewise, but this version of msgflow has no rule for them.
         found: rows.
         wrong: rows that are not true.
+        misguessed: likewise, of rows that say to be one of several possible ones.
         repeated: rows beyond the first for one true link.
         missing: decided, but not found.
         precision: share of the rows that are true.
@@ -39,11 +40,12 @@ class Score:
     """
 
     kind: str
-    is_built: bool
     happened: int
     decided: int
+    not_built: int
     found: int
     wrong: int
+    misguessed: int
     repeated: int
     missing: int
     precision: float
@@ -53,10 +55,14 @@ class Score:
 
 @dataclass(frozen=True)
 class Drop:
-    """Messages that a subscription did not take: the true reason and the one that was given."""
+    """Messages that a subscription did not take: the true reason and the one that was given.
+
+    `is_decided`: the trace decides it, so that the one given must be right.
+    """
 
     truth: str
     reason: str
+    is_decided: bool
     messages: int
     is_right: bool
 
@@ -101,8 +107,8 @@ def _open(database: Path) -> duckdb.DuckDBPyConnection:
 
 def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
     connection.execute(
-        "CREATE TEMP TABLE built AS SELECT schema_name || '.' || view_name FROM duckdb_views() "
-        "WHERE database_name = 'analysed' AND schema_name = 'derive'"
+        "CREATE TEMP TABLE built AS SELECT schema_name || '.' || view_name AS name "
+        "FROM duckdb_views() WHERE database_name = 'analysed' AND schema_name = 'derive'"
     )
     for name in (source, "found", "score"):
         connection.execute((_SQL / f"{name}.sql").read_text())

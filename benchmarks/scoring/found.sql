@@ -31,41 +31,52 @@ instance AS (
 ),
 link AS (
     SELECT
-        kind, kind AS label, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id
+        kind, kind AS label, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id,
+        false AS is_guess
     FROM instance
     WHERE kind IN ('publication', 'callback_instance')
     UNION ALL
     -- The middleware's own takes carry no stamp; nobody subscribes to them.
-    SELECT 'take', method, 'take', take_id, 'take', take_id
+    SELECT 'take', method, 'take', take_id, 'take', take_id, false
     FROM analysed.store.take
-    WHERE method <> 'callback_only' AND coalesce(source_timestamp_ns, 0) <> 0
+    WHERE method = 'ring_buffer'
+        OR method <> 'callback_only' AND coalesce(source_timestamp_ns, 0) <> 0
     UNION ALL
-    SELECT 'transport', method, 'publication', publication_id, 'take', take_id
+    -- One of several publications with the same topic and stamp.
+    SELECT 'transport', method, 'publication', publication_id, 'take', take_id,
+        method = 'exact' AND candidate_count > 1
     FROM analysed.store.link_transport
     UNION ALL
-    SELECT kind, kind, 'callback_instance', callback_instance_id, 'publication', publication_id
+    SELECT kind, kind, 'callback_instance', callback_instance_id, 'publication', publication_id,
+        false
     FROM analysed.store.link_causal
+    WHERE callback_instance_id IS NOT NULL
+    UNION ALL
+    SELECT kind, kind, 'take', take_id, 'publication', publication_id, false
+    FROM analysed.store.link_causal
+    WHERE callback_instance_id IS NULL
     UNION ALL
     SELECT 'link_request', 'request', 'callback_instance', callback_instance_id, 'request_sent',
-        request_id
+        request_id, false
     FROM analysed.store.link_request
     WHERE callback_instance_id IS NOT NULL
     UNION ALL
     SELECT 'link_response', 'response', 'callback_instance', callback_instance_id,
-        'response_sent', response_id
+        'response_sent', response_id, false
     FROM analysed.store.link_response
     WHERE callback_instance_id IS NOT NULL
     UNION ALL
-    SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id
+    SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id, false
     FROM analysed.store.request
     WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL
     UNION ALL
-    SELECT 'response', 'response', 'response_sent', response_id, 'response_taken', response_id
+    SELECT 'response', 'response', 'response_sent', response_id, 'response_taken', response_id,
+        false
     FROM analysed.store.response
     WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL
 )
 SELECT
-    row_number() OVER () AS number, l.kind, l.label, l.from_id, l.to_id,
+    row_number() OVER () AS number, l.kind, l.label, l.from_id, l.to_id, l.is_guess,
     l.from_kind, fp.host AS from_host, fp.pid AS from_pid, fp.tid AS from_tid, f.ts_ns AS from_ns,
     l.to_kind, tp.host AS to_host, tp.pid AS to_pid, tp.tid AS to_tid, t.ts_ns AS to_ns
 FROM link AS l

@@ -1,8 +1,10 @@
 -- Precision and recall by kind of link. A link that was found is right if it is true, whether or
 -- not the trace decides it; a true one that the trace decides and that was not found is missing.
+-- Which of several messages with one stamp was taken is a guess, marked as such in the database,
+-- and not judged.
 CREATE OR REPLACE TEMP TABLE verdict AS
 SELECT
-    f.number, f.kind, f.label, f.from_id AS found_from_id, f.to_id AS found_to_id,
+    f.number, f.kind, f.label, f.is_guess, f.from_id AS found_from_id, f.to_id AS found_to_id,
     l.from_id, l.to_id
 FROM found_link AS f
 LEFT JOIN truth_time AS a
@@ -20,7 +22,8 @@ WITH found AS (
         kind,
         count(*) AS found,
         count(from_id) AS right_count,
-        count(*) - count(from_id) AS wrong,
+        count(*) FILTER (from_id IS NULL AND NOT is_guess) AS wrong,
+        count(*) FILTER (from_id IS NULL AND is_guess) AS misguessed,
         count(from_id) - count(DISTINCT (from_id, to_id)) FILTER (from_id IS NOT NULL) AS repeated
     FROM verdict
     GROUP BY kind
@@ -37,25 +40,27 @@ labelled AS (
 expected AS (
     SELECT
         l.kind,
-        any_value(l.needs) AS needs,
         count(*) AS happened,
-        count(*) FILTER (l.is_decided) AS decided,
-        count(*) FILTER (l.is_decided AND v.from_id IS NULL) AS missing
+        count(*) FILTER (l.is_decided AND b.name IS NOT NULL) AS decided,
+        count(*) FILTER (l.is_decided AND b.name IS NULL) AS not_built,
+        count(*) FILTER (l.is_decided AND b.name IS NOT NULL AND v.from_id IS NULL) AS missing
     FROM truth_link AS l
+    LEFT JOIN built AS b ON l.needs = b.name
     LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM verdict) AS v
         ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
     GROUP BY l.kind
 )
 SELECT
     coalesce(e.kind, f.kind) AS kind,
-    coalesce(e.needs, 'derive.link_transport') IN (FROM built) AS is_built,
     coalesce(e.happened, 0) AS happened,
     coalesce(e.decided, 0) AS decided,
+    coalesce(e.not_built, 0) AS not_built,
     coalesce(f.found, 0) AS found,
     coalesce(f.wrong, 0) AS wrong,
+    coalesce(f.misguessed, 0) AS misguessed,
     coalesce(f.repeated, 0) AS repeated,
     coalesce(e.missing, 0) AS missing,
-    coalesce(f.right_count / nullif(f.found, 0), 1) AS precision,
+    coalesce(f.right_count / nullif(f.right_count + f.wrong, 0), 1) AS precision,
     coalesce(1 - e.missing / nullif(e.decided, 0), 1) AS recall,
     coalesce(labels, '') AS labels
 FROM expected AS e

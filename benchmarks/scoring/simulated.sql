@@ -6,6 +6,7 @@ CREATE OR REPLACE TEMP TABLE truth_event AS
 WITH happened AS (
     SELECT 'publication' AS kind, publication_id AS id, host, pid, tid,
         unnest([
+            {event: 'ros2:rclcpp_intra_publish', ts_ns: intra_ns},
             {event: 'ros2:rclcpp_publish', ts_ns: rclcpp_ns},
             {event: 'ros2:rcl_publish', ts_ns: rcl_ns},
             {event: 'ros2:rmw_publish', ts_ns: rmw_ns}
@@ -19,7 +20,8 @@ WITH happened AS (
         unnest([
             {event: 'ros2:rmw_take', ts_ns: rmw_ns},
             {event: 'ros2:rcl_take', ts_ns: rcl_ns},
-            {event: 'ros2:rclcpp_take', ts_ns: rclcpp_ns}
+            {event: 'ros2:rclcpp_take', ts_ns: rclcpp_ns},
+            {event: 'ros2:rclcpp_ring_buffer_dequeue', ts_ns: dequeue_ns}
         ], recursive := true)
     FROM simulated_take
     UNION ALL
@@ -29,6 +31,22 @@ WITH happened AS (
             {event: 'ros2:callback_end', ts_ns: end_ns}
         ], recursive := true)
     FROM simulated_callback_instance
+    UNION ALL
+    SELECT 'request_sent', request_id, client_host, client_pid, client_tid,
+        'ros2:rmw_send_request', sent_ns
+    FROM simulated_request
+    UNION ALL
+    SELECT 'request_taken', request_id, service_host, service_pid, service_tid,
+        'ros2:rmw_take_request', taken_ns
+    FROM simulated_request
+    UNION ALL
+    SELECT 'response_sent', request_id, service_host, service_pid, service_tid,
+        'ros2:rmw_send_response', sent_ns
+    FROM simulated_response
+    UNION ALL
+    SELECT 'response_taken', request_id, client_host, client_pid, client_tid,
+        'ros2:rmw_take_response', taken_ns
+    FROM simulated_response
 ),
 declared AS (
     SELECT DISTINCT event FROM simulated_declared
@@ -71,6 +89,10 @@ WITH recorded AS (
         kind, id,
         bool_or(is_recorded) AS is_any,
         bool_and(is_recorded OR NOT is_declared) AND bool_or(is_recorded) AS is_whole,
+        coalesce(bool_or(is_recorded) FILTER (event = 'ros2:rclcpp_intra_publish'), false)
+            AS is_intra,
+        coalesce(bool_or(is_recorded) FILTER (event = 'ros2:rclcpp_ring_buffer_dequeue'), false)
+            AS is_dequeue,
         coalesce(bool_or(is_recorded) FILTER (event = 'ros2:rmw_publish'), false)
             AS is_rmw_publish,
         coalesce(bool_or(is_recorded) FILTER (event = 'dds:write'), false) AS is_dds_write,
@@ -92,29 +114,55 @@ unknown_process AS (
     FROM simulated_unrecorded
     WHERE event LIKE '%\_init' ESCAPE '\'
 ),
--- Messages that another one of the topic resembles: by the stamp, or nearly by the time.
+-- Processes of which a ring buffer event is missing.
+unknown_buffer AS (
+    SELECT DISTINCT host, pid
+    FROM simulated_unrecorded
+    WHERE event LIKE 'ros2:rclcpp%buffer%' OR event LIKE '%\_ipb%' ESCAPE '\'
+),
+-- Hosts whose clocks are too far apart from the start to tell messages by time, or too coarse.
+far_host AS (
+    SELECT host
+    FROM simulated_publication
+    WHERE rmw_ns IS NOT NULL
+    GROUP BY host
+    HAVING abs(min_by(source_timestamp_ns - rmw_ns, rmw_ns)) > 5_000_000
+        OR count(DISTINCT source_timestamp_ns) < 0.99 * count(*)
+),
+-- Messages that another one of the topic resembles: by an equal stamp, or from another publisher at
+-- nearly the same time.
 twin AS (
-    SELECT DISTINCT a.publication_id, a.source_timestamp_ns = b.source_timestamp_ns AS is_equal
+    SELECT a.publication_id, bool_or(a.source_timestamp_ns = b.source_timestamp_ns) AS is_equal
     FROM simulated_publication AS a
     JOIN simulated_publication AS b
         ON a.topic_name = b.topic_name
         AND a.publication_id <> b.publication_id
-        AND (a.publisher_handle, a.host, a.pid)
-            IS DISTINCT FROM (b.publisher_handle, b.host, b.pid)
         AND b.source_timestamp_ns BETWEEN a.source_timestamp_ns - 5_000_000
             AND a.source_timestamp_ns + 5_000_000
+    WHERE a.source_timestamp_ns = b.source_timestamp_ns
+        OR (a.publisher_handle, a.host, a.pid)
+            IS DISTINCT FROM (b.publisher_handle, b.host, b.pid)
+    GROUP BY a.publication_id
 ),
 message AS (
     SELECT
         t.publication_id, t.take_id,
-        is_rmw_stamped OR is_dds_stamped AS is_stamped,
         CASE
+            WHEN t.method = 'ring_buffer' THEN 'derive.link_transport_ring_buffer'
+            WHEN is_rmw_stamped OR is_dds_stamped THEN 'derive.link_transport_exact'
+            ELSE 'derive.link_transport_nearest'
+        END AS needs,
+        CASE
+            -- A message that was kept for late subscriptions has no other event on its way there.
+            WHEN t.method = 'ring_buffer' THEN p.is_intra AND r.is_dequeue AND NOT t.is_replay
             WHEN is_rmw_stamped THEN p.is_rmw_publish AND r.is_rmw_take
             WHEN is_dds_stamped THEN p.is_dds_write AND r.is_rmw_take
             ELSE p.is_rmw_publish AND r.is_rmw_take
         END
         AND (
             CASE
+                WHEN t.method = 'ring_buffer' THEN
+                    (t.take_host, t.take_pid) NOT IN (SELECT (host, pid) FROM unknown_buffer)
                 WHEN is_rmw_stamped OR is_dds_stamped THEN
                     t.publication_id NOT IN (SELECT publication_id FROM twin WHERE is_equal)
                 ELSE t.publication_id NOT IN (SELECT publication_id FROM twin)
@@ -122,6 +170,7 @@ message AS (
                         NOT IN (SELECT (host, pid) FROM unknown_process)
                     AND (t.take_host, t.take_pid)
                         NOT IN (SELECT (host, pid) FROM unknown_process)
+                    AND t.publication_host NOT IN (FROM far_host)
                     AND p.is_whole
             END
         ) AS is_decided
@@ -146,7 +195,7 @@ SELECT
 FROM recorded
 WHERE kind = 'publication'
 UNION ALL
-SELECT 'take', kind, id, kind, id, is_rmw_take, 'derive.link_transport'
+SELECT 'take', kind, id, kind, id, is_rmw_take OR is_dequeue, 'derive.link_transport'
 FROM recorded
 WHERE kind = 'take'
 UNION ALL
@@ -155,8 +204,7 @@ FROM recorded
 WHERE kind = 'callback_instance'
 UNION ALL
 SELECT
-    'transport', 'publication', publication_id::VARCHAR, 'take', take_id::VARCHAR, is_decided,
-    CASE WHEN is_stamped THEN 'derive.link_transport_exact' ELSE 'derive.link_transport_nearest' END
+    'transport', 'publication', publication_id::VARCHAR, 'take', take_id::VARCHAR, is_decided, needs
 FROM message
 UNION ALL
 SELECT
@@ -165,13 +213,90 @@ SELECT
     'derive.link_causal_' || c.kind
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
-LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id;
-
--- Messages that a subscription did not take, where the publication is in the trace.
-CREATE OR REPLACE TEMP TABLE truth_drop AS
+LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
+WHERE c.callback_instance_id IS NOT NULL
+UNION ALL
 SELECT
-    u.publication_id::VARCHAR AS publication_id, u.subscription_host AS host,
-    u.subscription_pid AS pid, u.subscription_handle, u.reason, u.is_internal
+    c.kind, 'take', c.take_id::VARCHAR, 'publication', c.publication_id::VARCHAR,
+    t.is_whole AND p.is_whole, 'derive.link_causal_' || c.kind
+FROM simulated_causal AS c
+JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
+JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id
+WHERE c.callback_instance_id IS NULL
+UNION ALL
+SELECT
+    split_part(s.kind, '_', 1), s.kind, s.id, t.kind, t.id, s.is_any AND t.is_any,
+    'derive.' || split_part(s.kind, '_', 1)
+FROM recorded AS s
+JOIN recorded AS t
+    ON s.kind IN ('request_sent', 'response_sent') AND t.kind = replace(s.kind, 'sent', 'taken')
+    AND s.id = t.id
+UNION ALL
+SELECT
+    'link_request', 'callback_instance', q.sender_callback_instance_id::VARCHAR, 'request_sent',
+    s.id, s.is_any AND w.id IS NOT NULL, 'derive.link_request'
+FROM simulated_request AS q
+JOIN recorded AS s ON s.kind = 'request_sent' AND q.request_id::VARCHAR = s.id
+LEFT JOIN whole_callback AS w ON q.sender_callback_instance_id::VARCHAR = w.id
+WHERE q.sender_callback_instance_id IS NOT NULL
+UNION ALL
+SELECT
+    'link_response', 'callback_instance', q.callback_instance_id::VARCHAR, 'response_sent', s.id,
+    s.is_any AND t.is_any AND w.id IS NOT NULL, 'derive.link_response'
+FROM simulated_request AS q
+JOIN recorded AS s ON s.kind = 'response_sent' AND q.request_id::VARCHAR = s.id
+JOIN recorded AS t ON t.kind = 'request_taken' AND q.request_id::VARCHAR = t.id
+LEFT JOIN whole_callback AS w ON q.callback_instance_id::VARCHAR = w.id;
+
+-- Messages that a subscription did not take, where the publication is in the trace. An address may
+-- have been that of several subscriptions: `life` says the how manieth had it. Why a message did not
+-- arrive can be told as a rule only if a later one did.
+CREATE OR REPLACE TEMP TABLE truth_drop AS
+WITH life AS (
+    SELECT
+        subscription_id, host, pid, subscription_handle,
+        row_number() OVER (
+            PARTITION BY host, pid, subscription_handle ORDER BY created_ns
+        ) AS life
+    FROM simulated_subscription
+),
+taken AS (
+    SELECT
+        t.subscription_id, p.host, p.pid, p.publisher_handle, t.method,
+        max(p.source_timestamp_ns) AS last_stamp_ns
+    FROM simulated_take AS t
+    JOIN simulated_publication AS p ON t.publication_id = p.publication_id
+    GROUP BY ALL
+),
+last_of_publisher AS (
+    SELECT subscription_id, host, pid, publisher_handle, max(last_stamp_ns) AS last_stamp_ns
+    FROM taken
+    GROUP BY ALL
+),
+last_of_any AS (
+    SELECT
+        subscription_id, max(last_stamp_ns) AS last_stamp_ns,
+        bool_or(method = 'ring_buffer') AS is_buffered
+    FROM taken
+    GROUP BY ALL
+)
+SELECT
+    u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
+    u.reason, u.is_internal,
+    CASE
+        WHEN a.is_buffered AND 'derive.link_transport_ring_buffer' NOT IN (FROM built) THEN false
+        WHEN u.reason = 'before_subscription' THEN true
+        WHEN u.reason = 'overwritten' THEN a.last_stamp_ns > p.source_timestamp_ns
+        WHEN u.reason IN ('before_discovery', 'lost_in_transport', 'take_failed')
+            THEN b.last_stamp_ns > p.source_timestamp_ns
+        ELSE false
+    END IS TRUE AS is_decided
 FROM simulated_undelivered AS u
+JOIN simulated_publication AS p ON u.publication_id = p.publication_id
+JOIN life AS s ON u.subscription_id = s.subscription_id
 JOIN truth_link AS l ON l.kind = 'publication' AND u.publication_id::VARCHAR = l.from_id
+LEFT JOIN last_of_publisher AS b
+    ON u.subscription_id = b.subscription_id AND p.host = b.host AND p.pid = b.pid
+    AND p.publisher_handle = b.publisher_handle
+LEFT JOIN last_of_any AS a ON u.subscription_id = a.subscription_id
 WHERE l.is_decided;
