@@ -1,7 +1,7 @@
 """Precision and recall of what msgflow finds, where what happened is known.
 
     python benchmarks/truth.py [--system NAME]… [--layout NAME]… [--recording NAME]… [--quick]
-        [--factor 0.1] [--traces DIR] [--csv FILE]
+        [--factor 0.1] [--traces DIR] [--jobs N] [--csv FILE]
 
 Simulates systems, each in the layout of every release of ROS 2 and recorded with the faults that
 recordings have, ingests the traces and compares the result with the truth, row by row, in SQL. The
@@ -18,8 +18,10 @@ from __future__ import annotations
 
 import argparse
 import csv
+import os
 import sys
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -134,45 +136,46 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                     yield Case(system, layout, recording, scenario, arguments.factor)
 
 
-def compare(case: Case, directory: Path) -> tuple[list[Judged], list[Drop] | None]:
+def compare(case: Case) -> tuple[list[Judged], list[Drop] | None]:
     """Simulate, ingest and compare; drops are None where the database knows no reasons."""
-    recording = None if case.system == LONG else RECORDINGS[case.recording]
-    simulation = simulate(
-        case.scenario,
-        directory / "trace",
-        factor=case.factor,
-        layout=case.layout,
-        recording=recording,
-        clock_offset_ns=350_000_000,
-    )
-    database = directory / "run.duckdb"
-    ingest([simulation.directory], database)
-    scores, drops = compare_simulated(database, simulation.truth)
+    with tempfile.TemporaryDirectory() as temporary:
+        simulation = simulate(
+            case.scenario,
+            Path(temporary) / "trace",
+            factor=case.factor,
+            layout=case.layout,
+            recording=None if case.system == LONG else RECORDINGS[case.recording],
+            clock_offset_ns=350_000_000,
+        )
+        database = Path(temporary) / "run.duckdb"
+        ingest([simulation.directory], database)
+        scores, drops = compare_simulated(database, simulation.truth)
     return [Judged(case.system, case.layout, case.recording, score) for score in scores], drops
 
 
-def compare_recordings(traces: Path) -> Iterator[Judged]:
-    """Compare the recorded systems."""
-    for truth in sorted(traces.glob("*/truth.jsonl.gz")):
-        with tempfile.TemporaryDirectory() as temporary:
-            database = Path(temporary) / "run.duckdb"
-            ingest([truth.parent], database)
-            for score in compare_recorded(database, truth):
-                yield Judged(truth.parent.name, "recorded", "recorded", score)
+def compare_recording(truth: Path) -> list[Judged]:
+    """Compare a recorded system, given its truth."""
+    with tempfile.TemporaryDirectory() as temporary:
+        database = Path(temporary) / "run.duckdb"
+        ingest([truth.parent], database)
+        scores = compare_recorded(database, truth)
+    return [Judged(truth.parent.name, "recorded", "recorded", score) for score in scores]
 
 
-def show(judged: Judged) -> None:
-    """Print one line."""
-    score = judged.score
-    mark = " " if judged.is_good else "✗"
-    notes = f"  ({score.not_built} not built)" if score.not_built else ""
-    notes += f"  ({score.misguessed} misguessed)" if score.misguessed else ""
-    print(
-        f"{mark} {judged.system:24} {judged.layout:27} {judged.recording:12} {score.kind:18} "
-        f"{score.happened:7} {score.decided:7} {score.found:7} {score.wrong:5} {score.missing:7} "
-        f"{score.precision:.4f} {score.recall:.4f}  {score.labels}{notes}",
-        flush=True,
-    )
+def show(judged: list[Judged]) -> list[Judged]:
+    """Print a line for each, and return them."""
+    for one in judged:
+        score = one.score
+        mark = " " if one.is_good else "✗"
+        notes = f"  ({score.not_built} not built)" if score.not_built else ""
+        notes += f"  ({score.misguessed} misguessed)" if score.misguessed else ""
+        print(
+            f"{mark} {one.system:24} {one.layout:27} {one.recording:12} {score.kind:18} "
+            f"{score.happened:7} {score.decided:7} {score.found:7} {score.wrong:5} "
+            f"{score.missing:7} {score.precision:.4f} {score.recall:.4f}  {score.labels}{notes}",
+            flush=True,
+        )
+    return judged
 
 
 def main() -> None:
@@ -186,6 +189,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few only")
     parser.add_argument("--factor", type=float, default=0.1, help="length of the simulations")
     parser.add_argument("--traces", type=Path, default=SHARED_TRACES, help="recorded systems")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes at work")
     parser.add_argument("--csv", type=Path, help="write the table there as well")
     arguments = parser.parse_args()
 
@@ -196,21 +200,18 @@ def main() -> None:
     everything: list[Judged] = []
     reasons: list[tuple[Case, Drop]] = []
     has_reasons = False
-    for case in cases(arguments):
-        with tempfile.TemporaryDirectory() as temporary:
-            judged, drops = compare(case, Path(temporary))
-        has_reasons |= drops is not None
-        reasons += [(case, drop) for drop in drops or []]
-        everything += judged
-        for one in judged:
-            show(one)
-    if not (arguments.system or arguments.layout or arguments.recording):
-        if arguments.traces.is_dir():
-            for one in compare_recordings(arguments.traces):
-                everything.append(one)
-                show(one)
-        else:
-            print(f"note: no recorded systems — {arguments.traces}", file=sys.stderr)
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        todo = list(cases(arguments))
+        for case, (judged, drops) in zip(todo, pool.map(compare, todo), strict=True):
+            has_reasons |= drops is not None
+            reasons += [(case, drop) for drop in drops or []]
+            everything += show(judged)
+        if not (arguments.system or arguments.layout or arguments.recording or arguments.quick):
+            truths = sorted(arguments.traces.glob("*/truth.jsonl.gz"))
+            if not truths:
+                print(f"note: no recorded systems — {arguments.traces}", file=sys.stderr)
+            for judged in pool.map(compare_recording, truths):
+                everything += show(judged)
 
     are_reasons_right = show_reasons(reasons, has_reasons)
     if arguments.csv:

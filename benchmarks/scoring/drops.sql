@@ -9,6 +9,9 @@ WITH accepted AS (
         ('lost_in_transport', 'not_delivered'),
         ('overwritten', 'overwritten'),
         ('take_failed', 'take_failed'),
+        -- A take that failed meanwhile goes before these.
+        ('lost_in_transport', 'take_failed'),
+        ('overwritten', 'take_failed'),
         -- That a message has expired does not show.
         ('expired', 'lost_in_transport'),
         ('expired', 'not_delivered'),
