@@ -11,6 +11,19 @@ _RECORDING = "How it is recorded"
 _SECOND = 1_000_000_000
 
 
+def _list(is_asked: bool) -> None:
+    """Print each system and what it is, then end."""
+    if not is_asked:
+        return
+    from msgflow.sim import scenarios
+
+    known = scenarios()
+    width = max(map(len, known))
+    for name, scenario in known.items():
+        typer.echo(f"{name:{width}}  {scenario.description}")
+    raise typer.Exit
+
+
 def command(
     scenario: Annotated[
         str,
@@ -19,6 +32,12 @@ def command(
         ),
     ],
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the trace")],
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--list", callback=_list, is_eager=True, help="Name the systems there are, and end"
+        ),
+    ] = False,
     factor: Annotated[
         float, typer.Option("--factor", min=0, help="Length, as a multiple of the scenario's own")
     ] = 1,

@@ -246,3 +246,10 @@ def test_simulate_a_layout_and_a_recording_with_faults(msgflow: Msgflow) -> None
     counts = msgflow("events", "out", "--count").stdout
     assert "dds:write_pre" in counts
     assert "rcl_init" not in counts
+
+
+def test_simulate_lists_the_systems(msgflow):
+    lines = msgflow("simulate", "--list").stdout.splitlines()
+    names = [line.split()[0] for line in lines]
+    assert {"pipeline", "demo", "intra_process", "restarts", "services"} < set(names)
+    assert all(len(line.split()) > 4 for line in lines)
