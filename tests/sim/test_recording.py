@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.sim import Buffers, Recording, simulate
+from msgflow.sim import Buffers, Recording, long_recording, simulate
 
 SECOND = 1_000_000_000
 LENGTH = 0.3
@@ -189,3 +189,18 @@ def test_refuses_what_cannot_be_recorded(wrong, message):
     with pytest.raises(UsageError, match=message) as caught:
         replace(Recording(), **wrong)
     assert caught.value.hint
+
+
+def test_half_an_hour_is_cheap_and_drifts_apart(tmp_path):
+    simulation = simulate(long_recording(), tmp_path / "out", factor=0.02)
+    assert simulation.event_count == pytest.approx(0.02 * 500_000, rel=0.2)
+    rows = duckdb.sql(
+        "SELECT rmw_ns, source_timestamp_ns - rmw_ns AS distance_ns "
+        f"FROM '{simulation.truth['publication']}' WHERE topic_name = '/image' ORDER BY rmw_ns"
+    ).fetchall()
+    # 36 seconds of 20 ppm are 720 µs; each stamp is made some 2 ms after rmw_publish.
+    assert len(rows) == pytest.approx(180, abs=3)
+    assert all(1_500_000 < distance < 4_000_000 for _, distance in rows)
+    half = len(rows) // 2
+    first, second = (sum(d for _, d in part) / half for part in (rows[:half], rows[-half:]))
+    assert second - first == pytest.approx(360_000, rel=0.3)
