@@ -99,8 +99,12 @@ class Executor:
         """A wait is over: see what is ready."""
         ready = self._ready
         ready.clear()
-        ready.extend(timer for timer in self.timers if timer.due <= time)
-        ready.extend(subscription for subscription in self.subscriptions if subscription.queue)
+        for timer in self.timers:
+            if timer.due <= time:
+                ready.append(timer)
+        for subscription in self.subscriptions:
+            if subscription.queue:
+                ready.append(subscription)
         if self.waitables:
             ready.extend(entity for entity in self.waitables if entity.is_ready(time))
         if not ready and self.subscriptions and self._world.random() < _FAILED_TAKE:
@@ -109,22 +113,25 @@ class Executor:
     def pick(self) -> Entity | None:
         """What to execute next; None if there is nothing, or if its groups are busy."""
         for position, entity in enumerate(self._ready):
-            group = entity.group
-            if group.is_reentrant or not group.is_busy:
+            if _is_free(entity.group):
                 del self._ready[position]
                 return entity
         return None
 
     def next_wake_up(self, asleep: int) -> int | None:
         """When a wait that begins at `asleep` ends at the latest, None if it may be for ever."""
-        due = min((timer.due for timer in self.timers if _is_free(timer)), default=None)
-        if any(each.queue and _is_free(each) for each in self.subscriptions) or any(
-            entity.is_ready(asleep) and _is_free(entity) for entity in self.waitables
-        ):
-            due = asleep
+        due: int | None = None
+        for timer in self.timers:
+            if (due is None or timer.due < due) and _is_free(timer.group):
+                due = timer.due
+        for subscription in self.subscriptions:
+            if subscription.queue and _is_free(subscription.group):
+                return asleep
+        for entity in self.waitables:
+            if entity.is_ready(asleep) and _is_free(entity.group):
+                return asleep
         return due
 
 
-def _is_free(entity: Entity) -> bool:
-    group = entity.group
+def _is_free(group: CallbackGroup) -> bool:
     return group.is_reentrant or not group.is_busy

@@ -98,7 +98,7 @@ class Recorder:
         if recording.is_perfect:
             only = self._writer(0, "")
             self.emitters: tuple[Callable[..., None], ...] = tuple(
-                stream.emit for stream in only.streams
+                stream.emit_all for stream in only.streams
             )
             return
         if recording.is_dual_session:

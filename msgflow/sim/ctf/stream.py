@@ -150,6 +150,24 @@ class StreamWriter:
         self._size = size
         self._last = cycles
 
+    def emit_all(self, tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
+        """As `emit`, for a stream without breaks and faults."""
+        pack = tracepoint.pack
+        if pack is None:
+            return
+        cycles = time + self._origin
+        record = pack(tracepoint.id, cycles & _LOW, context, *values)
+        if cycles - self._last > _LOW:
+            record = extended(record, tracepoint.id, cycles)
+        size = self._size + len(record)
+        if size > self._packet_bytes:
+            self._write_packet(cycles, self._packet_bytes, is_full=True)
+            size = _HEADER.size + len(record)
+        tracepoint.count += 1
+        self._records.append(record)
+        self._size = size
+        self._last = cycles
+
     def close(self, end: int) -> None:
         """Write what is left as a last packet, which ends at time `end` (empty or not)."""
         self._pass_breaks(end)
