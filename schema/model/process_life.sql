@@ -1,7 +1,8 @@
 -- name: staging.process_life
--- description: Lives of each pid. A new life starts at an rcl_init from another main thread or
---     process name, or of a context handle initialised before without any object of the old life
---     being used after; but never while another thread of the pid goes on.
+-- description: Lives of each pid. A new life starts at an rcl_init of a context handle initialised
+--     before, unless an object of the old life is used or a callback goes on after it; and at one from
+--     another main thread or process name, unless another thread of the pid goes on. (Threads that
+--     seem to go on prove nothing in the first case: containers number them alike in every life.)
 -- grain: one row per host, PID namespace, pid and life
 -- needs: staging.thread_presence, staging.thread_seen, raw
 WITH initialisation AS (
@@ -26,7 +27,7 @@ WITH initialisation AS (
         )
 ),
 candidate AS (
-    SELECT host_id, pid_ns, vpid, vtid, event_id, is_other_main
+    SELECT host_id, pid_ns, vpid, vtid, event_id, is_other_main, is_same_context
     FROM initialisation
     WHERE is_repeated AND (is_other_main OR is_same_context)
 ),
@@ -44,7 +45,8 @@ used AS (
     SELECT thread_index, event_id, callback
     FROM raw.ros2_callback_start
 ),
--- An object made before and used afterwards, without being made again: the life goes on.
+-- An object made before and used afterwards, without being made again, or a callback of
+-- another thread that began before and ends afterwards: the life goes on.
 surviving AS (
     SELECT DISTINCT c.event_id
     FROM candidate AS c
@@ -62,20 +64,37 @@ surviving AS (
         AND u.handle = m.handle
         AND u.event_id >= m.event_id
     WHERE m.event_id < c.event_id
+    UNION
+    SELECT c.event_id
+    FROM candidate AS c
+    JOIN staging.thread_seen AS s
+        ON c.host_id = s.host_id
+        AND c.pid_ns IS NOT DISTINCT FROM s.pid_ns
+        AND c.vpid = s.vpid
+        AND c.vtid <> s.vtid
+    JOIN raw.ros2_callback_end AS e
+        ON s.thread_index = e.thread_index
+        AND e.event_id > c.event_id
+        AND e.previous_callback_event_id < c.event_id
+    JOIN raw.ros2_callback_start AS b
+        ON e.previous_callback_event_id = b.event_id AND e.callback = b.callback
 ),
 split AS (
     SELECT i.host_id, i.pid_ns, i.vpid, i.event_id
     FROM candidate AS i
-    WHERE (i.is_other_main OR i.event_id NOT IN (SELECT event_id FROM surviving))
-        AND NOT EXISTS (
-            SELECT 1
-            FROM staging.thread_presence AS p
-            WHERE p.host_id = i.host_id
-                AND p.pid_ns IS NOT DISTINCT FROM i.pid_ns
-                AND p.vpid = i.vpid
-                AND p.vtid <> i.vtid
-                AND p.first_event_id < i.event_id
-                AND p.last_event_id > i.event_id
+    WHERE (i.is_same_context AND i.event_id NOT IN (SELECT event_id FROM surviving))
+        OR (
+            i.is_other_main
+            AND NOT EXISTS (
+                SELECT 1
+                FROM staging.thread_presence AS p
+                WHERE p.host_id = i.host_id
+                    AND p.pid_ns IS NOT DISTINCT FROM i.pid_ns
+                    AND p.vpid = i.vpid
+                    AND p.vtid <> i.vtid
+                    AND p.first_event_id < i.event_id
+                    AND p.last_event_id > i.event_id
+            )
         )
 ),
 start AS (

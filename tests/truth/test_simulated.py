@@ -142,10 +142,7 @@ HAVING count(*) > 1
 
 
 @pytest.mark.parametrize("table", CASES)
-def test_row_by_row(request: pytest.FixtureRequest, simulated: Ingested, table: str) -> None:
-    if "container_restarts" in request.node.name and table in {"causal", "executor_state"}:
-        # The threads of the lives of a process are taken for threads that go on.
-        request.applymarker(pytest.mark.xfail(reason="lives with equal thread ids", strict=True))
+def test_row_by_row(simulated: Ingested, table: str) -> None:
     simulated.connection.execute(PLACE)
     expected, _ = CASES[table]
     assert simulated.rows(f"SELECT count(*) FROM ({expected})") > [(0,)]
