@@ -10,8 +10,8 @@ from scoring import compare_simulated
 
 from msgflow.sim import layouts, simulate
 
-# Between rcl and DDS, or between one write and the next, these have no event.
-UNSTITCHED = {"foxy-fastdds", "galactic-cyclonedds", "galactic-fastdds"}
+# Between rcl and DDS these have no event.
+UNSTITCHED = {"galactic-cyclonedds", "galactic-fastdds"}
 OBJECTS = {
     "node": (
         "SELECT full_name FROM node WHERE NOT is_inferred",
@@ -70,7 +70,7 @@ def test_objects(named, table):
 def test_instances_and_links(named, request):
     name, simulation, path, _ = named
     if name in UNSTITCHED:
-        request.applymarker(pytest.mark.xfail(reason="publications are torn or glued", strict=True))
+        request.applymarker(pytest.mark.xfail(reason="publications are torn", strict=True))
     scores, _ = compare_simulated(path, simulation.truth)
     assert {"publication", "take", "callback_instance", "direct", "transport"} <= {
         score.kind for score in scores
