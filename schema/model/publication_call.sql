@@ -62,7 +62,7 @@ written AS (
     FULL JOIN staging.middleware_write AS w
         ON m.end_event_id = w.previous_event_id
         AND m.message = w.message
-        AND m.rmw_ns IS NOT NULL
+        AND coalesce(m.rmw_ns, m.rcl_ns) IS NOT NULL
 ),
 caret AS (
     SELECT

@@ -1,8 +1,8 @@
 -- name: staging.take_chain
 -- description: Layers of one take stitched together, as for publications. A take whose rmw layer
 --     failed is none, although upper layers may report it. One without rcl layer is the
---     middleware's own, where its reader belongs to no rcl subscription although rcl takes are
---     traced.
+--     middleware's own, where its reader belongs to no rcl subscription and never had an rcl layer
+--     either, although rcl takes are traced.
 -- grain: one row per successful take or dequeue
 -- needs: staging.call, staging.context, staging.located, staging.subscription_known
 WITH middleware AS (
@@ -75,7 +75,9 @@ located AS (
     WHERE h.taken IS DISTINCT FROM 0
 ),
 known_reader AS (
-    SELECT DISTINCT process_id, rmw_handle FROM staging.subscription_known
+    SELECT process_id, rmw_handle FROM staging.subscription_known
+    UNION
+    SELECT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL
 ),
 rcl_traced AS (
     SELECT DISTINCT process_id FROM located WHERE rcl_ns IS NOT NULL

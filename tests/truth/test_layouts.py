@@ -11,7 +11,7 @@ from scoring import compare_simulated
 from msgflow.sim import layouts, simulate
 
 # Between rcl and DDS these have no event.
-UNSTITCHED = {"galactic-cyclonedds", "galactic-fastdds"}
+
 OBJECTS = {
     "node": (
         "SELECT full_name FROM node WHERE NOT is_inferred",
@@ -67,10 +67,8 @@ def test_objects(named, table):
     assert ingested.rows(f"{sql} ORDER BY ALL") == expected
 
 
-def test_instances_and_links(named, request):
+def test_instances_and_links(named):
     name, simulation, path, _ = named
-    if name in UNSTITCHED:
-        request.applymarker(pytest.mark.xfail(reason="publications are torn", strict=True))
     scores, _ = compare_simulated(path, simulation.truth)
     assert {"publication", "take", "callback_instance", "direct", "transport"} <= {
         score.kind for score in scores

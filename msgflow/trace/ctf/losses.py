@@ -29,7 +29,7 @@ class LossCounter:
     def losses(
         self, recording: Recording, stream: Stream, packet: Packet, counts: bool
     ) -> tuple[int | None, int]:
-        """Return the events lost in a packet, and the packets lost right before it.
+        """Return the events lost in a packet (None: unknown), and the packets lost before it.
 
         Args:
             recording: what the counter of events counts for.
@@ -45,12 +45,14 @@ class LossCounter:
             sequence = header.sequence or 0
             lost = min(max(sequence - previous.header.sequence - 1, 0), _LARGEST)
         if header.discarded is None:
-            return 0, lost
+            return None if packet.is_cut else 0, lost
         before = self._counters.get(recording, 0)
         if previous is not None and previous.header.discarded is not None:
             before = previous.header.discarded
         if counts:
             self._counters[recording] = header.discarded
+        if packet.is_cut:
+            return None, lost
         return min(_rise(before, header.discarded, header.discarded_bits), _LARGEST), lost
 
 

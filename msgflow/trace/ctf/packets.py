@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _CHUNK = 1 << 20
 _LATEST_NS = (1 << 63) - 1
+_CUT = "the file ends within this packet, it was cut off or is still being written"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +33,7 @@ class Packet:
         size: in bytes, from `offset`.
         content_bits: how much of that is used.
         header: what it says of itself.
+        is_cut: the file ends before the packet does.
     """
 
     path: Path
@@ -40,6 +42,7 @@ class Packet:
     size: int
     content_bits: int
     header: PacketHeader
+    is_cut: bool = False
 
 
 def packets_of(
@@ -98,7 +101,8 @@ class _Hopping:
                 self._report(self._path, number, offset, str(error))
                 offset = self._next_begin(offset)
             else:
-                self._compare_with_index(packet)
+                if not packet.is_cut:
+                    self._compare_with_index(packet)
                 yield packet
                 offset += packet.size
             number += 1
@@ -118,11 +122,14 @@ class _Hopping:
             raise FieldError(
                 f"a packet of {size_bits} bits with {content_bits} used bits makes no sense"
             )
-        if size > rest:
-            raise FieldError(
-                "the file ends within this packet, it was cut off or is still being written"
-            )
         self._check_times(header)
+        if size > rest:
+            is_last = self._next_begin(offset) == self._file_size
+            if not is_last or header.events_at > rest * BYTE:
+                raise FieldError(_CUT)
+            self._report(self._path, number, offset, f"{_CUT}; what is there of it is read")
+            there = min(content_bits, rest * BYTE)
+            return Packet(self._path, number, offset, rest, there, header, is_cut=True)
         size = self._without_swallowed(offset, size, content_bits, number)
         return Packet(self._path, number, offset, size, content_bits, header)
 

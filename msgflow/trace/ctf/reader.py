@@ -12,6 +12,7 @@ from msgflow.trace.ctf.iteration import Iteration
 from msgflow.trace.ctf.layout import StreamLayout
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.probe import begins_of
+from msgflow.trace.ctf.scan import BEYOND_END
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.discovery import stream_files
 from msgflow.trace.exclusive import ExclusiveTraceSet
@@ -104,6 +105,8 @@ class CtfTraceSet(ExclusiveTraceSet):
 
     def _report_in_packet(self, entry: Entry, offset: int, message: str) -> None:
         packet = entry.packet
+        if packet.is_cut and message == BEYOND_END:
+            return  # told when the packet was found
         self._report(
             Damage(
                 entry.stream.trace_index,
