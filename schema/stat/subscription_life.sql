@@ -2,11 +2,10 @@
 -- description: How long each subscription could take messages, on the clock of its host: from its
 --     creation to the last event of the threads that read it, or until its handle was used again.
 -- grain: one row per subscription
--- needs: store.subscription, store.process, store.host, store.trace, store.thread,
---     derive.subscription_reader
+-- needs: store.subscription, store.process, store.host, store.thread, derive.subscription_reader
 WITH host_end AS (
-    SELECT host_id, max(end_ns) AS end_ns
-    FROM store.trace
+    SELECT host_id, max(last_seen_ns) AS end_ns
+    FROM store.process
     GROUP BY host_id
 ),
 reader AS (

@@ -52,7 +52,7 @@ delivered AS MATERIALIZED (
 pace AS (
     SELECT
         subscription_id,
-        max(taken_ns - arrival_ns) AS longest_ns,
+        greatest(max(taken_ns - arrival_ns), 10_000_000) AS longest_ns,
         greatest(10 * quantile_disc(taken_ns - arrival_ns, 0.5), 1_000_000) AS patience_ns
     FROM delivered
     GROUP BY subscription_id
@@ -88,7 +88,7 @@ unidentified AS MATERIALIZED (
     WHERE t.run_id = of_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
 ),
 long_wait AS (
-    SELECT s.subscription_id, w.start_ns, w.end_ns, coalesce(p.patience_ns, 10_000_000) AS patience_ns
+    SELECT s.subscription_id, w.start_ns, w.end_ns
     FROM life AS s
     JOIN store.executor_state AS w ON s.only_thread_id = w.thread_id
     LEFT JOIN pace AS p ON s.subscription_id = p.subscription_id
@@ -101,7 +101,8 @@ known AS (
     SELECT
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
         m.arrival_ns, m.position, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
-        s.last_seen_ns, s.replaced_ns, s.host_end_ns, coalesce(c.longest_ns, 10_000_000) AS longest_ns,
+        s.last_seen_ns, s.replaced_ns, s.host_end_ns,
+        coalesce(c.longest_ns, 10_000_000) AS longest_ns,
         coalesce(c.patience_ns, 10_000_000) AS patience_ns,
         p.taken_ns AS publisher_taken_ns,
         n.taken_ns AS any_taken_ns,
