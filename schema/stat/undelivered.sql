@@ -124,7 +124,8 @@ decided AS (
     SELECT
         k.*,
         CASE
-            WHEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns
+            WHEN w.end_ns IS NOT NULL
+                AND greatest(w.start_ns, k.arrival_ns) + k.patience_ns
                 <= coalesce(k.any_taken_ns, w.end_ns)
                 THEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns
         END AS waited_ns
