@@ -45,10 +45,10 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """
     _forget_topics(con, run_id)
     for name in DERIVED:
-        _store(con, name, run_id, f"derive.{name} WHERE run_id = ?")
+        _store(con, name, run_id)
     _learn_topics(con, run_id)
     for name in DERIVED_FROM_LINKS:
-        _store(con, name, run_id, f"derive.{name}(?)")
+        _store(con, name, run_id)
     con.execute(
         "DELETE FROM store.diagnostic WHERE run_id = ? AND name = 'path_cut'",
         [run_id],
@@ -60,7 +60,7 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     )
 
 
-def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int, source: str) -> None:
+def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
     columns = ", ".join(
         row[0]
         for row in con.execute(
@@ -70,7 +70,18 @@ def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int, source: str) 
         ).fetchall()
     )
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
-    con.execute(f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {source}", [run_id])
+    con.execute(
+        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_source(name)}",
+        [run_id],
+    )
+
+
+def _source(name: str) -> str:
+    """Return what to read the rows of one run, given as parameter, from."""
+    kinds = {header.name: header.kind for header in objects.views()}
+    if kinds[f"derive.{name}"] == "macro":
+        return f"derive.{name}(?)"
+    return f"derive.{name} WHERE run_id = ?"
 
 
 def _forget_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:

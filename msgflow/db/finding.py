@@ -59,9 +59,7 @@ def find(con: duckdb.DuckDBPyConnection, run_ids: Sequence[int]) -> list[Finding
     return [finding for header in headers for finding in _findings(con, header, list(run_ids))]
 
 
-def _findings(
-    con: duckdb.DuckDBPyConnection, header: Header, run_ids: list[int]
-) -> list[Finding]:
+def _findings(con: duckdb.DuckDBPyConnection, header: Header, run_ids: list[int]) -> list[Finding]:
     rows = con.execute(
         f"SELECT run_id, subject, count, detail FROM ({header.body}) "
         "WHERE list_contains(?, run_id) ORDER BY ALL",

@@ -9,7 +9,8 @@
 -- needs: derive.link_transport_exact, derive.trace_gap, store.publication, store.publisher,
 --     store.take, store.subscription, store.node, store.process, store.host
 WITH link AS (
-    SELECT run_id, publication_id, take_id, method, candidate_count
+    SELECT
+        run_id, publication_id, take_id, method, candidate_count, false AS is_loss_affected
     FROM derive.link_transport_exact
 ),
 guess AS (
@@ -63,7 +64,7 @@ SELECT
         ),
         false
     ) AS is_self_loop,
-    x.take_id IS NOT NULL AS is_loss_affected
+    l.is_loss_affected OR x.take_id IS NOT NULL AS is_loss_affected
 FROM link AS l
 JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
 LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
