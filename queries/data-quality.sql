@@ -88,7 +88,9 @@ by_run AS (
     FROM main.link_transport
     GROUP BY run_id
     UNION ALL
-    SELECT run_id, 'ambiguous_transport_links', sum((candidate_count > 1)::BIGINT)::BIGINT, count(*)
+    SELECT
+        run_id, 'ambiguous_transport_links',
+        sum(coalesce(candidate_count > 1, false)::BIGINT)::BIGINT, count(*)
     FROM main.link_transport
     GROUP BY run_id
     UNION ALL
