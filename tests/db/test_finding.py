@@ -48,7 +48,8 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "tracing_paused": (
         {
-            "loss_interval": "kind,start_ns,end_ns\npause,0,1000000000\npause,5000000000,5500000000\n"
+            "loss_interval": "kind,start_ns,end_ns\n"
+            "pause,0,1000000000\npause,5000000000,5500000000\n"
         },
         [("trace", 2, "2 pauses, 1.500 s in all, the longest 1.000 s")],
     ),
