@@ -4,8 +4,8 @@
 --     whole part of the answers is empty.
 -- cause: The event was not enabled in the session, or the installed ROS 2 or middleware does not
 --     have it, although the metadata of the trace may promise it.
--- cure: Enable all events of ROS: lttng enable-event --userspace 'ros2:*' (ros2 trace does), and use
---     a tracetools and a middleware that have them.
+-- cure: Enable all events of ROS: lttng enable-event --userspace 'ros2:*' (ros2 trace does), and
+--     use a tracetools and a middleware that have them.
 -- grain: one row per run and kind
 -- severity: warning
 -- needs: main.publication, main.take, main.callback_instance, main.executor_state
