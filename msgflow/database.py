@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from msgflow.db.check import CheckResult
+    from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
@@ -287,6 +288,19 @@ class Database:
 
         connection = self.connection
         return interruptible(connection, lambda: run_checks(connection))
+
+    def findings(self, *, run: str | int | None = None) -> list[Finding]:
+        """Tell what is wrong with a recording: errors first, each with cause and cure.
+
+        Args:
+            run: 'all', a name or an id; the latest run when None.
+        """
+        from msgflow.db.finding import find
+        from msgflow.query.window import choose_runs
+
+        connection = self.connection
+        run_ids = [chosen.run_id for chosen in choose_runs(self.runs(), run)]
+        return interruptible(connection, lambda: find(connection, run_ids))
 
     def export_parquet(
         self,

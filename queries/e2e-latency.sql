@@ -22,6 +22,8 @@
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
 -- column: lost BIGINT              Roots lost on the way although later ones arrived
 -- column: edge BIGINT              Roots too close to the begin or end of the trace to tell
+-- column: loss_affected BIGINT     Roots with a gap of a trace in their time: what is said of them
+--     may be wrong
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are from
 -- column: min_ns BIGINT [ns]       Shortest latency
 -- column: median_ns BIGINT [ns]    Median latency
@@ -39,6 +41,7 @@
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, sink_event, latency_ns, status, reason,
+        is_loss_affected,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last
@@ -52,7 +55,7 @@ WITH flow AS (
 ),
 root AS (
     SELECT run_id, path_id, root_kind, root_id, any_value(status) AS status,
-        any_value(reason) AS reason
+        any_value(reason) AS reason, bool_or(is_loss_affected) AS is_loss_affected
     FROM flow
     GROUP BY run_id, path_id, root_kind, root_id
 ),
@@ -77,7 +80,8 @@ completeness AS (
         count(*) FILTER (WHERE status = 'reached') AS reached,
         count(*) FILTER (WHERE status = 'superseded') AS superseded,
         count(*) FILTER (WHERE status = 'lost') AS lost,
-        count(*) FILTER (WHERE status = 'edge') AS edge
+        count(*) FILTER (WHERE status = 'edge') AS edge,
+        count(*) FILTER (WHERE is_loss_affected) AS loss_affected
     FROM root
     GROUP BY run_id, path_id
 ),
@@ -102,6 +106,7 @@ SELECT
     coalesce(c.superseded, 0) AS superseded,
     coalesce(c.lost, 0) AS lost,
     coalesce(c.edge, 0) AS edge,
+    coalesce(c.loss_affected, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
     l.min_ns,
     l.quantiles[1] AS median_ns,

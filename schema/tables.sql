@@ -286,7 +286,8 @@ CREATE TABLE store.publication (
     source_timestamp_ns BIGINT,                  -- Stamp that the middleware sent along, clock of ROS [epoch ns]
     start_event_id      BIGINT,                  -- First layer seen [event order]
     end_event_id        BIGINT,                  -- Last layer seen [event order]
-    callback_event_id   BIGINT                   -- Last begin or end of a callback before it; NULL: none [event order]
+    callback_event_id   BIGINT,                  -- Last begin or end of a callback before it; NULL: none [event order]
+    is_loss_affected    BOOLEAN                  -- A gap right before or after it on its thread may hide a layer; NULL: not known
 );
 
 -- One row per message handed over to a subscription.
@@ -301,7 +302,18 @@ CREATE TABLE store.take (
     source_timestamp_ns BIGINT,                  -- Stamp that came with the message, clock of ROS [epoch ns]
     method              VARCHAR NOT NULL,        -- 'rmw', 'ring_buffer', 'caret' or 'callback_only'
     start_event_id      BIGINT,                  -- First layer seen [event order]
-    end_event_id        BIGINT                   -- Last layer seen [event order]
+    end_event_id        BIGINT,                  -- Last layer seen [event order]
+    is_loss_affected    BOOLEAN                  -- A gap right before or after it on its thread may hide a layer or its callback; NULL: not known
+);
+
+-- One row per attempt to take from a subscription that took nothing.
+CREATE TABLE store.failed_take (
+    run_id          BIGINT NOT NULL,             -- Run that the row belongs to -> run.run_id
+    trace_id        BIGINT NOT NULL,             -- Trace it was recorded in -> trace.trace_id
+    subscription_id BIGINT,                      -- Subscription -> subscription.subscription_id
+    process_id      BIGINT NOT NULL,             -- Process it lives in -> process.process_id
+    thread_id       BIGINT NOT NULL,             -- Thread it happened on -> thread.thread_id
+    failed_ns       BIGINT NOT NULL              -- Moment of the attempt [epoch ns]
 );
 
 -- One row per run of a callback.
@@ -321,7 +333,8 @@ CREATE TABLE store.callback_instance (
     depth                  INTEGER NOT NULL,     -- Nesting depth on its thread, from 1
     start_event_id         BIGINT,               -- callback_start [event order]
     end_event_id           BIGINT,               -- callback_end; NULL: never seen to end [event order]
-    effective_end_event_id BIGINT                -- callback_end, else the first event that cannot be inside [event order]
+    effective_end_event_id BIGINT,               -- callback_end, else the first event that cannot be inside [event order]
+    is_loss_affected       BOOLEAN               -- A gap inside or beside it on its thread may hide its end or what it did; NULL: not known
 );
 
 -- One row per service request.
@@ -403,4 +416,21 @@ CREATE TABLE store.link_response (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id
     response_id          BIGINT NOT NULL,        -- Effect -> response.response_id
     callback_instance_id BIGINT                  -- Cause -> callback_instance.callback_instance_id
+);
+
+-- One row per publication and subscription of its topic that is not known to have taken it.
+CREATE TABLE store.undelivered (
+    run_id          BIGINT NOT NULL,             -- Run that the row belongs to -> run.run_id
+    publication_id  BIGINT NOT NULL,             -- The message -> publication.publication_id
+    publisher_id    BIGINT NOT NULL,             -- Its publisher -> publisher.publisher_id
+    subscription_id BIGINT NOT NULL,             -- Who did not take it -> subscription.subscription_id
+    reason          VARCHAR NOT NULL             -- Why; a closed vocabulary
+);
+
+-- One row per take whose publication is not known.
+CREATE TABLE store.orphan_take (
+    run_id          BIGINT NOT NULL,             -- Run that the row belongs to -> run.run_id
+    take_id         BIGINT NOT NULL,             -- The take -> take.take_id
+    subscription_id BIGINT,                      -- Subscription that received it -> subscription.subscription_id
+    reason          VARCHAR NOT NULL             -- Why; a closed vocabulary
 );

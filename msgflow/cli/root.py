@@ -16,7 +16,9 @@ from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
-COMMANDS = ("ingest", "query", "flow", "sql", "info", "events", "export", "db", "simulate")
+COMMANDS = (
+    "ingest", "query", "flow", "sql", "info", "check", "events", "export", "db", "simulate"
+)  # fmt: skip
 
 
 class RootGroup(TyperGroup):

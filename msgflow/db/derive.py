@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 # Tables of `store` that hold the rows of the view of that name in `derive`.
 DERIVED = ("link_transport", "link_causal")
 
+# Likewise, of what is missing: they need the links, and the topics learned from them.
+DERIVED_FROM_LINKS = ("orphan_take", "undelivered")
+
 # Tables of `store` whose rows can learn their topic from a link.
 _TOPIC_OWNERS = ("publisher", "subscription")
 
@@ -42,21 +45,10 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """
     _forget_topics(con, run_id)
     for name in DERIVED:
-        columns = ", ".join(
-            row[0]
-            for row in con.execute(
-                "SELECT column_name FROM duckdb_columns() WHERE schema_name = 'store' "
-                "AND database_name = current_database() AND table_name = ? ORDER BY column_index",
-                [name],
-            ).fetchall()
-        )
-        con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
-        con.execute(
-            f"INSERT INTO store.{name} ({columns}) "
-            f"SELECT {columns} FROM derive.{name} WHERE run_id = ?",
-            [run_id],
-        )
+        _store(con, name, run_id)
     _learn_topics(con, run_id)
+    for name in DERIVED_FROM_LINKS:
+        _store(con, name, run_id)
     con.execute(
         "DELETE FROM store.diagnostic WHERE run_id = ? AND name = 'path_cut'",
         [run_id],
@@ -66,6 +58,30 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [objects.derivation_hash(), run_id],
     )
+
+
+def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
+    columns = ", ".join(
+        row[0]
+        for row in con.execute(
+            "SELECT column_name FROM duckdb_columns() WHERE schema_name = 'store' "
+            "AND database_name = current_database() AND table_name = ? ORDER BY column_index",
+            [name],
+        ).fetchall()
+    )
+    con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
+    con.execute(
+        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_source(name)}",
+        [run_id],
+    )
+
+
+def _source(name: str) -> str:
+    """Return what to read the rows of one run, given as parameter, from."""
+    kinds = {header.name: header.kind for header in objects.views()}
+    if kinds[f"derive.{name}"] == "macro":
+        return f"derive.{name}(?)"
+    return f"derive.{name} WHERE run_id = ?"
 
 
 def _forget_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:

@@ -75,8 +75,8 @@ def definition_hash() -> str:
 
 @cache
 def derivation_hash() -> str:
-    """Return the SHA-256 of the SQL that derives links from the stored instances."""
-    return _hash(_texts(("link",)))
+    """Return the SHA-256 of the SQL that derives what is stored of links and of what is missing."""
+    return _hash(_texts(("link", "stat")))
 
 
 def _texts(layers: Sequence[str]) -> Iterable[str]:

@@ -108,6 +108,11 @@ def _flag(name: str, comment: str) -> Column[Any]:
     return _column(name, Boolean, comment, required=True)
 
 
+def _loss_affected(comment: str) -> Column[Any]:
+    # Runs of before this column have NULL: DuckDB cannot add a column that must have a value.
+    return _column("is_loss_affected", Boolean, f"{comment}; NULL: not known")
+
+
 def _handle(name: str, comment: str) -> Column[Any]:
     return _column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
 
@@ -455,6 +460,7 @@ publication = _table(
     _order("start_event_id", "First layer seen"),
     _order("end_event_id", "Last layer seen"),
     _order("callback_event_id", "Last begin or end of a callback before it; NULL: none"),
+    _loss_affected("A gap right before or after it on its thread may hide a layer"),
 )
 
 take = _table(
@@ -471,6 +477,18 @@ take = _table(
     _text("method", "'rmw', 'ring_buffer', 'caret' or 'callback_only'", required=True),
     _order("start_event_id", "First layer seen"),
     _order("end_event_id", "Last layer seen"),
+    _loss_affected("A gap right before or after it on its thread may hide a layer or its callback"),
+)
+
+failed_take = _table(
+    "failed_take",
+    "One row per attempt to take from a subscription that took nothing",
+    _run(),
+    _trace(),
+    _reference("subscription_id", "Subscription", to="subscription.subscription_id"),
+    _process(),
+    _thread(),
+    _time("failed_ns", "Moment of the attempt", required=True),
 )
 
 callback_instance = _table(
@@ -492,6 +510,7 @@ callback_instance = _table(
     _order("start_event_id", "callback_start"),
     _order("end_event_id", "callback_end; NULL: never seen to end"),
     _order("effective_end_event_id", "callback_end, else the first event that cannot be inside"),
+    _loss_affected("A gap inside or beside it on its thread may hide its end or what it did"),
 )
 
 request = _table(
@@ -607,4 +626,37 @@ link_response = _table(
     _run(),
     _reference("response_id", "Effect", to="response.response_id", required=True),
     _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+)
+
+# --- what is missing -----------------------------------------------------------------------------
+
+undelivered = _table(
+    "undelivered",
+    "One row per publication and subscription of its topic that is not known to have taken it",
+    _run(),
+    _reference(
+        "publication_id",
+        "The message",
+        to="publication.publication_id",
+        required=True,
+    ),
+    _reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
+    _reference(
+        "subscription_id",
+        "Who did not take it",
+        to="subscription.subscription_id",
+        required=True,
+    ),
+    _text("reason", "Why; a closed vocabulary", required=True),
+)
+
+orphan_take = _table(
+    "orphan_take",
+    "One row per take whose publication is not known",
+    _run(),
+    _reference("take_id", "The take", to="take.take_id", required=True),
+    _reference(
+        "subscription_id", "Subscription that received it", to="subscription.subscription_id"
+    ),
+    _text("reason", "Why; a closed vocabulary", required=True),
 )

@@ -38,7 +38,9 @@ _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<descri
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
-_SINGLE = ("name", "title", "description", "grain", "kind", "severity", "note", "needs")
+_SINGLE = (
+    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "needs"
+)  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
 
@@ -101,7 +103,9 @@ class Header:
         params: parameters in the order of the file.
         columns: output columns in the order of the file.
         needs: names of the objects that the body reads.
-        severity: of a check, else None.
+        severity: of a check or finding, else None.
+        cause: where a finding comes from, else None.
+        cure: what to do about a finding, else None.
         note: 'clocks' where rows compare times of several hosts, else None.
         body: the SQL below the header.
         path: the file.
@@ -116,6 +120,8 @@ class Header:
     columns: tuple[Column, ...]
     needs: tuple[str, ...]
     severity: str | None
+    cause: str | None
+    cure: str | None
     note: str | None
     body: str
     path: Path
@@ -174,6 +180,8 @@ def parse(text: str, path: Path) -> Header:
         columns=columns,
         needs=tuple(part.strip() for part in single.get("needs", "").split(",") if part.strip()),
         severity=single.get("severity"),
+        cause=single.get("cause"),
+        cure=single.get("cure"),
         note=note,
         body=body,
         path=path,

@@ -3,7 +3,8 @@
 -- grain: one row per word that is not
 -- severity: error
 -- needs: store.loss_interval, store.clock, store.callback, store.annotation, store.take,
---     store.executor_state, store.link_transport, store.link_causal, store.diagnostic
+--     store.executor_state, store.link_transport, store.link_causal, store.undelivered,
+--     store.orphan_take, store.diagnostic
 SELECT DISTINCT run_id, 'loss_interval.kind' AS place, kind AS word
 FROM store.loss_interval
 WHERE kind NOT IN ('loss', 'packets', 'pause')
@@ -39,6 +40,21 @@ UNION ALL
 SELECT DISTINCT run_id, 'link_causal.kind', kind
 FROM store.link_causal
 WHERE kind NOT IN ('direct', 'periodic_async', 'partial_sync', 'take_adjacent')
+UNION ALL
+SELECT DISTINCT run_id, 'undelivered.reason', reason
+FROM store.undelivered
+WHERE reason NOT IN (
+    'before_subscription', 'subscription_ended', 'receiver_gap', 'take_failed',
+    'before_discovery', 'not_delivered', 'overwritten', 'lost_in_transport', 'pending_at_end',
+    'unknown'
+)
+UNION ALL
+SELECT DISTINCT run_id, 'orphan_take.reason', reason
+FROM store.orphan_take
+WHERE reason NOT IN (
+    'no_stamp', 'before_tracing', 'publisher_gap', 'publisher_trace_ends',
+    'publisher_not_traced', 'ambiguous', 'unknown'
+)
 UNION ALL
 SELECT DISTINCT run_id, 'diagnostic.severity', severity
 FROM store.diagnostic

@@ -1,5 +1,6 @@
 -- name: derive.link_causal
--- description: What led to each publication, by every kind of link.
+-- description: What led to each publication, by every kind of link. A link may be spoilt by lost
+--     events where a gap touches its run of a callback or its publication.
 -- grain: one row per run of a callback and publication that it led to
 -- needs: derive.link_causal_direct, store.callback_instance, store.take, store.publication
 WITH link AS (
@@ -19,6 +20,8 @@ SELECT
     l.annotation_id,
     l.candidate_count,
     l.is_loss_affected
+    OR coalesce(i.is_loss_affected, false)
+    OR coalesce(b.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
 JOIN store.callback_instance AS i
     ON l.callback_instance_id = i.callback_instance_id AND l.run_id = i.run_id

@@ -1,10 +1,53 @@
 -- name: derive.link_transport
 -- description: Messages from publication to take, by every method. A node that takes its own
 --     transform, or whose process's transform listener does, is a self loop: no flow passes
---     through it. Links by equal stamps cannot be spoilt by lost events.
+--     through it. A link by equal stamps and topics with one candidate cannot be spoilt by lost
+--     events. Any other can: where a gap of the sender's trace lies between the publication and the
+--     take (on hosts with different clocks: within the publication), or a gap of the receiver's
+--     trace likewise, the better candidate may be in it.
 -- grain: one row per take whose publication is known
--- needs: derive.link_transport_exact, store.publication, store.publisher, store.take,
---     store.subscription, store.node
+-- needs: derive.link_transport_exact, derive.trace_gap, store.publication, store.publisher,
+--     store.take, store.subscription, store.node, store.process, store.host
+WITH link AS (
+    SELECT
+        run_id, publication_id, take_id, method, candidate_count, false AS is_loss_affected
+    FROM derive.link_transport_exact
+),
+guess AS (
+    SELECT
+        l.run_id, l.take_id, b.trace_id AS sender_trace_id, t.trace_id AS receiver_trace_id,
+        b.start_ns AS sent_ns,
+        CASE WHEN bh.clock_id = th.clock_id THEN greatest(b.end_ns, t.taken_ns) ELSE b.end_ns END
+            AS sent_until_ns,
+        CASE WHEN bh.clock_id = th.clock_id THEN least(b.start_ns, t.taken_ns) ELSE t.taken_ns END
+            AS received_from_ns,
+        t.taken_ns
+    FROM link AS l
+    JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
+    JOIN store.process AS bp ON b.process_id = bp.process_id
+    JOIN store.host AS bh ON bp.host_id = bh.host_id
+    JOIN store.take AS t ON l.take_id = t.take_id AND l.run_id = t.run_id
+    JOIN store.process AS tp ON t.process_id = tp.process_id
+    JOIN store.host AS th ON tp.host_id = th.host_id
+    WHERE l.method <> 'exact' OR l.candidate_count > 1
+),
+exposed AS (
+    SELECT u.run_id, u.take_id
+    FROM guess AS u
+    ASOF JOIN derive.trace_gap AS g
+        ON u.run_id = g.run_id
+        AND u.sender_trace_id = g.trace_id
+        AND u.sent_until_ns >= g.start_ns
+    WHERE g.covered_until_ns >= u.sent_ns
+    UNION
+    SELECT u.run_id, u.take_id
+    FROM guess AS u
+    ASOF JOIN derive.trace_gap AS g
+        ON u.run_id = g.run_id
+        AND u.receiver_trace_id = g.trace_id
+        AND u.taken_ns >= g.start_ns
+    WHERE g.covered_until_ns >= u.received_from_ns
+)
 SELECT
     l.run_id,
     l.publication_id,
@@ -21,11 +64,12 @@ SELECT
         ),
         false
     ) AS is_self_loop,
-    false AS is_loss_affected
-FROM derive.link_transport_exact AS l
+    l.is_loss_affected OR x.take_id IS NOT NULL AS is_loss_affected
+FROM link AS l
 JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
 LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
 JOIN store.take AS t ON l.take_id = t.take_id AND l.run_id = t.run_id
 LEFT JOIN store.subscription AS s
     ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id AND s.run_id = n.run_id
+LEFT JOIN exposed AS x ON l.run_id = x.run_id AND l.take_id = x.take_id

@@ -2,7 +2,8 @@
 -- description: Runs of callbacks, numbered in the order in which they began, with the run that
 --     each is nested in.
 -- grain: one row per run of a callback
--- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take
+-- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take,
+--     staging.beside_gap
 WITH callback_of AS (
     SELECT b.start_event_id, c.callback_id
     FROM staging.callback_binding AS b
@@ -51,10 +52,31 @@ nested AS (
         ON n.thread_id = p.thread_id
         AND n.depth - 1 = p.depth
         AND n.start_event_id > p.start_event_id
+),
+-- Runs with a gap inside, right before, or (never seen to end) right after.
+exposed AS (
+    SELECT callback_instance_id, thread_id, start_event_id, end_event_id, effective_end_event_id
+    FROM numbered
+    WHERE thread_id IN (SELECT thread_id FROM staging.beside_gap)
+),
+touched AS (
+    SELECT e.callback_instance_id
+    FROM exposed AS e
+    ASOF JOIN (SELECT thread_id, event_id FROM staging.beside_gap WHERE is_behind) AS g
+        ON e.thread_id = g.thread_id AND e.effective_end_event_id >= g.event_id
+    WHERE g.event_id >= e.start_event_id
+    UNION
+    SELECT e.callback_instance_id
+    FROM (SELECT * FROM exposed WHERE end_event_id IS NULL) AS e
+    ASOF JOIN (SELECT thread_id, event_id FROM staging.beside_gap WHERE NOT is_behind) AS g
+        ON e.thread_id = g.thread_id AND e.effective_end_event_id > g.event_id
+    WHERE g.event_id >= e.start_event_id
 )
 SELECT
     n.callback_instance_id, n.trace_id, n.callback_id, n.process_id, n.thread_id, n.start_ns,
     n.end_ns, n.take_id, NULL::BIGINT AS request_id, n.is_intra_process, p.parent_id, n.depth,
-    n.start_event_id, n.end_event_id, n.effective_end_event_id
+    n.start_event_id, n.end_event_id, n.effective_end_event_id,
+    g.callback_instance_id IS NOT NULL AS is_loss_affected
 FROM numbered AS n
 LEFT JOIN nested AS p ON n.callback_instance_id = p.callback_instance_id
+LEFT JOIN touched AS g ON n.callback_instance_id = g.callback_instance_id

@@ -3,7 +3,8 @@
 -- grain: one row per finding
 -- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
 --     staging.callback_instance, staging.callback_left_over,
---     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host
+--     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host,
+--     staging.trace_overlap, staging.source, staging.publisher_known, staging.subscription_known
 WITH unmatched_end AS (
     SELECT trace_index
     FROM staging.callback_left_over
@@ -21,6 +22,19 @@ damage AS (
         row_number() OVER (PARTITION BY trace_index ORDER BY file, position, byte_offset, message)
             AS number
     FROM staging.damage
+),
+initialised AS (
+    SELECT
+        process_id, publisher_handle AS handle, topic_name,
+        lag(topic_name) OVER (
+            PARTITION BY process_id, publisher_handle ORDER BY event_id
+        ) AS previous_topic
+    FROM staging.publisher_known
+    UNION ALL
+    SELECT
+        process_id, subscription_handle, topic_name,
+        lag(topic_name) OVER (PARTITION BY process_id, subscription_handle ORDER BY event_id)
+    FROM staging.subscription_known
 ),
 inferred AS (
     SELECT 'node' AS kind, process_id FROM staging.node WHERE is_inferred
@@ -122,3 +136,28 @@ SELECT
 FROM inferred AS i
 JOIN process_label AS l ON i.process_id = l.process_id
 GROUP BY i.kind
+UNION ALL
+SELECT
+    o.second_index + 1,
+    'overlapping_traces',
+    'error',
+    o.event_count,
+    printf(
+        'events of %d threads, over %.3f s, that the trace %s holds as well: what they did is '
+        || 'counted twice',
+        o.thread_count, o.length_ns / 1e9, s.path
+    )
+FROM staging.trace_overlap AS o
+JOIN staging.source AS s ON o.first_index = s.trace_index
+UNION ALL
+SELECT
+    NULL,
+    'repeated_initialisation',
+    'info',
+    count(*),
+    'publishers and subscriptions initialised on the handle of one of the same topic: created '
+    || 'anew, or traced twice; the later one counts from then on: '
+    || string_agg(DISTINCT topic_name, ', ' ORDER BY topic_name)
+FROM initialised
+WHERE topic_name = previous_topic
+HAVING count(*) > 0

@@ -2,7 +2,7 @@
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
 -- needs: staging.publication_call, staging.publication_origin, staging.publisher,
---     staging.callback_left_over, staging.callback_pair
+--     staging.callback_left_over, staging.callback_pair, staging.beside_gap
 WITH publisher_of AS (
     SELECT o.start_event_id, p.publisher_id
     FROM staging.publication_origin AS o
@@ -56,8 +56,13 @@ SELECT
     c.start_event_id,
     c.end_event_id,
     CASE WHEN q.start_event_id IS NULL THEN c.callback_event_id ELSE q.callback_event_id END
-        AS callback_event_id
+        AS callback_event_id,
+    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL AS is_loss_affected
 FROM staging.publication_call AS c
 JOIN numbered AS n ON c.start_event_id = n.start_event_id
 LEFT JOIN publisher_of AS p ON c.start_event_id = p.start_event_id
 LEFT JOIN placed AS q ON c.start_event_id = q.start_event_id
+LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
+    ON c.start_event_id = behind.event_id
+LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE NOT is_behind) AS before
+    ON c.end_event_id = before.event_id

@@ -1,7 +1,7 @@
 -- name: staging.take
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
--- needs: staging.take_origin, staging.subscription
+-- needs: staging.take_origin, staging.subscription, staging.beside_gap
 WITH subscription_of AS (
     SELECT o.start_event_id, s.subscription_id
     FROM staging.take_origin AS o
@@ -29,7 +29,12 @@ SELECT
     o.method,
     o.start_event_id,
     o.end_event_id,
-    o.callback_start_event_id
+    o.callback_start_event_id,
+    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL AS is_loss_affected
 FROM staging.take_origin AS o
 JOIN numbered AS n ON o.start_event_id = n.start_event_id
 LEFT JOIN subscription_of AS s ON o.start_event_id = s.start_event_id
+LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
+    ON o.start_event_id = behind.event_id
+LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE NOT is_behind) AS before
+    ON o.end_event_id = before.event_id

@@ -14,6 +14,8 @@
 -- column: is_intra_process BOOLEAN  Called with an intra-process message
 -- column: parent_id BIGINT  Run it is nested in
 -- column: depth INTEGER  Nesting depth on its thread, from 1
+-- column: is_loss_affected BOOLEAN  A gap inside or beside it on its thread may hide its end or
+--     what it did
 -- needs: store.callback_instance, derive.corrected_ns, derive.process_clock
 SELECT
     self.callback_instance_id,
@@ -28,6 +30,7 @@ SELECT
     self.request_id,
     self.is_intra_process,
     self.parent_id,
-    self.depth
+    self.depth,
+    coalesce(self.is_loss_affected, false) AS is_loss_affected
 FROM store.callback_instance AS self
 JOIN derive.process_clock AS c ON self.process_id = c.process_id

@@ -26,13 +26,16 @@
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: status VARCHAR  'reached', 'superseded', 'lost' or 'edge'
--- column: reason VARCHAR  Why it did not arrive: 'not_delivered', 'not_published',
---     'superseded' or 'callback_not_finished'
+-- column: reason VARCHAR  Why it did not arrive: 'not_published', 'superseded',
+--     'callback_not_finished', or a reason of main.stat_delivery for the message that stopped it
 -- column: is_first BOOLEAN  First arrival of the root
 -- column: is_last BOOLEAN  Last arrival of the root
 -- column: is_newest BOOLEAN  Newest root of the arrival
+-- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
+--     where it did not arrive, as long as the longest flow of the path took
 -- needs: main.flow_path, derive.flow_root, derive.flow_transport, derive.flow_continuation,
---     main.publication, main.callback_instance, main.take, store.publisher
+--     main.publication, main.callback_instance, main.take, main.loss_interval, store.publisher,
+--     store.undelivered
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
     max_depth := 32, max_paths := 1000
@@ -227,7 +230,7 @@ explained AS (
         s.root_key,
         CASE
             WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
-            WHEN s.publication_id IS NOT NULL THEN 'not_delivered'
+            WHEN s.publication_id IS NOT NULL THEN coalesce(u.reason, 'unknown')
             ELSE 'not_published'
         END AS reason,
         s.publication_id IS NULL AND s.is_cached AS is_cached,
@@ -246,52 +249,85 @@ explained AS (
     LEFT JOIN delivered AS d
         ON s.publisher_id = d.publisher_id AND s.subscription_id = d.subscription_id
     LEFT JOIN finished AS f ON s.path_id = f.path_id
+    LEFT JOIN store.undelivered AS u
+        ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
     LEFT JOIN main.take AS t ON s.take_id = t.take_id
     LEFT JOIN continued AS c
         ON t.subscription_id = c.subscription_id AND s.publisher_id = c.publisher_id
+),
+outcome AS MATERIALIZED (
+    SELECT
+        e.run_id,
+        e.path_id,
+        e.root_key,
+        e.root_ns,
+        a.take_id,
+        a.sink_event,
+        a.sink_ns,
+        'reached' AS status,
+        NULL::VARCHAR AS reason
+    FROM pair AS a
+    JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
+    UNION ALL
+    SELECT
+        m.run_id,
+        m.path_id,
+        m.root_key,
+        m.root_ns,
+        NULL,
+        NULL,
+        NULL,
+        CASE
+            WHEN x.is_edge THEN 'edge'
+            WHEN x.is_cached THEN 'superseded'
+            ELSE 'lost'
+        END,
+        CASE WHEN x.is_cached AND NOT x.is_edge THEN 'superseded' ELSE x.reason END
+    FROM missing AS m
+    JOIN explained AS x ON m.path_id = x.path_id AND m.root_key = x.root_key
+),
+longest AS (
+    SELECT path_id, max(sink_ns - root_ns) AS longest_ns
+    FROM outcome
+    GROUP BY path_id
+),
+timed AS (
+    SELECT
+        o.run_id, o.path_id, o.root_key, o.root_ns, o.take_id, o.sink_event, o.sink_ns, o.status,
+        o.reason, coalesce(o.sink_ns, o.root_ns + coalesce(l.longest_ns, 0)) AS until_ns
+    FROM outcome AS o
+    JOIN longest AS l ON o.path_id = l.path_id
+),
+gap AS (
+    SELECT
+        run_id, start_ns,
+        max(end_ns) OVER (
+            PARTITION BY run_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
+        ) AS covered_until_ns
+    FROM main.loss_interval
+    WHERE list_contains(runs, run_id)
 )
 SELECT
-    e.run_id,
-    e.path_id,
-    CASE WHEN e.root_key > 0 THEN 'callback_instance' ELSE 'publication' END AS root_kind,
-    abs(e.root_key) AS root_id,
-    e.root_ns,
-    a.take_id,
-    a.sink_event,
-    a.sink_ns,
-    a.sink_ns - e.root_ns AS latency_ns,
-    'reached' AS status,
-    NULL AS reason,
+    o.run_id,
+    o.path_id,
+    CASE WHEN o.root_key > 0 THEN 'callback_instance' ELSE 'publication' END AS root_kind,
+    abs(o.root_key) AS root_id,
+    o.root_ns,
+    o.take_id,
+    o.sink_event,
+    o.sink_ns,
+    o.sink_ns - o.root_ns AS latency_ns,
+    o.status,
+    o.reason,
     row_number() OVER (
-        PARTITION BY a.path_id, a.root_key ORDER BY a.sink_ns, a.take_id
+        PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns, o.take_id
     ) = 1 AS is_first,
     row_number() OVER (
-        PARTITION BY a.path_id, a.root_key ORDER BY a.sink_ns DESC, a.take_id DESC
+        PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns DESC, o.take_id DESC
     ) = 1 AS is_last,
-    row_number() OVER (
-        PARTITION BY a.path_id, a.take_id ORDER BY e.root_ns DESC, a.root_key DESC
-    ) = 1 AS is_newest
-FROM pair AS a
-JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
-UNION ALL
-SELECT
-    m.run_id,
-    m.path_id,
-    CASE WHEN m.root_key > 0 THEN 'callback_instance' ELSE 'publication' END,
-    abs(m.root_key),
-    m.root_ns,
-    NULL,
-    NULL,
-    NULL,
-    NULL,
-    CASE
-        WHEN x.is_edge THEN 'edge'
-        WHEN x.is_cached THEN 'superseded'
-        ELSE 'lost'
-    END,
-    CASE WHEN x.is_cached AND NOT x.is_edge THEN 'superseded' ELSE x.reason END,
-    true,
-    true,
-    true
-FROM missing AS m
-JOIN explained AS x ON m.path_id = x.path_id AND m.root_key = x.root_key
+    o.take_id IS NULL OR row_number() OVER (
+        PARTITION BY o.path_id, o.take_id ORDER BY o.root_ns DESC, o.root_key DESC
+    ) = 1 AS is_newest,
+    coalesce(g.covered_until_ns >= o.root_ns, false) AS is_loss_affected
+FROM timed AS o
+ASOF LEFT JOIN gap AS g ON o.run_id = g.run_id AND o.until_ns >= g.start_ns

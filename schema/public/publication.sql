@@ -15,6 +15,7 @@
 -- column: rmw_ns BIGINT [epoch ns]  rmw_publish
 -- column: dds_ns BIGINT [epoch ns]  dds:write
 -- column: source_timestamp_ns BIGINT [epoch ns]  Stamp that the middleware sent along, clock of ROS
+-- column: is_loss_affected BOOLEAN  A gap right before or after it on its thread may hide a layer
 -- needs: store.publication, derive.corrected_ns, derive.process_clock
 SELECT
     self.publication_id,
@@ -30,6 +31,7 @@ SELECT
     derive.corrected_ns(self.rcl_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS rcl_ns,
     derive.corrected_ns(self.rmw_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS rmw_ns,
     derive.corrected_ns(self.dds_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS dds_ns,
-    self.source_timestamp_ns
+    self.source_timestamp_ns,
+    coalesce(self.is_loss_affected, false) AS is_loss_affected
 FROM store.publication AS self
 JOIN derive.process_clock AS c ON self.process_id = c.process_id

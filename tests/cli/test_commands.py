@@ -17,6 +17,7 @@ COMMANDS = (
     "query",
     "sql",
     "info",
+    "check",
     "events",
     "export",
     "export parquet",

@@ -142,13 +142,13 @@ def test_what_became_of_every_root(built: Analysis, chain: Chain) -> None:
         begin, end = times[f"{root} start"], times[f"{sink} end"]
         expected.append(("callback_instance", begin, end, end - begin, "reached", None))
     for root, status, reason in (
-        ("A", "edge", "not_delivered"),
-        ("D", "lost", "not_delivered"),
+        ("A", "edge", "before_discovery"),
+        ("D", "lost", "lost_in_transport"),
         ("E", "lost", "not_published"),
-        ("F", "lost", "not_delivered"),
+        ("F", "lost", "lost_in_transport"),
         ("G", "lost", "callback_not_finished"),
-        ("I", "edge", "not_delivered"),
-        ("J", "edge", "not_delivered"),
+        ("I", "edge", "pending_at_end"),
+        ("J", "edge", "pending_at_end"),
     ):
         begin = times[f"{root} start"]
         expected.append(("callback_instance", begin, None, None, status, reason))
@@ -282,7 +282,7 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])
     assert row["median_ns"] == latencies[(len(latencies) - 1) // 2]
-    assert row["lost_reasons"] == "callback_not_finished 1, not_delivered 2, not_published 1"
+    assert row["lost_reasons"] == "callback_not_finished 1, lost_in_transport 2, not_published 1"
 
 
 def graph(system: RosSystem, *edges: tuple[str | None, int, str], rounds: int = 1) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from ros_system import RosSystem
 from staged_events import Analyse, Thread
 
@@ -130,3 +131,156 @@ def test_the_extent_of_a_trace(system: RosSystem, analyse: Analyse) -> None:
     assert analyse(system).rows("SELECT start_ns, end_ns, event_count, domain FROM trace") == [
         (500, 2_000, 3, "ust")
     ]
+
+
+def test_what_meets_a_gap_is_marked(system: RosSystem, analyse: Analyse) -> None:
+    """A message published and taken right before the gap, and one right after it; one later."""
+    system.publisher(Thread(100), 0x10, "/a")
+    system.subscription(Thread(100), 0x30, "/a", callback=0xC1)
+    thread = Thread(100)
+    for stamp in (1, 2, 3):
+        system.publish(thread, 0x10, stamp)
+        system.take(thread, 0x30, stamp)
+        system.start(thread, 0xC1)
+        system.end(thread, 0xC1)
+        if stamp == 1:
+            system.lose()
+    model = analyse(system)
+    assert model.column(
+        "SELECT source_timestamp_ns FROM publication WHERE is_loss_affected ORDER BY 1"
+    ) == [2]
+    assert model.column("SELECT source_timestamp_ns FROM take WHERE is_loss_affected") == []
+    assert model.column("SELECT count(*) FROM link_transport WHERE is_loss_affected") == [0]
+
+
+def test_a_take_whose_callback_is_in_the_gap(system: RosSystem, analyse: Analyse) -> None:
+    system.subscription(Thread(100), 0x30, "/a", callback=0xC1)
+    system.take(Thread(100), 0x30, 1)
+    system.lose()
+    system.end(Thread(100), 0xC1)
+    model = analyse(system)
+    assert model.column("SELECT is_loss_affected FROM take") == [True]
+    assert model.column("SELECT count(*) FROM callback_instance") == [0]
+
+
+def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse) -> None:
+    system.subscription(Thread(100), 0x30, "/a", callback=0xC1)
+    system.add("ros2:rmw_take", Thread(100), message=0xB)
+    system.lose()
+    system.start(Thread(100), 0xC1)
+    system.end(Thread(100), 0xC1)
+    model = analyse(system)
+    assert model.rows("SELECT method, is_loss_affected FROM take ORDER BY taken_ns DESC")[0] == (
+        "callback_only",
+        True,
+    )
+    assert model.column("SELECT is_loss_affected FROM callback_instance") == [True]
+
+
+def test_links_of_a_run_that_meets_a_gap_are_marked(system: RosSystem, analyse: Analyse) -> None:
+    thread = Thread(100)
+    system.publisher(thread, 0x10, "/a")
+    system.timer(thread, 0x20, 0xC0)
+    for stamp in (1, 2, 3):
+        system.start(thread, 0xC0)
+        system.publish(thread, 0x10, stamp)
+        if stamp == 2:
+            system.wait(10)
+            system.add("ros2:rcl_publish", thread, publisher_handle=0x77, message=0x7)
+            system.lose()
+        system.end(thread, 0xC0)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT b.source_timestamp_ns, l.is_loss_affected, i.end_ns IS NULL FROM link_causal AS l "
+        "JOIN publication AS b USING (publication_id) "
+        "JOIN callback_instance AS i USING (callback_instance_id) "
+        "WHERE b.source_timestamp_ns IS NOT NULL ORDER BY 1"
+    ) == [(1, False, False), (2, True, True), (3, False, False)]
+
+
+def test_a_gap_at_the_end_marks_what_never_ended(system: RosSystem, analyse: Analyse) -> None:
+    """A run that ended before it is whole."""
+    thread, other = Thread(100), Thread(200)
+    system.start(thread, 0xC1)
+    system.end(thread, 0xC1)
+    system.start(thread, 0xC2)
+    system.lose()
+    system.start(other, 0xC3)
+    system.end(other, 0xC3)
+    model = analyse(system)
+    assert model.column("SELECT is_loss_affected FROM callback_instance ORDER BY start_ns") == [
+        False,
+        True,
+        False,
+    ]
+
+
+def test_a_guess_over_a_gap_is_marked(system: RosSystem, analyse: Analyse) -> None:
+    """Two publications with one stamp: a third may be in the gap between them and the take."""
+    thread = Thread(100)
+    system.publisher(thread, 0x10, "/a")
+    system.subscription(thread, 0x30, "/a")
+    for stamp in (1, 2):
+        system.publish(thread, 0x10, stamp)
+        system.publish(thread, 0x10, stamp)
+        if stamp == 2:
+            system.lose()
+            system.wait(10)
+        system.take(thread, 0x30, stamp)
+        system.take(thread, 0x30, stamp)
+    assert analyse(system).rows(
+        "SELECT b.source_timestamp_ns, l.candidate_count, l.is_loss_affected "
+        "FROM link_transport AS l JOIN publication AS b USING (publication_id) ORDER BY ALL"
+    ) == [(1, 2, False), (1, 2, False), (2, 2, True), (2, 2, True)]
+
+
+def test_a_lost_end_costs_one_run(system: RosSystem, analyse: Analyse) -> None:
+    """Where no gap is declared: the others of the thread keep their ends."""
+    thread = Thread(100)
+    times = []
+    for number in range(4):
+        start = system.start(thread, 0xC1)
+        end = system.end(thread, 0xC1) if number != 1 else None
+        times.append((start, end))
+    assert (
+        analyse(system).rows("SELECT start_ns, end_ns FROM callback_instance ORDER BY start_ns")
+        == times
+    )
+
+
+@pytest.mark.parametrize("lost", ["inner", "outer"])
+def test_a_lost_end_of_nested_runs_costs_one(
+    system: RosSystem, analyse: Analyse, lost: str
+) -> None:
+    """The outer callback spins and the inner one runs in it, three times.
+
+    What never ends lasts until the next callback begins: nothing is nested in it.
+    """
+    thread = Thread(100)
+    expected = []
+    for number in range(3):
+        missing = lost if number == 1 else None
+        outer = system.start(thread, 0xC1)
+        inner = system.start(thread, 0xC2)
+        inner_end = system.end(thread, 0xC2) if missing != "inner" else None
+        outer_end = system.end(thread, 0xC1) if missing != "outer" else None
+        depth = 1 if missing == "outer" else 2
+        expected += [(outer, outer_end, 1), (inner, inner_end, depth)]
+    assert (
+        analyse(system).rows(
+            "SELECT start_ns, end_ns, depth FROM callback_instance ORDER BY start_ns"
+        )
+        == expected
+    )
+
+
+def test_a_lost_end_of_a_recursion_costs_one(system: RosSystem, analyse: Analyse) -> None:
+    """Which of the two was lost, nobody can tell."""
+    thread = Thread(100)
+    system.start(thread, 0xC1)
+    system.start(thread, 0xC1)
+    system.end(thread, 0xC1)
+    for _ in range(2):
+        system.start(thread, 0xC1)
+        system.end(thread, 0xC1)
+    assert analyse(system).value("SELECT count(*) - count(end_ns) FROM callback_instance") == 1

@@ -69,6 +69,7 @@ class RosSystem(StagedEvents):
         node: int = 0x1,
         callback: int | None = None,
         rmw: int | None = None,
+        depth: int = 10,
     ) -> int:
         """The rcl subscription and, with a callback, its rclcpp object."""
         rmw_handle = handle + RMW if rmw is None else rmw
@@ -80,7 +81,7 @@ class RosSystem(StagedEvents):
             node_handle=node,
             rmw_subscription_handle=rmw_handle,
             topic_name=topic,
-            queue_depth=10,
+            queue_depth=depth,
         )
         if callback is not None:
             self.add(

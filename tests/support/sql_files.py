@@ -10,7 +10,7 @@ from msgflow.query.header import Header, read
 from msgflow.resources import resource_directory
 
 # From left to right: an object reads only its own layer and those to its left.
-LAYERS = ("model", "store", "link", "flow", "stat", "public", "check", "queries")
+LAYERS = ("model", "store", "link", "flow", "stat", "public", "check", "finding", "queries")
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
     "model": "staging",
@@ -19,6 +19,7 @@ SCHEMAS = {
     "stat": "derive",
     "public": "main",
     "check": "check",
+    "finding": "finding",
 }
 _REFERENCE = re.compile(r"\b(?:staging|store|derive|main)\.[a-z_0-9]+\b")
 _COMMENT = re.compile(r"--[^\n]*")

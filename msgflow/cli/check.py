@@ -1,0 +1,102 @@
+"""`msgflow check`: what is wrong with a recording, numbered, with cause and cure."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import textwrap
+from dataclasses import asdict
+from enum import StrEnum
+from itertools import groupby
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from msgflow.cli.options import DEFAULT_DATABASE, OUTPUT, DatabaseOption, RunOption
+from msgflow.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from msgflow.db.finding import Finding
+
+_WIDTH = 100
+_PLACES_SHOWN = 10
+
+
+class CheckFormat(StrEnum):
+    """How findings are written."""
+
+    TABLE = "table"
+    JSON = "json"
+
+
+def command(
+    run: RunOption = None,
+    form: Annotated[
+        CheckFormat, typer.Option("--format", help="How to write it", rich_help_panel=OUTPUT)
+    ] = CheckFormat.TABLE,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Tell what is wrong with a recording, with cause and cure; exit code 1 when there are errors.
+
+    Warnings alone leave the exit code at 0.
+    """
+    from msgflow.cli.output import count, print_lines, print_status
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        findings = opened.findings(run=run)
+    print_lines(_json(findings) if form is CheckFormat.JSON else _text(findings))
+    numbers = [
+        count(len({f.name for f in findings if f.severity == severity}), severity)
+        for severity in ("error", "warning")
+    ]
+    print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
+    if any(finding.severity == "error" for finding in findings):
+        raise typer.Exit(ExitCode.FAILED)
+
+
+def _json(findings: Sequence[Finding]) -> Iterator[str]:
+    yield "["
+    for position, (number, finding) in enumerate(_numbered(findings), start=1):
+        comma = "," if position < len(findings) else ""
+        row = {"number": number, **asdict(finding)}
+        yield f"  {json.dumps(row, ensure_ascii=False)}{comma}"
+    yield "]"
+
+
+def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
+    groups = groupby(findings, key=lambda finding: finding.name)
+    for number, (_, places) in enumerate(groups, start=1):
+        for finding in places:
+            yield number, finding
+
+
+def _text(findings: Sequence[Finding]) -> Iterator[str]:
+    from msgflow.export.human import format_cell
+
+    width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)
+    for number, group in groupby(_numbered(findings), key=lambda item: item[0]):
+        places = [finding for _, finding in group]
+        first = places[0]
+        if number > 1:
+            yield ""
+        yield f"{number}. {first.severity}: {first.title} ({first.name})"
+        for finding in places[:_PLACES_SHOWN]:
+            yield f"   {format_cell(finding.subject)} — {format_cell(finding.detail)}"
+        if len(places) > _PLACES_SHOWN:
+            yield f"   … and {len(places) - _PLACES_SHOWN} more; --format json has them all"
+        for label, text in (
+            ("means", first.description),
+            ("cause", first.cause),
+            ("cure", first.cure),
+        ):
+            yield from textwrap.wrap(
+                text,
+                width,
+                initial_indent=f"   {label + ':':<7}",
+                subsequent_indent=" " * 10,
+                break_long_words=False,
+                break_on_hyphens=False,
+            )

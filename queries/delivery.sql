@@ -1,0 +1,91 @@
+-- name: delivery
+-- title: Messages delivered, skipped and lost by topic and subscription
+-- description: What became of the messages published in the time window at each subscription of
+--     their topic. Skipped: newer messages took their place in the queue. Lost: they did not arrive
+--     or could not be taken. Edge: the two were not connected yet, or not any more, or the trace
+--     ended. Unknown: events are lost, or nothing tells. The five add up to what was published.
+--     Whether a message was overwritten or lost on the way is told by the depth of the queue alone;
+--     incompatible QoS, lifespan and best effort do not show in a trace.
+-- grain: one row per topic and subscription
+-- param: topic VARCHAR = NULL       Only this topic
+-- column: run_id BIGINT             Run
+-- column: topic_name VARCHAR        Topic
+-- column: subscriber VARCHAR        Node that subscribes
+-- column: published BIGINT          Messages published on the topic in the time window
+-- column: delivered BIGINT          Of these, taken
+-- column: skipped BIGINT            Of these, replaced by newer ones
+-- column: lost BIGINT               Of these, lost
+-- column: edge BIGINT               Of these, before or after the two were connected
+-- column: unknown BIGINT            Of these, with an unknown fate
+-- column: delivered_percent DOUBLE [%]  Share delivered, those at the edge left out
+-- column: orphans BIGINT            Takes in the time window whose publication is not known
+-- column: reasons VARCHAR           Why messages were not taken, with counts
+-- column: orphan_reasons VARCHAR    Why publications are not known, with counts
+-- column: subscription_id BIGINT    Identity of the subscription
+-- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- needs: main.stat_delivery, main.stat_orphan, main.publication, main.take, main.subscription,
+--     main.node, main.process
+WITH outcome AS (
+    SELECT d.subscription_id, d.status, d.reason, count(*) AS number
+    FROM main.stat_delivery AS d
+    JOIN main.publication AS b ON d.publication_id = b.publication_id
+    WHERE list_contains($runs, d.run_id)
+        AND b.start_ns >= $start_ns
+        AND b.start_ns < $end_ns
+    GROUP BY d.subscription_id, d.status, d.reason
+),
+delivery AS (
+    SELECT
+        subscription_id,
+        sum(number)::BIGINT AS published,
+        sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
+        sum(CASE WHEN status = 'skipped' THEN number ELSE 0 END)::BIGINT AS skipped,
+        sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
+        sum(CASE WHEN status = 'edge' THEN number ELSE 0 END)::BIGINT AS edge,
+        sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
+        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
+    FROM outcome
+    GROUP BY subscription_id
+),
+orphan_outcome AS (
+    SELECT o.subscription_id, o.reason, count(*) AS number
+    FROM main.stat_orphan AS o
+    JOIN main.take AS t ON o.take_id = t.take_id
+    WHERE list_contains($runs, o.run_id)
+        AND t.taken_ns >= $start_ns
+        AND t.taken_ns < $end_ns
+    GROUP BY o.subscription_id, o.reason
+),
+orphan AS (
+    SELECT
+        subscription_id,
+        sum(number)::BIGINT AS orphans,
+        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS orphan_reasons
+    FROM orphan_outcome
+    GROUP BY subscription_id
+)
+SELECT
+    s.run_id,
+    s.topic_name,
+    coalesce(n.full_name, printf('[%s %d]', coalesce(p.name, '?'), p.pid)) AS subscriber,
+    coalesce(d.published, 0) AS published,
+    coalesce(d.delivered, 0) AS delivered,
+    coalesce(d.skipped, 0) AS skipped,
+    coalesce(d.lost, 0) AS lost,
+    coalesce(d.edge, 0) AS edge,
+    coalesce(d.unknown, 0) AS unknown,
+    100 * d.delivered / nullif(d.published - d.edge, 0) AS delivered_percent,
+    coalesce(o.orphans, 0) AS orphans,
+    d.reasons,
+    o.orphan_reasons,
+    s.subscription_id,
+    s.is_internal
+FROM main.subscription AS s
+JOIN main.process AS p ON s.process_id = p.process_id
+LEFT JOIN main.node AS n ON s.node_id = n.node_id
+LEFT JOIN delivery AS d ON s.subscription_id = d.subscription_id
+LEFT JOIN orphan AS o ON s.subscription_id = o.subscription_id
+WHERE list_contains($runs, s.run_id)
+    AND (d.subscription_id IS NOT NULL OR o.subscription_id IS NOT NULL)
+    AND ($topic IS NULL OR s.topic_name = $topic)
+ORDER BY s.run_id, s.topic_name NULLS LAST, subscriber, s.subscription_id

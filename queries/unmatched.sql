@@ -1,0 +1,76 @@
+-- name: unmatched
+-- title: Messages without their other side, each with its reason
+-- description: Every take whose publication is not known, and every message that a subscription of
+--     its topic did not take, in the order of time. The query delivery counts them.
+-- grain: one row per take without a publication, or publication and subscription without a take
+-- param: topic VARCHAR = NULL     Only this topic
+-- param: side VARCHAR {take|publication} = NULL   Only takes without a publication, or only
+--     publications without a take
+-- param: reason VARCHAR = NULL    Only this reason
+-- column: run_id BIGINT           Run
+-- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
+-- column: side VARCHAR            'publication' or 'take': what there is
+-- column: topic_name VARCHAR      Topic
+-- column: publisher VARCHAR       Node that published; NULL: not known
+-- column: subscriber VARCHAR      Node that took, or should have taken
+-- column: status VARCHAR          'skipped', 'lost', 'edge', 'unknown', as in delivery; 'orphan': a
+--     take without a publication
+-- column: reason VARCHAR          Why the other side is missing
+-- column: source_timestamp_ns BIGINT [epoch ns]  Stamp of the message
+-- column: publication_id BIGINT   Identity of the publication
+-- column: take_id BIGINT          Identity of the take
+-- column: subscription_id BIGINT  Identity of the subscription
+-- column: is_internal BOOLEAN     ROS uses the topic for itself
+-- needs: main.stat_delivery, main.stat_orphan, main.publication, main.publisher, main.take,
+--     main.subscription, main.node, main.process
+WITH missing AS (
+    SELECT
+        d.run_id, b.start_ns AS at_ns, 'publication' AS side, d.publisher_id, d.status, d.reason,
+        b.source_timestamp_ns, d.publication_id, NULL::BIGINT AS take_id, d.subscription_id,
+        s.process_id
+    FROM main.stat_delivery AS d
+    JOIN main.publication AS b ON d.publication_id = b.publication_id
+    JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
+    WHERE d.status <> 'delivered'
+    UNION ALL
+    SELECT
+        o.run_id, t.taken_ns, 'take', NULL, 'orphan', o.reason,
+        t.source_timestamp_ns, NULL, o.take_id, o.subscription_id,
+        t.process_id
+    FROM main.stat_orphan AS o
+    JOIN main.take AS t ON o.take_id = t.take_id
+),
+process_node AS (
+    SELECT
+        p.process_id,
+        printf('[%s %d]', coalesce(p.name, '?'), p.pid) AS label
+    FROM main.process AS p
+)
+SELECT
+    m.run_id,
+    m.at_ns,
+    m.side,
+    coalesce(s.topic_name, b.topic_name) AS topic_name,
+    CASE WHEN b.publisher_id IS NOT NULL THEN coalesce(bn.full_name, bp.label) END AS publisher,
+    coalesce(sn.full_name, sp.label) AS subscriber,
+    m.status,
+    m.reason,
+    m.source_timestamp_ns,
+    m.publication_id,
+    m.take_id,
+    m.subscription_id,
+    coalesce(s.is_internal, b.is_internal, false) AS is_internal
+FROM missing AS m
+LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
+LEFT JOIN main.node AS sn ON s.node_id = sn.node_id
+LEFT JOIN process_node AS sp ON m.process_id = sp.process_id
+LEFT JOIN main.publisher AS b ON m.publisher_id = b.publisher_id
+LEFT JOIN main.node AS bn ON b.node_id = bn.node_id
+LEFT JOIN process_node AS bp ON b.process_id = bp.process_id
+WHERE list_contains($runs, m.run_id)
+    AND m.at_ns >= $start_ns
+    AND m.at_ns < $end_ns
+    AND ($topic IS NULL OR coalesce(s.topic_name, b.topic_name) = $topic)
+    AND ($side IS NULL OR m.side = $side)
+    AND ($reason IS NULL OR m.reason = $reason)
+ORDER BY m.run_id, m.at_ns, m.side, m.publication_id, m.take_id, m.subscription_id

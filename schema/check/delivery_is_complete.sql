@@ -1,0 +1,57 @@
+-- name: check.delivery_is_complete
+-- description: Every take has a publication or a reason, and every message was taken by each
+--     subscription of its topic or has a reason: published times subscriptions is what was
+--     delivered and what was not.
+-- grain: one row per run and topic, or run, for which the sums differ
+-- severity: error
+-- needs: store.publication, store.publisher, store.subscription, store.link_transport,
+--     store.undelivered, store.take, store.orphan_take
+WITH published AS (
+    SELECT p.run_id, p.topic_name, count(*) AS number
+    FROM store.publication AS b
+    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE p.topic_name IS NOT NULL
+    GROUP BY p.run_id, p.topic_name
+),
+subscribed AS (
+    SELECT run_id, topic_name, count(*) AS number
+    FROM store.subscription
+    WHERE topic_name IS NOT NULL
+    GROUP BY run_id, topic_name
+),
+delivered AS (
+    SELECT s.run_id, s.topic_name, count(DISTINCT (l.publication_id, l.subscription_id)) AS number
+    FROM store.link_transport AS l
+    JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
+    WHERE p.topic_name = s.topic_name
+    GROUP BY s.run_id, s.topic_name
+),
+undelivered AS (
+    SELECT s.run_id, s.topic_name, count(*) AS number
+    FROM store.undelivered AS u
+    JOIN store.subscription AS s ON u.subscription_id = s.subscription_id
+    GROUP BY s.run_id, s.topic_name
+),
+taken AS (
+    SELECT run_id, count(*) AS number FROM store.take GROUP BY run_id
+),
+linked AS (
+    SELECT run_id, count(DISTINCT take_id) AS number FROM store.link_transport GROUP BY run_id
+),
+orphan AS (
+    SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id
+)
+SELECT b.run_id, b.topic_name, b.number * s.number AS expected,
+    coalesce(d.number, 0) + coalesce(u.number, 0) AS explained
+FROM published AS b
+JOIN subscribed AS s ON b.run_id = s.run_id AND b.topic_name = s.topic_name
+LEFT JOIN delivered AS d ON b.run_id = d.run_id AND b.topic_name = d.topic_name
+LEFT JOIN undelivered AS u ON b.run_id = u.run_id AND b.topic_name = u.topic_name
+WHERE b.number * s.number <> coalesce(d.number, 0) + coalesce(u.number, 0)
+UNION ALL
+SELECT t.run_id, NULL, t.number, coalesce(l.number, 0) + coalesce(o.number, 0)
+FROM taken AS t
+LEFT JOIN linked AS l ON t.run_id = l.run_id
+LEFT JOIN orphan AS o ON t.run_id = o.run_id
+WHERE t.number <> coalesce(l.number, 0) + coalesce(o.number, 0)

@@ -1,0 +1,26 @@
+-- name: finding.clocks_apart
+-- title: The clocks of two hosts are apart
+-- description: Messages seem to be received before they were published. Latencies between the two
+--     hosts are off by at least that much; links are right all the same, as they compare stamps.
+-- cause: The hosts were not synchronised while recording.
+-- cure: Synchronise the clocks before recording (chrony, ptp4l), or correct them in the database.
+-- grain: one row per pair of hosts
+-- severity: warning
+-- needs: main.link_transport, main.publication, main.take, main.process, main.host
+SELECT
+    l.run_id,
+    fh.hostname || ' → ' || th.hostname AS subject,
+    count(*) AS count,
+    printf(
+        '%d messages received up to %.3f ms before they were published',
+        count(*), -min(l.latency_ns) / 1e6
+    ) AS detail
+FROM main.link_transport AS l
+JOIN main.publication AS b ON l.publication_id = b.publication_id
+JOIN main.process AS fp ON b.process_id = fp.process_id
+JOIN main.host AS fh ON fp.host_id = fh.host_id
+JOIN main.take AS t ON l.take_id = t.take_id
+JOIN main.process AS tp ON t.process_id = tp.process_id
+JOIN main.host AS th ON tp.host_id = th.host_id
+WHERE l.latency_ns < 0 AND fh.clock_id <> th.clock_id
+GROUP BY l.run_id, fh.hostname, th.hostname

@@ -1,0 +1,46 @@
+-- name: finding.discarded_events
+-- title: The tracer discarded events
+-- description: Events were lost because the buffers were full. What happened in those gaps is
+--     missing, nothing is paired across them, and results near them are marked is_loss_affected.
+-- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
+--     take them away.
+-- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
+--     --num-subbuf=8 CHANNEL before the events are enabled (ros2 trace: --subbuffer-size-ust), with
+--     the size given above; or enable fewer events, or write to a faster disk.
+-- grain: one row per trace
+-- severity: error
+-- needs: main.loss_interval, main.trace, store.packet
+WITH loss AS (
+    SELECT
+        trace_id,
+        count(*) AS places,
+        sum(event_count)::BIGINT AS events,
+        max(event_count) AS largest,
+        sum(end_ns - start_ns)::BIGINT AS length_ns
+    FROM main.loss_interval
+    WHERE kind = 'loss'
+    GROUP BY trace_id
+),
+fullest AS (
+    SELECT trace_id, max(event_count) AS events
+    FROM store.packet
+    GROUP BY trace_id
+)
+SELECT
+    t.run_id,
+    t.path AS subject,
+    coalesce(l.events, l.places) AS count,
+    printf(
+        '%s events in %d places, %.3f s in all; --subbuf-size=%dM would have held the largest '
+        || 'burst',
+        coalesce(format('{:,}', l.events), 'unknown'),
+        l.places,
+        l.length_ns / 1e9,
+        -- About 100 bytes for an event, the next power of two that holds them, at least 1 MiB.
+        (2 ** greatest(
+            ceil(log2((coalesce(l.largest, 0) + f.events) * 100 / 1048576)), 0
+        ))::BIGINT
+    ) AS detail
+FROM loss AS l
+JOIN main.trace AS t ON l.trace_id = t.trace_id
+JOIN fullest AS f ON l.trace_id = f.trace_id

@@ -1,0 +1,23 @@
+-- name: finding.lost_packets
+-- title: Whole packets are missing
+-- description: The tracer counted packets that are not in the trace. What happened in them is
+--     missing, and nothing is paired across the places.
+-- cause: The buffers were overwritten (a snapshot, or a channel in overwrite mode), or packets were
+--     lost on the way to the relay daemon.
+-- cure: Record into a trace on a disk (not a snapshot) with a channel in discard mode: lttng
+--     enable-channel --userspace --discard CHANNEL; or take snapshots of larger buffers.
+-- grain: one row per trace
+-- severity: error
+-- needs: main.loss_interval, main.trace
+SELECT
+    t.run_id,
+    t.path AS subject,
+    count(*) AS count,
+    printf(
+        '%d places on %d CPUs, %.3f s in all',
+        count(*), count(DISTINCT g.cpu), sum(g.end_ns - g.start_ns) / 1e9
+    ) AS detail
+FROM main.loss_interval AS g
+JOIN main.trace AS t ON g.trace_id = t.trace_id
+WHERE g.kind = 'packets'
+GROUP BY t.run_id, t.trace_id, t.path

@@ -1,0 +1,30 @@
+-- name: finding.process_without_ros
+-- title: A traced process shows nothing of ROS
+-- description: The trace has events of the process, but none of ROS: no node, publisher,
+--     subscription or callback. What it does with messages is not known.
+-- cause: It runs with a tracetools that was built without LTTng, or it is no ROS process at all.
+-- cure: In its environment, ros2 run tracetools status must say that tracing is enabled; build
+--     tracetools with LTTng installed where it does not. Start the process with the events of ROS
+--     enabled.
+-- grain: one row per process
+-- severity: warning
+-- needs: main.process, main.host, main.node, main.publisher, main.subscription, main.callback,
+--     main.timer
+SELECT
+    p.run_id,
+    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    1::BIGINT AS count,
+    printf('seen for %.3f s', (p.last_seen_ns - p.first_seen_ns) / 1e9) AS detail
+FROM main.process AS p
+JOIN main.host AS h ON p.host_id = h.host_id
+WHERE p.process_id NOT IN (
+    SELECT process_id FROM main.node
+    UNION ALL
+    SELECT process_id FROM main.publisher
+    UNION ALL
+    SELECT process_id FROM main.subscription
+    UNION ALL
+    SELECT process_id FROM main.callback
+    UNION ALL
+    SELECT process_id FROM main.timer
+)

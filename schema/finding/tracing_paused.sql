@@ -1,0 +1,22 @@
+-- name: finding.tracing_paused
+-- title: Tracing was paused
+-- description: All streams of a trace are silent at once between packets. What happened meanwhile
+--     is missing, and nothing is paired across the pauses.
+-- cause: The session was stopped and started again (lttng stop, lttng start), or the machine slept.
+-- cure: Ingest one stretch at a time, or leave the pauses out with --start and --end; record
+--     without stopping.
+-- grain: one row per trace
+-- severity: warning
+-- needs: main.loss_interval, main.trace
+SELECT
+    t.run_id,
+    t.path AS subject,
+    count(*) AS count,
+    printf(
+        '%d pauses, %.3f s in all, the longest %.3f s',
+        count(*), sum(g.end_ns - g.start_ns) / 1e9, max(g.end_ns - g.start_ns) / 1e9
+    ) AS detail
+FROM main.loss_interval AS g
+JOIN main.trace AS t ON g.trace_id = t.trace_id
+WHERE g.kind = 'pause'
+GROUP BY t.run_id, t.trace_id, t.path

@@ -1,0 +1,11 @@
+-- name: main.stat_orphan
+-- description: Takes whose publication is not known, and why.
+-- grain: one row per take without a publication
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: take_id BIGINT  The take
+-- column: subscription_id BIGINT  Subscription that took it
+-- column: reason VARCHAR  'no_stamp', 'before_tracing', 'publisher_gap', 'publisher_trace_ends',
+--     'publisher_not_traced', 'ambiguous' or 'unknown', the first that holds
+-- needs: store.orphan_take
+SELECT run_id, take_id, subscription_id, reason
+FROM store.orphan_take

@@ -1,0 +1,42 @@
+-- name: derive.expected_arrival
+-- description: When each message could be received at the earliest, on the clock of those who
+--     subscribe to its topic: the end of its publication, which is shifted to another clock where
+--     messages tell how far the two are apart (NULL: nothing tells).
+-- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
+-- needs: store.publication, store.publisher, store.subscription, store.process, store.host,
+--     derive.clock_shift
+WITH process_clock AS (
+    SELECT p.run_id, p.process_id, h.clock_id
+    FROM store.process AS p
+    JOIN store.host AS h ON p.host_id = h.host_id
+),
+audience AS (
+    SELECT DISTINCT s.run_id, s.topic_name, c.clock_id
+    FROM store.subscription AS s
+    JOIN process_clock AS c ON s.process_id = c.process_id
+    WHERE s.topic_name IS NOT NULL
+),
+sent AS (
+    SELECT
+        b.run_id, b.publication_id, b.publisher_id, p.topic_name, b.end_ns,
+        b.source_timestamp_ns, f.clock_id AS from_clock_id, a.clock_id
+    FROM store.publication AS b
+    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    JOIN process_clock AS f ON p.process_id = f.process_id
+    JOIN audience AS a ON p.run_id = a.run_id AND p.topic_name = a.topic_name
+)
+SELECT
+    run_id, publication_id, publisher_id, topic_name, source_timestamp_ns, clock_id,
+    end_ns AS arrival_ns
+FROM sent
+WHERE from_clock_id = clock_id
+UNION ALL
+SELECT
+    s.run_id, s.publication_id, s.publisher_id, s.topic_name, s.source_timestamp_ns,
+    s.clock_id, s.end_ns + c.shift_ns
+FROM (SELECT * FROM sent WHERE from_clock_id <> clock_id) AS s
+ASOF LEFT JOIN derive.clock_shift AS c
+    ON s.run_id = c.run_id
+    AND s.from_clock_id = c.from_clock_id
+    AND s.clock_id = c.to_clock_id
+    AND s.end_ns >= c.from_ns

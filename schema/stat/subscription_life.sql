@@ -1,0 +1,48 @@
+-- name: derive.subscription_life
+-- description: How long each subscription could take messages, on the clock of its host: from its
+--     creation to the last event of the threads that read it, or until its handle was used again.
+-- grain: one row per subscription
+-- needs: store.subscription, store.process, store.host, store.thread, derive.subscription_reader
+WITH host_end AS (
+    SELECT host_id, max(last_seen_ns) AS end_ns
+    FROM store.process
+    GROUP BY host_id
+),
+reader AS (
+    SELECT
+        r.subscription_id,
+        count(*) AS thread_count,
+        max(t.last_seen_ns) AS last_seen_ns,
+        any_value(r.thread_id) AS thread_id
+    FROM derive.subscription_reader AS r
+    JOIN store.thread AS t ON r.thread_id = t.thread_id
+    GROUP BY r.subscription_id
+),
+successor AS (
+    SELECT
+        subscription_id,
+        lead(created_ns) OVER (
+            PARTITION BY run_id, process_id, subscription_handle
+            ORDER BY created_ns NULLS FIRST, subscription_id
+        ) AS replaced_ns
+    FROM store.subscription
+    WHERE subscription_handle IS NOT NULL
+)
+SELECT
+    s.run_id,
+    s.subscription_id,
+    s.topic_name,
+    s.process_id,
+    h.clock_id,
+    nullif(s.queue_depth, 0) AS queue_depth,
+    s.created_ns,
+    coalesce(r.last_seen_ns, p.last_seen_ns) AS last_seen_ns,
+    x.replaced_ns,
+    e.end_ns AS host_end_ns,
+    CASE WHEN r.thread_count = 1 THEN r.thread_id END AS only_thread_id
+FROM store.subscription AS s
+JOIN store.process AS p ON s.process_id = p.process_id
+JOIN store.host AS h ON p.host_id = h.host_id
+LEFT JOIN host_end AS e ON p.host_id = e.host_id
+LEFT JOIN reader AS r ON s.subscription_id = r.subscription_id
+LEFT JOIN successor AS x ON s.subscription_id = x.subscription_id

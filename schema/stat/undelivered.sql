@@ -1,0 +1,200 @@
+-- name: derive.undelivered
+-- kind: macro
+-- description: Why a subscription did not take a message of its topic; the first reason that holds.
+--     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
+--     message in the queue would have ended it. A wait tells only where a single thread reads, and
+--     only if it lasted ten times as long as messages usually need, at least a millisecond.
+--     `overwritten` and `lost_in_transport` are told apart by the depth of the queue alone. Where
+--     the subscription took a message in that time that could not be identified, nothing is said.
+-- grain: one row per publication and subscription of its topic that is not known to have taken it
+-- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap,
+--     store.link_transport, store.take, store.failed_take, store.executor_state
+CREATE OR REPLACE MACRO derive.undelivered(of_run) AS TABLE
+WITH arrival AS MATERIALIZED (
+    SELECT
+        publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
+        row_number() OVER (
+            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
+        ) AS position
+    FROM derive.expected_arrival
+    WHERE run_id = of_run
+),
+life AS MATERIALIZED (
+    SELECT
+        subscription_id, topic_name, process_id, clock_id, queue_depth, created_ns, last_seen_ns,
+        replaced_ns, host_end_ns, only_thread_id
+    FROM derive.subscription_life
+    WHERE run_id = of_run AND topic_name IS NOT NULL
+),
+link AS (
+    SELECT publication_id, publisher_id, subscription_id, min(take_id) AS take_id
+    FROM store.link_transport
+    WHERE run_id = of_run AND subscription_id IS NOT NULL
+    GROUP BY publication_id, publisher_id, subscription_id
+),
+missing AS MATERIALIZED (
+    SELECT
+        a.publication_id, a.publisher_id, s.subscription_id, a.topic_name, a.clock_id,
+        a.arrival_ns, a.position, a.source_timestamp_ns IS NULL AS has_no_stamp
+    FROM arrival AS a
+    JOIN life AS s ON a.topic_name = s.topic_name AND a.clock_id = s.clock_id
+    ANTI JOIN link AS l
+        ON a.publication_id = l.publication_id AND s.subscription_id = l.subscription_id
+),
+delivered AS MATERIALIZED (
+    SELECT l.subscription_id, l.publisher_id, a.arrival_ns, t.taken_ns
+    FROM link AS l
+    JOIN life AS s ON l.subscription_id = s.subscription_id
+    JOIN arrival AS a ON l.publication_id = a.publication_id AND s.clock_id = a.clock_id
+    JOIN store.take AS t ON l.take_id = t.take_id
+    WHERE l.subscription_id IN (SELECT subscription_id FROM missing) AND a.arrival_ns IS NOT NULL
+),
+pace AS (
+    SELECT
+        subscription_id,
+        greatest(max(taken_ns - arrival_ns), 10_000_000) AS longest_ns,
+        greatest(10 * quantile_disc(taken_ns - arrival_ns, 0.5), 1_000_000) AS patience_ns
+    FROM delivered
+    GROUP BY subscription_id
+),
+-- The first take of anything that came later, of the same publisher and of any.
+later_of_publisher AS (
+    SELECT
+        subscription_id, publisher_id, arrival_ns,
+        min(taken_ns) OVER (
+            PARTITION BY subscription_id, publisher_id ORDER BY arrival_ns DESC
+            ROWS UNBOUNDED PRECEDING
+        ) AS taken_ns
+    FROM delivered
+),
+later_of_any AS (
+    SELECT
+        subscription_id, arrival_ns,
+        min(taken_ns) OVER (
+            PARTITION BY subscription_id ORDER BY arrival_ns DESC ROWS UNBOUNDED PRECEDING
+        ) AS taken_ns
+    FROM delivered
+),
+earliest AS (
+    SELECT subscription_id, publisher_id, min(arrival_ns) AS arrival_ns
+    FROM delivered
+    GROUP BY subscription_id, publisher_id
+),
+-- Takes that could be any message, and those that could be one without a stamp.
+unidentified AS MATERIALIZED (
+    SELECT t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp
+    FROM store.take AS t
+    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
+    WHERE t.run_id = of_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
+),
+long_wait AS (
+    SELECT s.subscription_id, w.start_ns, w.end_ns
+    FROM life AS s
+    JOIN store.executor_state AS w ON s.only_thread_id = w.thread_id
+    LEFT JOIN pace AS p ON s.subscription_id = p.subscription_id
+    WHERE w.run_id = of_run
+        AND w.state = 'wait'
+        AND w.end_ns - w.start_ns > coalesce(p.patience_ns, 10_000_000)
+        AND s.subscription_id IN (SELECT subscription_id FROM missing)
+),
+known AS (
+    SELECT
+        m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
+        m.arrival_ns, m.position, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
+        s.last_seen_ns, s.replaced_ns, s.host_end_ns,
+        coalesce(c.longest_ns, 10_000_000) AS longest_ns,
+        coalesce(c.patience_ns, 10_000_000) AS patience_ns,
+        p.taken_ns AS publisher_taken_ns,
+        n.taken_ns AS any_taken_ns,
+        e.arrival_ns > m.arrival_ns AS is_before_first
+    FROM missing AS m
+    JOIN life AS s ON m.subscription_id = s.subscription_id
+    LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
+    LEFT JOIN earliest AS e
+        ON m.subscription_id = e.subscription_id AND m.publisher_id = e.publisher_id
+    ASOF LEFT JOIN later_of_publisher AS p
+        ON m.subscription_id = p.subscription_id
+        AND m.publisher_id = p.publisher_id
+        AND m.arrival_ns < p.arrival_ns
+    ASOF LEFT JOIN later_of_any AS n
+        ON m.subscription_id = n.subscription_id AND m.arrival_ns < n.arrival_ns
+),
+-- When it was certain that the message is not in the queue: the reader waited for long.
+decided AS (
+    SELECT
+        k.*,
+        CASE
+            WHEN w.end_ns IS NOT NULL
+                AND greatest(w.start_ns, k.arrival_ns) + k.patience_ns
+                <= coalesce(k.any_taken_ns, w.end_ns)
+                THEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns
+        END AS waited_ns
+    FROM (
+        SELECT *, arrival_ns + patience_ns AS due_ns FROM known
+    ) AS k
+    ASOF LEFT JOIN long_wait AS w
+        ON k.subscription_id = w.subscription_id AND k.due_ns <= w.end_ns
+),
+bounded AS (
+    SELECT
+        *,
+        coalesce(
+            least(publisher_taken_ns, waited_ns), least(last_seen_ns, replaced_ns)
+        ) AS until_ns,
+        coalesce(any_taken_ns, least(last_seen_ns, replaced_ns)) AS gone_ns,
+        min(CASE WHEN arrival_ns > last_seen_ns THEN arrival_ns END) OVER (
+            PARTITION BY subscription_id
+        ) AS first_unseen_ns
+    FROM decided
+),
+facts AS (
+    SELECT
+        b.*,
+        g.covered_until_ns >= b.arrival_ns AS has_gap,
+        f.failed_ns <= b.until_ns AS has_failed_take,
+        u.taken_ns <= coalesce(b.waited_ns, b.gone_ns) AS has_unidentified_take,
+        q.position - b.position AS newer_count
+    FROM bounded AS b
+    ASOF LEFT JOIN (SELECT * FROM derive.process_gap WHERE run_id = of_run) AS g
+        ON b.process_id = g.process_id AND b.until_ns >= g.start_ns
+    ASOF LEFT JOIN (SELECT * FROM store.failed_take WHERE run_id = of_run) AS f
+        ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
+    ASOF LEFT JOIN (
+        SELECT subscription_id, taken_ns, false AS for_no_stamp
+        FROM unidentified
+        WHERE has_no_stamp
+        UNION ALL
+        SELECT subscription_id, taken_ns, true
+        FROM unidentified
+    ) AS u
+        ON b.subscription_id = u.subscription_id
+        AND b.has_no_stamp = u.for_no_stamp
+        AND b.arrival_ns <= u.taken_ns
+    ASOF LEFT JOIN arrival AS q
+        ON b.topic_name = q.topic_name
+        AND b.clock_id = q.clock_id
+        AND b.gone_ns >= q.arrival_ns
+)
+SELECT
+    of_run::BIGINT AS run_id,
+    publication_id,
+    publisher_id,
+    subscription_id,
+    CASE
+        WHEN arrival_ns IS NULL THEN 'unknown'
+        WHEN created_ns > arrival_ns THEN 'before_subscription'
+        WHEN replaced_ns < arrival_ns THEN 'subscription_ended'
+        WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
+            THEN 'subscription_ended'
+        WHEN has_gap THEN 'receiver_gap'
+        WHEN has_failed_take THEN 'take_failed'
+        WHEN has_unidentified_take THEN 'unknown'
+        WHEN is_before_first THEN 'before_discovery'
+        WHEN waited_ns IS NOT NULL THEN 'not_delivered'
+        WHEN newer_count >= queue_depth THEN 'overwritten'
+        WHEN any_taken_ns IS NOT NULL AND newer_count < queue_depth THEN 'lost_in_transport'
+        WHEN any_taken_ns IS NULL AND (newer_count < queue_depth OR newer_count = 0)
+            THEN 'pending_at_end'
+        ELSE 'unknown'
+    END AS reason
+FROM facts

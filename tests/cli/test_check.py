@@ -1,0 +1,104 @@
+"""msgflow check: what is printed, and when the exit code is 1."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from golden import insert
+from typer.testing import Result
+
+Msgflow = Callable[..., Result]
+
+
+@pytest.fixture
+def database(fresh_database: Path) -> Path:
+    """A run with a node, to which tests add what is wrong."""
+    from golden import BASE
+
+    with duckdb.connect(str(fresh_database)) as connection:
+        for table, row in BASE.items():
+            insert(connection, table, list(row), [list(row.values())])
+        insert(connection, "node", ["node_id", "full_name"], [["1", "/node"]])
+    return fresh_database
+
+
+def add(path: Path, table: str, *rows: dict[str, str]) -> None:
+    with duckdb.connect(str(path)) as connection:
+        for row in rows:
+            insert(connection, table, list(row), [list(row.values())])
+
+
+def pause() -> dict[str, str]:
+    return {"kind": "pause", "start_ns": "0", "end_ns": "1000000000"}
+
+
+def loss(number: int) -> dict[str, str]:
+    start = number * 1_000_000_000
+    return {
+        "kind": "loss",
+        "start_ns": str(start),
+        "end_ns": str(start + 500_000_000),
+        "event_count": "100",
+    }
+
+
+def test_nothing_is_wrong(msgflow: Msgflow, database: Path) -> None:
+    result = msgflow("check", "--db", database)
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    assert result.stderr == "nothing is wrong with the recording\n"
+
+
+def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> None:
+    add(database, "loss_interval", pause())
+    result = msgflow("check", "--db", database)
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert lines[0] == "1. warning: Tracing was paused (tracing_paused)"
+    assert lines[1] == "   trace — 1 pauses, 1.000 s in all, the longest 1.000 s"
+    assert [line.strip().partition(":")[0] for line in lines[2:] if line[3:4] != " "] == [
+        "means",
+        "cause",
+        "cure",
+    ]
+    assert result.stderr == "0 errors, 1 warning\n"
+
+
+def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> None:
+    add(database, "loss_interval", pause(), loss(5))
+    add(database, "packet", {"event_count": "900"})
+    result = msgflow("check", "--db", database)
+    assert result.exit_code == 1
+    numbered = [line for line in result.stdout.splitlines() if line[:1].isdigit()]
+    assert numbered == [
+        "1. error: The tracer discarded events (discarded_events)",
+        "2. warning: Tracing was paused (tracing_paused)",
+    ]
+    assert "--subbuf-size=1M" in result.stdout
+    assert result.stderr == "1 error, 1 warning\n"
+
+
+def test_json_has_every_place_under_the_number_of_its_finding(
+    msgflow: Msgflow, database: Path
+) -> None:
+    add(database, "process", *({"process_id": str(n), "pid": str(n)} for n in range(2, 14)))
+    add(database, "loss_interval", pause())
+    result = msgflow("check", "--format", "json", "--db", database)
+    rows = json.loads(result.stdout)
+    assert [row["number"] for row in rows] == [1] * 12 + [2]
+    assert {row["name"] for row in rows} == {"process_without_ros", "tracing_paused"}
+    assert all(row["cause"] and row["cure"] and row["run_id"] == 1 for row in rows)
+
+
+def test_many_places_are_cut_and_it_says_so(msgflow: Msgflow, database: Path) -> None:
+    add(database, "process", *({"process_id": str(n), "pid": str(n)} for n in range(2, 14)))
+    result = msgflow("check", "--db", database)
+    assert "   … and 2 more; --format json has them all" in result.stdout.splitlines()
+
+
+def test_a_run_that_does_not_exist(msgflow: Msgflow, database: Path) -> None:
+    assert msgflow("check", "--run", "nothing", "--db", database).exit_code == 2

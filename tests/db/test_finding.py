@@ -1,0 +1,232 @@
+"""Each finding, from the rows that show it; and what else its header promises."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import duckdb
+import golden
+import pytest
+
+from msgflow.db import objects
+from msgflow.db.derive import derive
+from msgflow.db.finding import SEVERITIES, find
+
+Tables = dict[str, str]
+PUBLISHED = "publication_id,publisher_id,process_id,start_ns,end_ns,source_timestamp_ns\n"
+TAKEN = "take_id,subscription_id,process_id,taken_ns,source_timestamp_ns,method\n"
+TWO_HOSTS: Tables = {
+    "clock": "clock_id,method\n1,none\n2,none\n",
+    "host": "host_id,clock_id,hostname\n1,1,alpha\n2,2,beta\n",
+    "process": "process_id,host_id,pid,name,first_seen_ns,last_seen_ns\n"
+    "1,1,10,talker,0,100000\n2,2,20,listener,0,100000\n",
+    "node": "node_id,process_id,full_name\n1,1,/talker\n2,2,/listener\n",
+}
+
+# finding -> (input rows, expected (subject, count, detail))
+CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
+    "discarded_events": (
+        {
+            "loss_interval": "kind,cpu,start_ns,end_ns,event_count\n"
+            "loss,0,1000000000,1250000000,20000\nloss,1,3000000000,3250000000,5000\n"
+            "pause,,5,6,\n",
+            "packet": "cpu_id,event_count\n0,10000\n1,900\n",
+        },
+        [
+            (
+                "trace",
+                25000,
+                "25,000 events in 2 places, 0.500 s in all; --subbuf-size=4M would have held "
+                "the largest burst",
+            )
+        ],
+    ),
+    "lost_packets": (
+        {"loss_interval": "kind,cpu,start_ns,end_ns\npackets,0,0,2000000000\nloss,0,5,6\n"},
+        [("trace", 1, "1 places on 1 CPUs, 2.000 s in all")],
+    ),
+    "tracing_paused": (
+        {
+            "loss_interval": "kind,start_ns,end_ns\n"
+            "pause,0,1000000000\npause,5000000000,5500000000\n"
+        },
+        [("trace", 2, "2 pauses, 1.500 s in all, the longest 1.000 s")],
+    ),
+    "damaged_trace": (
+        {
+            "diagnostic": "trace_id,name,severity,count,detail\n"
+            "1,damaged_trace,data_loss,1,cut off\n1,pause,warning,1,none\n"
+        },
+        [("trace", 1, "cut off")],
+    ),
+    "audit_failed": (
+        {"diagnostic": "name,severity,count,detail\ncheck_failed,error,3,two of one\n"},
+        [("database", 3, "two of one")],
+    ),
+    "overlapping_traces": (
+        {"diagnostic": "trace_id,name,severity,count,detail\n1,overlapping_traces,error,9,twice\n"},
+        [("trace", 9, "twice")],
+    ),
+    "started_late": (
+        {
+            "publisher": "publisher_id,is_inferred\n1,true\n2,false\n",
+            "callback": "callback_id,kind\n1,unknown\n",
+            "node": "node_id,is_inferred\n1,false\n",
+        },
+        [
+            (
+                "process 1 on host",
+                2,
+                "not seen to be created: 1 of 1 callbacks, 1 of 2 publishers",
+            )
+        ],
+    ),
+    "process_without_ros": (
+        {
+            "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n"
+            "1,1,ros,0,1\n2,2,bridge,0,1500000000\n",
+            "node": "process_id\n1\n",
+        },
+        [("bridge 2 on host", 1, "seen for 1.500 s")],
+    ),
+    "publisher_not_traced": (
+        {
+            "subscription": "subscription_id,topic_name,is_internal\n1,/a,false\n2,/b,false\n",
+            "orphan_take": "take_id,subscription_id,reason\n1,1,publisher_not_traced\n"
+            "2,1,publisher_not_traced\n3,2,no_stamp\n",
+            "take": "take_id,method\n1,rmw\n2,rmw\n3,rmw\n",
+        },
+        [("/a", 2, "2 messages")],
+    ),
+    "trace_ends_early": (
+        {
+            "process": "process_id,pid,name,last_seen_ns\n1,1,talker,1000000000\n",
+            "publisher": "publisher_id,topic_name\n1,/a\n",
+            "subscription": "subscription_id,topic_name\n1,/a\n",
+            "orphan_take": "take_id,subscription_id,reason\n1,1,publisher_trace_ends\n",
+            "take": "take_id,taken_ns,method\n1,1250000000,rmw\n",
+        },
+        [("/a", 1, "1 messages until 0.250 s after the last event of talker 1 on host")],
+    ),
+    "stream_ends_early": (
+        {
+            "packet": "cpu_id,stream_instance_id,begin_ns,end_ns\n"
+            "0,0,0,10000000000\n1,1,0,4000000000\n2,2,0,9900000000\n"
+        },
+        [("trace", 1, "1 streams (CPU 1) end up to 6.000 s early")],
+    ),
+    "unbalanced_callbacks": (
+        {
+            # the second is explained by a gap, the last may still be running
+            "callback_instance": "callback_instance_id,start_ns,end_ns,is_loss_affected\n"
+            "1,10,,false\n2,20,,true\n3,30,35,false\n4,40,,false\n"
+        },
+        [("process 1 on host", 1, "1 runs of 1 callbacks")],
+    ),
+    "clocks_apart": (
+        {
+            **TWO_HOSTS,
+            "publication": PUBLISHED + "1,1,1,5000000,6000000,7\n2,1,1,5000,6000,8\n",
+            "take": TAKEN + "1,1,2,4000000,7,rmw\n2,1,2,7000,8,rmw\n",
+            "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
+        },
+        [("alpha → beta", 1, "1 messages received up to 2.000 ms before they were published")],
+    ),
+    "clock_jumps": (
+        {
+            "publication": PUBLISHED + "1,1,1,1000,1000,1000\n2,1,1,12000000000,12000000000,9\n",
+            "take": TAKEN + "1,1,1,2000,1000,rmw\n2,1,1,12000000500,32000000000,rmw\n",
+            "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
+        },
+        [("host", 1, "1 jumps, the largest 20.000 s")],
+    ),
+    "missing_layer": (
+        {
+            "callback_instance": "callback_instance_id\n1\n",
+            "executor_state": "state,start_ns\nwait,1\n",
+        },
+        [
+            (
+                "publications",
+                1,
+                "nothing was published as far as traced (rcl_publish, rclcpp_publish, "
+                "rmw_publish): no flows",
+            ),
+            (
+                "takes",
+                1,
+                "no message was taken as far as traced (rmw_take, rcl_take): no transport, no "
+                "flows",
+            ),
+        ],
+    ),
+}
+
+
+@pytest.fixture
+def database(empty_database: Path, tmp_path: Path) -> duckdb.DuckDBPyConnection:
+    path = tmp_path / "case.duckdb"
+    shutil.copyfile(empty_database, path)
+    return duckdb.connect(str(path))
+
+
+def fill(con: duckdb.DuckDBPyConnection, directory: Path, tables: Tables) -> None:
+    for name, text in tables.items():
+        (directory / f"{name}.csv").write_text(text)
+    golden.fill(con, directory)
+
+
+def test_every_finding_has_a_case() -> None:
+    assert {header.name for header in objects.load("finding")} == {f"finding.{n}" for n in CASES}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_finding(name: str, database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
+    tables, expected = CASES[name]
+    fill(database, tmp_path, tables)
+    found = [f for f in find(database, [1]) if f.name == name]
+    assert [(f.subject, f.count, f.detail) for f in found] == expected
+    assert find(database, [2]) == []
+
+
+@pytest.mark.parametrize("header", objects.load("finding"), ids=lambda header: header.name)
+def test_a_finding_says_what_it_means_and_what_to_do(header: objects.Header) -> None:
+    assert header.title != header.name
+    assert header.severity in SEVERITIES
+    assert header.cause
+    assert header.cure
+
+
+def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
+    fill(
+        database,
+        tmp_path,
+        {
+            "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n1,1,ros,0,100000\n",
+            "node": "node_id,full_name\n1,/node\n",
+            "publisher": "publisher_id,topic_name\n1,/a\n",
+            "subscription": "subscription_id,topic_name\n1,/a\n",
+            "publication": PUBLISHED + "1,1,1,10,11,10\n",
+            "take": TAKEN + "1,1,1,20,10,rmw\n",
+            "callback": "callback_id,kind\n1,subscription\n",
+            "callback_instance": "callback_instance_id,take_id,start_ns,end_ns\n1,1,21,22\n",
+            "executor_state": "state,start_ns\nwait,1\n",
+            "packet": "begin_ns,end_ns,event_count\n0,100,9\n",
+        },
+    )
+    derive(database, 1)
+    assert find(database, [1]) == []
+
+
+def test_errors_come_first(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
+    fill(
+        database,
+        tmp_path,
+        {
+            "loss_interval": "kind,cpu,start_ns,end_ns,event_count\npause,,0,9,\nloss,0,20,29,5\n",
+            "packet": "event_count\n100\n",
+            "node": "node_id\n1\n",
+        },
+    )
+    assert [f.severity for f in find(database, [1])] == ["error", "warning"]

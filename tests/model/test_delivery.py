@@ -1,0 +1,352 @@
+"""Why messages were not taken, and why the publication of a take is not known."""
+
+from __future__ import annotations
+
+import pytest
+from ros_system import RosSystem
+from staged_events import Analyse, Analysis, Thread
+
+TALKER = Thread(100)
+LISTENER = Thread(200)
+OTHER = Thread(300)
+MS = 1_000_000
+REASONS = """
+SELECT b.source_timestamp_ns, d.status, d.reason
+FROM stat_delivery AS d JOIN publication AS b USING (publication_id) ORDER BY 1, d.subscription_id
+"""
+ORPHANS = """
+SELECT t.source_timestamp_ns, o.reason
+FROM stat_orphan AS o JOIN take AS t USING (take_id) ORDER BY t.taken_ns
+"""
+
+
+class Pair(RosSystem):
+    """A talker that publishes on /a and a listener that takes from it, in processes of their own.
+
+    Each has an executor, as the listener's waits tell what was in its queue.
+    """
+
+    def create(self, depth: int = 10) -> None:
+        """Make the publisher, then the subscription."""
+        self.publisher(TALKER, 0x10, "/a")
+        self.add_subscription(depth)
+
+    def add_subscription(self, depth: int = 10, handle: int = 0x30) -> None:
+        """rcl_subscription_init of /a with this depth, with its callback."""
+        self.subscription(LISTENER, handle, "/a", callback=0xC2, depth=depth)
+
+    def send(self, *stamps: int) -> None:
+        """Publish messages."""
+        for stamp in stamps:
+            self.publish(TALKER, 0x10, stamp)
+
+    def hear(self, stamp: int, *, handle: int = 0x30) -> None:
+        """Take a message and run the callback, with the executor around it."""
+        self.ready(LISTENER)
+        self.execute(LISTENER, handle)
+        self.take(LISTENER, handle, stamp)
+        self.start(LISTENER, 0xC2)
+        self.end(LISTENER, 0xC2)
+        self.ready(LISTENER)
+        self.idle(LISTENER)
+
+    def go_on(self) -> None:
+        """All processes are seen once more, so that none ends before the others."""
+        for thread in (TALKER, LISTENER):
+            self.ready(thread)
+
+
+@pytest.fixture
+def pair() -> Pair:
+    return Pair()
+
+
+def reasons(analysis: Analysis) -> dict[int, str | None]:
+    """Return stamp -> reason, which is None for what was delivered."""
+    return {stamp: reason for stamp, _, reason in analysis.rows(REASONS)}
+
+
+def test_what_was_taken_has_no_reason(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    assert analyse(pair).rows(REASONS) == [(1, "delivered", None)]
+
+
+def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None:
+    pair.publisher(TALKER, 0x10, "/a")
+    pair.send(1)
+    pair.add_subscription()
+    pair.send(2)
+    pair.hear(2)
+    assert analyse(pair).rows(REASONS) == [
+        (1, "edge", "before_subscription"),
+        (2, "delivered", None),
+    ]
+
+
+def test_before_discovery_nothing_arrives(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1, 2)
+    pair.send(3)
+    pair.hear(3)
+    assert reasons(analyse(pair)) == {
+        1: "before_discovery",
+        2: "before_discovery",
+        3: None,
+    }
+
+
+def test_a_process_that_is_seen_no_more_has_ended(pair: Pair, analyse: Analyse) -> None:
+    """Others go on for much longer than a message ever took."""
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.wait(50 * MS)
+    pair.send(3)
+    assert reasons(analyse(pair)) == {
+        1: None,
+        2: "subscription_ended",
+        3: "subscription_ended",
+    }
+
+
+def test_at_the_end_of_the_trace_messages_are_pending(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    assert reasons(analyse(pair)) == {1: None, 2: "pending_at_end"}
+
+
+def test_a_subscription_ends_where_its_handle_is_used_again(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.add_subscription()
+    pair.send(2)
+    pair.hear(2)
+    assert analyse(pair).rows(REASONS) == [
+        (1, "delivered", None),
+        (1, "edge", "before_subscription"),
+        (2, "edge", "subscription_ended"),
+        (2, "delivered", None),
+    ]
+
+
+def test_a_gap_of_the_receiver_may_hide_the_take(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.lose()
+    pair.wait(100)
+    pair.send(3)
+    pair.hear(3)
+    pair.send(4)
+    pair.send(5)
+    pair.hear(5)
+    assert reasons(analyse(pair)) == {
+        1: None,
+        2: "receiver_gap",
+        3: None,
+        4: "lost_in_transport",
+        5: None,
+    }
+
+
+def test_an_attempt_that_took_nothing(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
+    pair.send(3)
+    pair.hear(3)
+    model = analyse(pair)
+    assert reasons(model) == {1: None, 2: "take_failed", 3: None}
+    assert model.value("SELECT count(*) FROM failed_take") == 1
+
+
+def test_a_queue_that_was_full(pair: Pair, analyse: Analyse) -> None:
+    """Of five messages the newest two fit; nobody can tell whether fewer were overwritten."""
+    pair.create(depth=2)
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2, 3, 4, 5, 6)
+    pair.hear(5)
+    pair.hear(6)
+    model = analyse(pair)
+    assert reasons(model) == {
+        1: None,
+        2: "overwritten",
+        3: "overwritten",
+        4: "overwritten",
+        5: None,
+        6: None,
+    }
+    assert ("skipped",) in model.rows("SELECT DISTINCT status FROM stat_delivery")
+
+
+def test_fewer_newer_messages_than_fit_overwrite_nothing(pair: Pair, analyse: Analyse) -> None:
+    pair.create(depth=10)
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2, 3)
+    pair.hear(3)
+    assert reasons(analyse(pair)) == {1: None, 2: "lost_in_transport", 3: None}
+
+
+def test_without_a_depth_nobody_can_tell(pair: Pair, analyse: Analyse) -> None:
+    pair.create(depth=0)
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2, 3)
+    pair.hear(3)
+    assert analyse(pair).rows(REASONS)[1] == (2, "unknown", "unknown")
+
+
+def test_a_reader_that_waits_has_nothing_in_its_queue(pair: Pair, analyse: Analyse) -> None:
+    """It waited for longer than messages take: the message did not come, whatever the depth."""
+    pair.create(depth=1)
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.wait(20 * MS)
+    pair.send(3)
+    pair.hear(3)
+    pair.go_on()
+    assert reasons(analyse(pair)) == {1: None, 2: "not_delivered", 3: None}
+
+
+def test_a_reader_that_is_busy_tells_nothing(pair: Pair, analyse: Analyse) -> None:
+    pair.create(depth=1)
+    pair.send(1)
+    pair.hear(1)
+    pair.ready(LISTENER)
+    pair.start(LISTENER, 0xC9)
+    pair.send(2)
+    pair.wait(20 * MS)
+    pair.send(3)
+    pair.end(LISTENER, 0xC9)
+    pair.ready(LISTENER)
+    pair.idle(LISTENER)
+    pair.hear(3)
+    assert reasons(analyse(pair)) == {1: None, 2: "overwritten", 3: None}
+
+
+def test_a_take_that_cannot_be_identified_may_be_any(pair: Pair, analyse: Analyse) -> None:
+    """A callback that ran without a take traced was handed some message."""
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.start(LISTENER, 0xC2)
+    pair.end(LISTENER, 0xC2)
+    pair.send(3)
+    pair.hear(3)
+    model = analyse(pair)
+    assert reasons(model) == {1: None, 2: "unknown", 3: None}
+    assert model.rows(ORPHANS) == [(None, "no_stamp")]
+
+
+def test_hosts_with_clocks_apart_are_compared_by_messages(pair: Pair, analyse: Analyse) -> None:
+    """Beta's clock is a second behind: takes seem to precede."""
+    pair.add_source(1, "beta", "boot-b")
+    listener, second = Thread(200, trace=1), 1_000 * MS
+    base = 5 * second
+    pair.publisher(TALKER, 0x10, "/a")
+    pair.subscription(listener, 0x30, "/a", callback=0xC2)
+    for number in range(4):
+        sent = base + number * 30 * MS
+        pair.add("ros2:rclcpp_publish", TALKER, ts=sent, message=0xA)
+        pair.publish(TALKER, 0x10, number + 1, layers="rcl rmw")
+        if number != 2:
+            pair.add("ros2:rmw_take", listener, ts=sent - second, message=0xB, taken=1,
+                     rmw_subscription_handle=0x1030, source_timestamp=number + 1)  # fmt: skip
+            pair.take(listener, 0x30, 0, layers="rcl rclcpp")
+    assert reasons(analyse(pair)) == {1: None, 2: None, 3: "lost_in_transport", 4: None}
+
+
+def test_no_stamp(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.hear(0)
+    assert analyse(pair).rows(ORPHANS) == [(None, "no_stamp")]
+
+
+def stamped(system: Pair) -> int:
+    """Publish and take a message whose stamp is of the clock of the trace; return that."""
+    stamp = system.publish(TALKER, 0x10, 0)
+    system._events[-1][1]["timestamp"] = stamp
+    system.hear(stamp)
+    return stamp
+
+
+def test_a_stamp_of_before_the_trace(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.hear(5)
+    assert analyse(pair).rows(ORPHANS) == [(5, "before_tracing")]
+
+
+def test_a_stamp_in_a_gap_of_the_publisher(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    stamped(pair)
+    pair.lose()
+    stamp = pair._now + 1
+    pair.wait(100)
+    pair.hear(stamp)
+    pair.send(pair._now)
+    assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
+
+
+def test_a_stamp_after_the_last_event_of_every_publisher(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    stamped(pair)
+    pair.wait(20 * MS)
+    stamp = pair._now
+    pair.hear(stamp)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_trace_ends")]
+
+
+def test_a_publisher_that_is_not_traced(pair: Pair, analyse: Analyse) -> None:
+    """The known publisher is seen before and after, and nothing is lost."""
+    pair.create()
+    stamped(pair)
+    stamp = pair._now + 5
+    pair.hear(stamp)
+    stamped(pair)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
+
+
+def test_a_topic_without_a_publisher(pair: Pair, analyse: Analyse) -> None:
+    pair.add_subscription()
+    stamp = pair._now
+    pair.hear(stamp)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
+
+
+def test_more_takes_of_a_stamp_than_publications(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    stamp = stamped(pair)
+    pair.hear(stamp)
+    stamped(pair)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "ambiguous")]
+
+
+def test_every_take_and_message_is_accounted_for(pair: Pair, analyse: Analyse) -> None:
+    """Two subscriptions, two publishers, some messages of each missing on a side."""
+    pair.create(depth=1)
+    pair.publisher(OTHER, 0x10, "/a")
+    pair.subscription(OTHER, 0x30, "/a")
+    pair.send(1, 2)
+    pair.hear(2)
+    pair.publish(OTHER, 0x10, 3)
+    pair.take(OTHER, 0x30, 2)
+    pair.take(OTHER, 0x30, 77)
+    model = analyse(pair)
+    assert model.value("SELECT count(*) FROM stat_delivery") == 3 * 2
+    assert model.value(
+        "SELECT (SELECT count(*) FROM take) = (SELECT count(DISTINCT take_id) FROM "
+        "link_transport) + (SELECT count(*) FROM stat_orphan)"
+    )

@@ -1,0 +1,97 @@
+"""Every message that was not delivered has the reason that it really had."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from ingested import Ingested
+
+from msgflow.db.check import run_checks
+
+RECORDED = (
+    "partial_sync",
+    "periodic_async_jazzy24",
+    "pingpong",
+    "services",
+    "sync_1_1",
+    "sync_1_1_humble",
+    "sync_1_1_jazzy",
+    "tracecompass-ros2",
+)
+UNDELIVERED = """
+    SELECT ph.hostname AS publication_host, pp.pid AS publication_pid,
+        b.rmw_ns AS publication_rmw_ns, sh.hostname AS subscription_host,
+        sp.pid AS subscription_pid, s.subscription_handle, d.reason
+    FROM stat_delivery AS d
+    JOIN publication AS b USING (publication_id)
+    JOIN process AS pp ON b.process_id = pp.process_id
+    JOIN host AS ph ON pp.host_id = ph.host_id
+    JOIN subscription AS s ON d.subscription_id = s.subscription_id
+    JOIN process AS sp ON s.process_id = sp.process_id
+    JOIN host AS sh ON sp.host_id = sh.host_id
+    WHERE d.status <> 'delivered' AND s.is_internal = {internal}
+"""
+TRUE = """
+    SELECT publication_host, publication_pid, publication_rmw_ns, subscription_host,
+        subscription_pid, subscription_handle, reason
+    FROM truth_undelivered
+    WHERE is_internal = {internal}
+"""
+
+
+def reasons(ingested: Ingested, internal: str) -> list[tuple[str | None, str | None]]:
+    """Return the true reason and ours, of everything that either says is missing."""
+    return ingested.rows(
+        f"SELECT t.reason, m.reason FROM ({TRUE.format(internal=internal)}) AS t "
+        f"FULL JOIN ({UNDELIVERED.format(internal=internal)}) AS m "
+        "USING (publication_host, publication_pid, publication_rmw_ns, subscription_host, "
+        "subscription_pid, subscription_handle)"
+    )
+
+
+def test_reasons_of_the_application(simulated: Ingested) -> None:
+    """What was published before the subscription was there is undelivered to us alone."""
+    found = reasons(simulated, "false")
+    assert found
+    for true, ours in found:
+        assert ours == (true or "before_subscription")
+
+
+def test_reasons_of_what_ros_publishes_once(simulated: Ingested) -> None:
+    """Where nothing ever came, it cannot be told that the two did not know each other yet."""
+    for true, ours in reasons(simulated, "true"):
+        if true == "before_discovery":
+            assert ours in ("before_discovery", "not_delivered", "pending_at_end")
+        else:
+            assert ours == (true or "before_subscription")
+
+
+def test_no_take_is_an_orphan(simulated: Ingested) -> None:
+    assert simulated.rows("SELECT reason FROM stat_orphan") == []
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_reasons_add_up(recordings: Callable[[str], Ingested], name: str) -> None:
+    results = {result.name: result for result in run_checks(recordings(name).connection)}
+    assert results["check.delivery_is_complete"].row_count == 0
+    assert results["check.vocabulary_is_closed"].row_count == 0
+
+
+def test_reasons_of_simulated_systems_add_up(simulated: Ingested) -> None:
+    results = {result.name: result for result in run_checks(simulated.connection)}
+    assert results["check.delivery_is_complete"].row_count == 0
+
+
+def test_the_trace_of_trace_compass(recordings: Callable[[str], Ingested]) -> None:
+    """The buffers of the process in the middle end 0.2 s before the others."""
+    trace = recordings("tracecompass-ros2")
+    assert trace.rows(
+        "SELECT s.topic_name, o.reason, count(*) FROM stat_orphan AS o "
+        "JOIN subscription AS s USING (subscription_id) GROUP BY ALL"
+    ) == [("/topic_b", "publisher_trace_ends", 40)]
+    assert trace.rows(
+        "SELECT s.topic_name, d.reason, count(*) FROM stat_delivery AS d "
+        "JOIN subscription AS s USING (subscription_id) "
+        "WHERE d.status <> 'delivered' AND NOT s.is_internal GROUP BY ALL ORDER BY ALL"
+    ) == [("/topic_a", "before_discovery", 5), ("/topic_a", "subscription_ended", 40)]
