@@ -46,7 +46,7 @@ def test_a_chain_goes_straight_down_and_what_was_asked_for_is_marked(robot: Data
         "  transport 40 ns (events were lost here)  wait 20 ns  ran NA: never seen to end"
         "  thread thread 1  Tracker::on_detections",
         "+250 ns  publishes /tracks  in 10 ns",
-        "├──      NA  /recorder  Subscription(/tracks)  not taken: reason unknown",
+        "├──      NA  /recorder  Subscription(/tracks)  not taken: lost_in_transport",
         "└──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
     ]
 
@@ -64,7 +64,7 @@ def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> No
         "  transport 40 ns (events were lost here)  wait 20 ns  ran NA: never seen to end"
         "  thread thread 1  Tracker::on_detections",
         "│   +240 ns  [1] publishes /tracks  in 10 ns",
-        "│   ├──      NA  /recorder  Subscription(/tracks)  not taken: reason unknown",
+        "│   ├──      NA  /recorder  Subscription(/tracks)  not taken: lost_in_transport",
         "│   └──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
         "└── +120 ns  /tracker  Subscription(/image)  transport 90 ns (one of 2 candidates)"
         "  wait 20 ns  ran 10 ns  thread thread 1  Tracker::on_image",
@@ -101,7 +101,7 @@ def test_a_ring_is_drawn_once(empty_database: Path, tmp_path: Path) -> None:
 def test_what_the_trace_does_not_show_is_said(empty_database: Path, tmp_path: Path) -> None:
     with database_of("take_without_publication", empty_database, tmp_path) as database:
         line = str(database.flow(take_id=6)).splitlines()[1]
-    assert "NA: its publication was not seen, reason unknown" in line
+    assert "NA: its publication was not seen, publisher_trace_ends" in line
     with database_of("callback_without_message", empty_database, tmp_path) as database:
         line = str(database.flow(callback_instance_id=5)).splitlines()[1]
     assert "NA: its message was not seen" in line
@@ -148,7 +148,7 @@ def test_json_has_each_node_once_and_all_edges(robot: Database) -> None:
         for edge in content["edges"]
         if edge["link_kind"] == "not_taken"
     }
-    assert reasons == {(4, None), (6, "before_subscription")}
+    assert reasons == {(4, "lost_in_transport"), (6, "before_subscription")}
 
 
 def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> None:

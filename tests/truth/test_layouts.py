@@ -68,7 +68,7 @@ def test_objects(named, table):
 
 
 def test_instances_and_links(named):
-    name, simulation, path, _ = named
+    _, simulation, path, _ = named
     scores, _ = compare_simulated(path, simulation.truth)
     assert {"publication", "take", "callback_instance", "direct", "transport"} <= {
         score.kind for score in scores
