@@ -1,8 +1,9 @@
 -- name: staging.process_life
 -- description: Lives of each pid. A new life starts at an rcl_init of a context handle initialised
---     before, unless an object of the old life is used or a callback goes on after it; and at one from
---     another main thread or process name, unless another thread of the pid goes on. (Threads that
---     seem to go on prove nothing in the first case: containers number them alike in every life.)
+--     before, unless an object of the old life is used or a callback goes on after it; and at one
+--     from another main thread or process name, unless another thread of the pid goes on. (Threads
+--     that seem to go on prove nothing in the first case: containers number them alike in every
+--     life.)
 -- grain: one row per host, PID namespace, pid and life
 -- needs: staging.thread_presence, staging.thread_seen, raw
 WITH initialisation AS (
