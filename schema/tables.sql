@@ -226,6 +226,22 @@ CREATE TABLE store.executor_thread (
     thread_id   BIGINT NOT NULL                  -- The thread -> thread.thread_id
 );
 
+-- One row per callback group of an executor, where the trace tells (CARET).
+CREATE TABLE store.callback_group (
+    callback_group_id BIGINT PRIMARY KEY,        -- Identity of the callback group
+    run_id            BIGINT NOT NULL,           -- Run that the row belongs to -> run.run_id
+    process_id        BIGINT NOT NULL,           -- Process it lives in -> process.process_id
+    executor_id       BIGINT,                    -- Executor that it was added to -> executor.executor_id
+    kind              VARCHAR NOT NULL           -- 'mutually_exclusive', 'reentrant' or 'unknown', as CARET names it
+);
+
+-- One row per callback in a callback group.
+CREATE TABLE store.callback_group_member (
+    run_id            BIGINT NOT NULL,           -- Run that the row belongs to -> run.run_id
+    callback_group_id BIGINT NOT NULL,           -- The callback group -> callback_group.callback_group_id
+    callback_id       BIGINT NOT NULL            -- The callback -> callback.callback_id
+);
+
 -- One row per declared indirect link.
 CREATE TABLE store.annotation (
     annotation_id BIGINT PRIMARY KEY,            -- Identity of the annotation
@@ -375,6 +391,14 @@ CREATE TABLE store.executor_state (
     end_ns               BIGINT,                 -- Next executor event; NULL: not known (the last, or a gap) [epoch ns]
     callback_instance_id BIGINT,                 -- First callback run in it -> callback_instance.callback_instance_id
     start_event_id       BIGINT                  -- Executor event that began it [event order]
+);
+
+-- One row per gap in the record of a thread.
+CREATE TABLE store.thread_break (
+    run_id           BIGINT NOT NULL,            -- Run that the row belongs to -> run.run_id
+    thread_id        BIGINT NOT NULL,            -- Thread whose events may be missing -> thread.thread_id
+    resumed_ns       BIGINT NOT NULL,            -- First event of the thread behind the gap [epoch ns]
+    resumed_event_id BIGINT                      -- First event of the thread behind the gap [event order]
 );
 
 -- One row per take whose publication is known.

@@ -1,7 +1,7 @@
 """What partial traces need.
 
 Publications know the callback event before them; marks of what gaps may hide, failed takes, and
-what is missing.
+what is missing; where the records of threads break; callback groups.
 
 Frozen: it does not follow later changes of msgflow/db/tables.py.
 """
@@ -85,10 +85,62 @@ def upgrade() -> None:
         schema="store",
         comment="One row per take whose publication is not known",
     )
+    _create_thread_break()
+    _create_callback_groups()
+
+
+def _create_thread_break() -> None:
+    op.create_table(
+        "thread_break",
+        _required("run_id", "Run that the row belongs to"),
+        _required("thread_id", "Thread whose events may be missing"),
+        _required("resumed_ns", "First event of the thread behind the gap [epoch ns]"),
+        sa.Column(
+            "resumed_event_id",
+            sa.BigInteger(),
+            comment="First event of the thread behind the gap [event order]",
+        ),
+        schema="store",
+        comment="One row per gap in the record of a thread",
+    )
+
+
+def _create_callback_groups() -> None:
+    op.create_table(
+        "callback_group",
+        sa.Column(
+            "callback_group_id",
+            sa.BigInteger(),
+            primary_key=True,
+            autoincrement=False,
+            comment="Identity of the callback group",
+        ),
+        _required("run_id", "Run that the row belongs to"),
+        _required("process_id", "Process it lives in"),
+        sa.Column("executor_id", sa.BigInteger(), comment="Executor that it was added to"),
+        sa.Column(
+            "kind",
+            sa.String(),
+            nullable=False,
+            comment="'mutually_exclusive', 'reentrant' or 'unknown', as CARET names it",
+        ),
+        schema="store",
+        comment="One row per callback group of an executor, where the trace tells (CARET)",
+    )
+    op.create_table(
+        "callback_group_member",
+        _required("run_id", "Run that the row belongs to"),
+        _required("callback_group_id", "The callback group"),
+        _required("callback_id", "The callback"),
+        schema="store",
+        comment="One row per callback in a callback group",
+    )
 
 
 def downgrade() -> None:
     """Drop the columns and tables."""
+    for table in ("callback_group_member", "callback_group", "thread_break"):
+        op.drop_table(table, schema="store")
     for table in ("orphan_take", "undelivered", "failed_take"):
         op.drop_table(table, schema="store")
     for table in _LOSS_AFFECTED:

@@ -389,6 +389,31 @@ executor_thread = _table(
     _thread("The thread"),
 )
 
+callback_group = _table(
+    "callback_group",
+    "One row per callback group of an executor, where the trace tells (CARET)",
+    _key("callback_group_id", "Identity of the callback group"),
+    _run(),
+    _process(),
+    _reference("executor_id", "Executor that it was added to", to="executor.executor_id"),
+    _text(
+        "kind", "'mutually_exclusive', 'reentrant' or 'unknown', as CARET names it", required=True
+    ),
+)
+
+callback_group_member = _table(
+    "callback_group_member",
+    "One row per callback in a callback group",
+    _run(),
+    _reference(
+        "callback_group_id",
+        "The callback group",
+        to="callback_group.callback_group_id",
+        required=True,
+    ),
+    _reference("callback_id", "The callback", to="callback.callback_id", required=True),
+)
+
 annotation = _table(
     "annotation",
     "One row per declared indirect link",
@@ -566,6 +591,15 @@ executor_state = _table(
         to="callback_instance.callback_instance_id",
     ),
     _order("start_event_id", "Executor event that began it"),
+)
+
+thread_break = _table(
+    "thread_break",
+    "One row per gap in the record of a thread",
+    _run(),
+    _thread("Thread whose events may be missing"),
+    _time("resumed_ns", "First event of the thread behind the gap", required=True),
+    _order("resumed_event_id", "First event of the thread behind the gap"),
 )
 
 # --- links ---------------------------------------------------------------------------------------

@@ -1,17 +1,40 @@
 -- name: staging.executor
--- description: Executors, deduced from threads: stock traces do not name them. One thread with
---     executor events is a single-threaded executor, one without may be any.
+-- description: Executors. Stock traces do not name them: there they are deduced from their threads.
+--     One thread with executor events is a single-threaded executor, one without may be any.
 -- grain: one row per executor
--- needs: staging.executor_member
+-- needs: staging.executor_member, staging.executor_named
+WITH deduced AS (
+    SELECT
+        first_thread_id,
+        any_value(process_id) AS process_id,
+        min(executor_event_id) AS executor_event_id,
+        CASE
+            WHEN count(*) > 1 THEN 'multi_threaded'
+            WHEN bool_or(is_spinning) THEN 'single_threaded'
+            ELSE 'unknown'
+        END AS kind
+    FROM staging.executor_member
+    GROUP BY first_thread_id
+),
+every_executor AS (
+    SELECT
+        d.first_thread_id,
+        d.process_id,
+        d.executor_event_id,
+        CASE WHEN x.kind <> 'unknown' THEN x.kind ELSE d.kind END AS kind,
+        x.event_id IS NULL AS is_inferred
+    FROM deduced AS d
+    LEFT JOIN staging.executor_named AS x ON d.executor_event_id = x.event_id
+    UNION ALL
+    SELECT NULL, x.process_id, x.event_id, x.kind, false
+    FROM staging.executor_named AS x
+    ANTI JOIN deduced AS d ON x.event_id = d.executor_event_id
+)
 SELECT
-    row_number() OVER (ORDER BY first_thread_id) AS executor_id,
-    any_value(process_id) AS process_id,
-    CASE
-        WHEN count(*) > 1 THEN 'multi_threaded'
-        WHEN bool_or(is_spinning) THEN 'single_threaded'
-        ELSE 'unknown'
-    END AS kind,
-    true AS is_inferred,
-    first_thread_id
-FROM staging.executor_member
-GROUP BY first_thread_id
+    row_number() OVER (ORDER BY first_thread_id NULLS LAST, executor_event_id) AS executor_id,
+    process_id,
+    kind,
+    is_inferred,
+    first_thread_id,
+    executor_event_id
+FROM every_executor

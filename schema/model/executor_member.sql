@@ -1,14 +1,41 @@
 -- name: staging.executor_member
--- description: Which threads work for the same executor: those of a process that execute the same
---     callbacks, directly or through others. The smallest thread of such a group names it.
+-- description: Which threads work for the same executor: those of a process that execute callbacks
+--     of an executor that names itself, else the same callbacks, directly or through others. The
+--     smallest thread of such a group stands for it. A thread that serves several executors by
+--     name belongs to the one of which it ran most.
 -- grain: one row per thread that runs callbacks or emits executor events
--- needs: staging.callback_instance, staging.executor_event, staging.thread
-WITH RECURSIVE runs AS (
-    SELECT DISTINCT thread_id, callback_id FROM staging.callback_instance
+-- needs: staging.callback_instance, staging.callback_group_entry, staging.callback_group_owner,
+--     staging.executor_event, staging.thread
+WITH RECURSIVE served AS (
+    SELECT e.callback_id, g.executor_event_id
+    FROM staging.callback_group_entry AS e
+    JOIN staging.callback_group_owner AS g ON e.group_event_id = g.event_id
+    WHERE g.executor_event_id IS NOT NULL
 ),
--- Each thread is tied to the smallest one that shares a callback with it, not to all.
+main_executor AS (
+    SELECT thread_id, executor_event_id
+    FROM (
+        SELECT i.thread_id, s.executor_event_id, count(*) AS run_count
+        FROM staging.callback_instance AS i
+        JOIN served AS s ON i.callback_id = s.callback_id
+        WHERE i.depth = 1
+        GROUP BY i.thread_id, s.executor_event_id
+    )
+    QUALIFY row_number() OVER (
+        PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id
+    ) = 1
+),
+-- What ties threads: an executor by its event, or a callback by its (never negative) identity.
+runs AS (
+    SELECT thread_id, -1 - executor_event_id AS tie_id FROM main_executor
+    UNION ALL
+    SELECT DISTINCT i.thread_id, i.callback_id
+    FROM staging.callback_instance AS i
+    ANTI JOIN served AS s ON i.callback_id = s.callback_id
+),
+-- Each thread is tied to the smallest one that shares something with it, not to all.
 neighbour AS (
-    SELECT DISTINCT thread_id, min(thread_id) OVER (PARTITION BY callback_id) AS other_thread_id
+    SELECT DISTINCT thread_id, min(thread_id) OVER (PARTITION BY tie_id) AS other_thread_id
     FROM runs
 ),
 tie AS (
@@ -39,7 +66,9 @@ SELECT
     l.thread_id,
     t.process_id,
     l.first_thread_id,
-    s.thread_id IS NOT NULL AS is_spinning
+    s.thread_id IS NOT NULL AS is_spinning,
+    m.executor_event_id
 FROM labelled AS l
 JOIN staging.thread AS t ON l.thread_id = t.thread_id
 LEFT JOIN spinning AS s ON l.thread_id = s.thread_id
+LEFT JOIN main_executor AS m ON l.thread_id = m.thread_id

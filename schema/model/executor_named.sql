@@ -1,0 +1,26 @@
+-- name: staging.executor_named
+-- description: Executors that name themselves (CARET), and those of which only the address is
+--     known, their construction not being traced.
+-- grain: one row per executor
+-- needs: staging.located
+WITH constructed AS (
+    SELECT event_id, process_id, executor_addr, executor_type_name AS kind
+    FROM staging.located('ros2_caret_construct_executor')
+    UNION ALL
+    SELECT event_id, process_id, executor_addr, executor_type_name
+    FROM staging.located('ros2_caret_construct_static_executor')
+),
+used AS (
+    SELECT event_id, process_id, executor_addr
+    FROM staging.located('ros2_caret_add_callback_group')
+    UNION ALL
+    SELECT event_id, process_id, executor_addr
+    FROM staging.located('ros2_caret_executor_entity_collector_to_executor')
+)
+SELECT event_id, process_id, executor_addr, coalesce(kind, 'unknown') AS kind
+FROM constructed
+UNION ALL
+SELECT min(u.event_id), u.process_id, u.executor_addr, 'unknown'
+FROM used AS u
+ANTI JOIN constructed AS c ON u.process_id = c.process_id AND u.executor_addr = c.executor_addr
+GROUP BY u.process_id, u.executor_addr
