@@ -1,7 +1,12 @@
 -- name: main.executor_activity
--- description: What executor threads did, refined by callbacks: the states are split where a
---     callback begins and ends. Before its callback an executing thread takes the message; after
---     it, a thread of a multi-threaded executor is blocked until it may look for work again.
+-- description: What executor threads did, refined: the states are split where a callback begins and
+--     ends and where a message is taken. An executing thread takes the message before its callback
+--     (a timer has none: it is still selecting); after it, a thread of a multi-threaded executor is
+--     blocked until it may look for work again. Of nested callbacks the innermost counts, and
+--     inside of a callback that spins what it does there. Threads whose executor tells nothing of
+--     itself have callbacks, services and takes alone. A callback never seen to end lasts until
+--     the first event that cannot be inside of it. Activities of a thread never overlap, add up to
+--     its states, and never reach across a gap.
 -- grain: one row per interval of a thread in which nothing changed
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: executor_id BIGINT  Executor
@@ -9,79 +14,132 @@
 -- column: activity VARCHAR  'wait', 'select', 'take', 'callback', 'service' or 'blocked'
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; NULL: not known (the last, or a gap follows)
--- column: callback_instance_id BIGINT  Callback that ran
--- needs: store.executor_state, store.callback_instance, store.callback, store.executor_thread,
---     store.executor, store.thread, derive.corrected_ns, derive.process_clock
-WITH change AS (
+-- column: callback_instance_id BIGINT  Innermost callback that ran
+-- needs: store.executor_state, store.callback_instance, store.callback, store.take,
+--     store.thread_break, store.executor_thread, store.executor, store.thread,
+--     derive.corrected_ns, derive.process_clock
+WITH instance AS (
     SELECT
-        run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns, state,
-        NULL::BIGINT AS callback_instance_id, 0 AS step
+        i.run_id, i.thread_id, i.callback_instance_id, i.parent_id, i.start_ns, i.end_ns,
+        i.start_event_id, i.end_event_id, i.effective_end_event_id, i.take_id, c.kind
+    FROM store.callback_instance AS i
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+),
+-- A callback never seen to end was over at the first event that cannot be inside of it.
+outside AS (
+    SELECT start_event_id AS event_id, thread_id, start_ns AS at_ns FROM store.executor_state
+    UNION ALL
+    SELECT start_event_id, thread_id, start_ns FROM store.callback_instance
+    UNION ALL
+    SELECT resumed_event_id, thread_id, resumed_ns FROM store.thread_break
+),
+closed AS (
+    SELECT
+        i.run_id, i.thread_id, i.effective_end_event_id AS event_id, any_value(x.at_ns) AS at_ns,
+        i.callback_instance_id, i.parent_id
+    FROM instance AS i
+    JOIN outside AS x
+        ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
+    WHERE i.end_event_id IS NULL
+    GROUP BY ALL
+),
+change AS (
+    SELECT
+        run_id, thread_id, resumed_event_id AS event_id, 0 AS step, resumed_ns AS at_ns,
+        NULL::BIGINT AS running_id, 0 AS state, NULL AS kind
+    FROM store.thread_break
+    UNION ALL
+    SELECT run_id, thread_id, end_event_id, 1, end_ns, parent_id, 0, NULL
+    FROM instance
+    WHERE end_event_id IS NOT NULL
+    UNION ALL
+    SELECT run_id, thread_id, event_id, 1, at_ns, parent_id, 0, NULL
+    FROM closed
+    UNION ALL
+    SELECT
+        run_id, thread_id, start_event_id, 2, start_ns, NULL,
+        CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END, NULL
     FROM store.executor_state
     UNION ALL
-    SELECT run_id, thread_id, start_event_id, start_ns, NULL, callback_instance_id, 1
-    FROM store.callback_instance
-    WHERE depth = 1
+    SELECT run_id, thread_id, start_event_id, 3, start_ns, callback_instance_id, 0, kind
+    FROM instance
     UNION ALL
-    SELECT run_id, thread_id, end_event_id, end_ns, NULL, NULL, -1
-    FROM store.callback_instance
-    WHERE depth = 1 AND end_event_id IS NOT NULL
+    SELECT t.run_id, t.thread_id, t.start_event_id, 4, t.taken_ns, NULL, 0, i.kind
+    FROM store.take AS t
+    LEFT JOIN instance AS i ON t.take_id = i.take_id
+    WHERE t.method <> 'callback_only' AND t.start_event_id IS NOT NULL
 ),
-ordered AS (
+-- Each of these is the number of an event, with a digit that says which or what.
+situation AS (
     SELECT
-        run_id,
-        thread_id,
-        event_id AS change_event_id,
-        step,
-        at_ns AS start_ns,
-        lead(at_ns) OVER on_thread AS end_ns,
-        max(CASE WHEN state IS NOT NULL THEN event_id END) OVER so_far AS state_event_id,
-        max(CASE WHEN step = 1 THEN event_id END) OVER so_far AS callback_event_id,
-        max(CASE WHEN step = -1 THEN event_id END) OVER so_far AS ended_event_id
+        run_id, thread_id, event_id, step, at_ns, kind,
+        coalesce(max(CASE WHEN step = 0 THEN event_id END) OVER so_far, -1) AS break_event_id,
+        max(CASE WHEN state > 0 THEN event_id * 4 + state END) OVER so_far AS state_mark,
+        max(CASE WHEN step IN (1, 3) THEN event_id * 4 + step END) OVER so_far AS run_mark
     FROM change
-    WINDOW
-        on_thread AS (PARTITION BY run_id, thread_id ORDER BY event_id),
-        so_far AS (
-            PARTITION BY run_id, thread_id ORDER BY event_id ROWS UNBOUNDED PRECEDING
-        )
+    WINDOW so_far AS (
+        PARTITION BY run_id, thread_id ORDER BY event_id, step ROWS UNBOUNDED PRECEDING
+    )
 ),
--- Where a gap follows a state, nobody knows how its last part went on.
-followed AS (
+-- A take while the executor executes is what it is about to do anyway.
+split AS (
     SELECT
-        run_id, thread_id, start_ns, end_ns, state_event_id, callback_event_id, ended_event_id,
-        lead(state_event_id) OVER (
-            PARTITION BY run_id, thread_id ORDER BY change_event_id, step
-        ) IS DISTINCT FROM state_event_id AS is_last_of_state
-    FROM ordered
+        run_id, thread_id, event_id, step, at_ns, kind, break_event_id, run_mark,
+        run_mark // 4 AS run_event_id,
+        CASE WHEN state_mark // 4 >= break_event_id THEN state_mark // 4 END AS state_event_id,
+        CASE WHEN state_mark // 4 >= break_event_id THEN state_mark % 4 ELSE 0 END AS state,
+        lead(at_ns) OVER on_thread AS next_ns,
+        lead(step) OVER on_thread AS next_step,
+        lead(kind) OVER on_thread AS next_kind
+    FROM situation
+    WHERE step < 4 OR state_mark IS NULL OR state_mark % 4 = 2 OR state_mark // 4 < break_event_id
+    WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY event_id, step)
+),
+run_change AS (
+    SELECT thread_id, event_id * 4 + step AS run_mark, running_id
+    FROM change
+    WHERE step IN (1, 3)
+),
+told AS (
+    SELECT
+        s.run_id, s.thread_id, s.at_ns, s.next_ns, s.next_step, s.next_kind, s.step, s.state,
+        s.kind IS NOT NULL AS has_callback,
+        coalesce(s.run_event_id > s.state_event_id, false) AS has_run,
+        i.callback_instance_id,
+        i.kind,
+        s.state > 0 AND coalesce(s.state_event_id > i.start_event_id, true) AS is_spinning
+    FROM split AS s
+    LEFT JOIN run_change AS r ON s.thread_id = r.thread_id AND s.run_mark = r.run_mark
+    LEFT JOIN instance AS i
+        ON r.running_id = i.callback_instance_id
+        AND i.effective_end_event_id > s.event_id
+        AND i.start_event_id >= s.break_event_id
 ),
 classified AS (
     SELECT
-        o.run_id,
-        o.thread_id,
+        t.run_id,
+        t.thread_id,
         x.executor_id,
-        o.start_ns,
-        CASE WHEN s.end_ns IS NULL AND o.is_last_of_state THEN NULL ELSE o.end_ns END AS end_ns,
-        i.callback_instance_id,
+        t.at_ns AS start_ns,
+        CASE WHEN t.next_step > 0 THEN t.next_ns END AS end_ns,
+        t.callback_instance_id,
         CASE
-            WHEN i.callback_instance_id IS NOT NULL THEN
-                CASE WHEN c.kind = 'service' THEN 'service' ELSE 'callback' END
-            WHEN s.state = 'wait' THEN 'wait'
-            WHEN s.state = 'execute' AND coalesce(o.callback_event_id < o.state_event_id, true)
-                THEN 'take'
-            WHEN s.state = 'execute' AND e.kind = 'multi_threaded' THEN 'blocked'
+            WHEN t.callback_instance_id IS NOT NULL AND (NOT t.is_spinning OR t.next_step = 1)
+                THEN CASE WHEN t.kind = 'service' THEN 'service' ELSE 'callback' END
+            WHEN t.step = 4 THEN CASE WHEN t.is_spinning OR t.has_callback THEN 'take' END
+            WHEN NOT t.is_spinning THEN NULL
+            WHEN t.state = 1 AND NOT t.has_run THEN 'wait'
+            WHEN t.state = 3 AND NOT t.has_run
+                THEN CASE WHEN t.next_kind = 'timer' THEN 'select' ELSE 'take' END
+            WHEN t.has_run
+                AND t.callback_instance_id IS NULL
+                AND e.kind LIKE 'multi_threaded%'
+                THEN 'blocked'
             ELSE 'select'
         END AS activity
-    FROM followed AS o
-    JOIN store.executor_thread AS x ON o.thread_id = x.thread_id
+    FROM told AS t
+    JOIN store.executor_thread AS x ON t.thread_id = x.thread_id
     JOIN store.executor AS e ON x.executor_id = e.executor_id
-    LEFT JOIN store.executor_state AS s
-        ON o.run_id = s.run_id AND o.state_event_id = s.start_event_id
-    LEFT JOIN store.callback_instance AS i
-        ON o.run_id = i.run_id
-        AND o.callback_event_id = i.start_event_id
-        AND coalesce(o.ended_event_id < o.callback_event_id, true)
-        AND coalesce(o.state_event_id < i.effective_end_event_id, true)
-    LEFT JOIN store.callback AS c ON i.callback_id = c.callback_id
-    WHERE s.state IS NOT NULL OR i.callback_instance_id IS NOT NULL
 )
 SELECT
     k.run_id,
@@ -94,4 +152,4 @@ SELECT
 FROM classified AS k
 JOIN store.thread AS t ON k.thread_id = t.thread_id
 JOIN derive.process_clock AS p ON t.process_id = p.process_id
-WHERE k.end_ns > k.start_ns OR k.end_ns IS NULL
+WHERE k.activity IS NOT NULL AND (k.end_ns > k.start_ns OR k.end_ns IS NULL)
