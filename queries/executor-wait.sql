@@ -1,0 +1,113 @@
+-- name: executor-wait
+-- title: How long callbacks waited, and what their executor ran meanwhile
+-- description: The time from the end of a publication (or from when a timer was due, or a request
+--     was sent) to the start of its callback, and how much of it the executor was busy with other
+--     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds:
+--     at least what ran after the executor had found it ready, at most what ran since it can have
+--     been there. The rest of the wait was the network, an idle executor or its overhead. The
+--     callback that others kept waiting most comes first. Totals are over the runs in the time
+--     window; 'waits' has them one by one, 'interference' every pair of callbacks.
+-- grain: one row per callback object that ran
+-- column: run_id BIGINT             Run
+-- column: node VARCHAR              Node of the callback
+-- column: callback VARCHAR          What triggers it
+-- column: count BIGINT              Runs that began in the time window
+-- column: delayed_min BIGINT        Runs that others ran before for certain though it was ready
+-- column: delayed_max BIGINT        Runs for which that is possible
+-- column: wait_median_ns BIGINT [ns]  Median wait, where its beginning is known
+-- column: wait_max_ns BIGINT [ns]   Longest wait
+-- column: busy_worst_ns BIGINT [ns]   Longest that the executor can have been busy during one wait
+-- column: busy_min_ns BIGINT [ns]   Executor busy with others during all waits, at least
+-- column: busy_max_ns BIGINT [ns]   Executor busy with others during all waits, at most
+-- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, where the wait is known, at least
+-- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, where the wait is known, at most
+-- column: meanwhile VARCHAR         What ran meanwhile, by its share: the three with the most, with
+--     their node where it is another
+-- column: unknown BIGINT            Runs of which the beginning of the wait is not known
+-- column: loss_affected BIGINT      Runs with a gap of the trace in their wait
+-- column: callback_id BIGINT        Identity of the callback
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- note: clocks
+-- needs: main.executor_wait, main.executor_interference, main.callback_instance,
+--     main.callback_label
+WITH waited AS (
+    SELECT
+        run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
+        is_loss_affected
+    FROM main.executor_wait
+    WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
+),
+measured AS (
+    SELECT
+        run_id,
+        callback_id,
+        count(*) AS count,
+        count(*) FILTER (WHERE busy_min_ns > 0) AS delayed_min,
+        count(*) FILTER (WHERE coalesce(busy_max_ns, busy_min_ns) > 0) AS delayed_max,
+        quantile_disc(wait_ns, 0.5) AS wait_median_ns,
+        max(wait_ns) AS wait_max_ns,
+        max(busy_max_ns) AS busy_worst_ns,
+        sum(busy_min_ns)::BIGINT AS busy_min_ns,
+        sum(coalesce(busy_max_ns, busy_min_ns))::BIGINT AS busy_max_ns,
+        sum(wait_ns - busy_max_ns)::BIGINT AS rest_min_ns,
+        sum(wait_ns - busy_min_ns)::BIGINT AS rest_max_ns,
+        count(*) - count(wait_ns) AS unknown,
+        count(*) FILTER (WHERE is_loss_affected) AS loss_affected
+    FROM waited
+    GROUP BY run_id, callback_id
+),
+pair AS (
+    SELECT w.callback_id, r.callback_id AS meanwhile_id, sum(i.overlap_ns) AS overlap_ns
+    FROM main.executor_interference AS i
+    JOIN waited AS w ON i.callback_instance_id = w.callback_instance_id
+    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
+    WHERE i.overlap_ns > 0
+    GROUP BY w.callback_id, r.callback_id
+),
+ranked AS (
+    SELECT
+        p.callback_id,
+        p.meanwhile_id,
+        p.overlap_ns / sum(p.overlap_ns) OVER (PARTITION BY p.callback_id) AS share,
+        row_number() OVER (
+            PARTITION BY p.callback_id ORDER BY p.overlap_ns DESC, p.meanwhile_id
+        ) AS place
+    FROM pair AS p
+),
+meanwhile AS (
+    SELECT
+        r.callback_id,
+        string_agg(
+            CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
+            || printf('%s %.0f %%', o.label, 100 * r.share),
+            ', ' ORDER BY r.place
+        ) AS shares
+    FROM ranked AS r
+    JOIN main.callback_label AS l ON r.callback_id = l.callback_id
+    JOIN main.callback_label AS o ON r.meanwhile_id = o.callback_id
+    WHERE r.place <= 3 AND r.share >= 0.005
+    GROUP BY r.callback_id
+)
+SELECT
+    m.run_id,
+    l.node,
+    l.label AS callback,
+    m.count,
+    m.delayed_min,
+    m.delayed_max,
+    m.wait_median_ns,
+    m.wait_max_ns,
+    m.busy_worst_ns,
+    m.busy_min_ns,
+    m.busy_max_ns,
+    m.rest_min_ns,
+    m.rest_max_ns,
+    w.shares AS meanwhile,
+    m.unknown,
+    m.loss_affected,
+    m.callback_id,
+    l.is_internal
+FROM measured AS m
+JOIN main.callback_label AS l ON m.callback_id = l.callback_id
+LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id
+ORDER BY m.run_id, m.busy_max_ns DESC, l.node, l.label, m.callback_id

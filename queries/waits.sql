@@ -1,0 +1,85 @@
+-- name: waits
+-- title: Waits of callbacks, one by one
+-- description: For every run of a callback the time since the end of the publication of its message
+--     (or since the timer was due, or the request was sent), how much of it the executor was busy
+--     with other callbacks, as bounds, and with which. Runs inside of others have no wait of their
+--     own.
+-- grain: one row per run of a callback that is not nested in another
+-- param: callback_id BIGINT = NULL  Only runs of this callback, see executor-wait
+-- param: min_busy_ns BIGINT {0..} = 0  Only runs whose executor may have been busy that long [ns]
+-- column: run_id BIGINT             Run
+-- column: start_ns BIGINT [epoch ns]  Start of the callback
+-- column: node VARCHAR              Node of the callback
+-- column: callback VARCHAR          What triggers it
+-- column: since VARCHAR             Where the wait begins: 'publication', 'stamp', 'request' or
+--     'timer'; NULL: not known
+-- column: wait_ns BIGINT [ns]       From there to the start of the callback
+-- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
+-- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
+-- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
+-- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
+-- column: meanwhile VARCHAR         What ran meanwhile and how long, the longest first, with
+--     its node where it is another
+-- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- column: callback_instance_id BIGINT  Identity of the run of the callback
+-- column: callback_id BIGINT        Identity of the callback
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- note: clocks
+-- needs: main.executor_wait, main.executor_interference, main.callback_instance,
+--     main.callback_label
+WITH waited AS (
+    SELECT
+        run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
+        busy_max_ns, is_loss_affected
+    FROM main.executor_wait
+    WHERE list_contains($runs, run_id)
+        AND start_ns >= $start_ns
+        AND start_ns < $end_ns
+        AND coalesce(callback_id = $callback_id, true)
+        AND coalesce(busy_max_ns, busy_min_ns) >= $min_busy_ns
+),
+pair AS (
+    SELECT
+        i.callback_instance_id,
+        w.callback_id,
+        r.callback_id AS meanwhile_id,
+        sum(i.overlap_ns) AS overlap_ns
+    FROM main.executor_interference AS i
+    JOIN waited AS w ON i.callback_instance_id = w.callback_instance_id
+    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
+    WHERE i.overlap_ns > 0
+    GROUP BY i.callback_instance_id, w.callback_id, r.callback_id
+),
+meanwhile AS (
+    SELECT
+        p.callback_instance_id,
+        string_agg(
+            CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
+            || printf('%s %.3f ms', o.label, p.overlap_ns / 1e6),
+            ', ' ORDER BY p.overlap_ns DESC, p.meanwhile_id
+        ) AS names
+    FROM pair AS p
+    JOIN main.callback_label AS l ON p.callback_id = l.callback_id
+    JOIN main.callback_label AS o ON p.meanwhile_id = o.callback_id
+    GROUP BY p.callback_instance_id
+)
+SELECT
+    w.run_id,
+    w.start_ns,
+    l.node,
+    l.label AS callback,
+    w.since,
+    w.wait_ns,
+    w.busy_min_ns,
+    w.busy_max_ns,
+    w.wait_ns - w.busy_max_ns AS rest_min_ns,
+    w.wait_ns - w.busy_min_ns AS rest_max_ns,
+    m.names AS meanwhile,
+    w.is_loss_affected,
+    w.callback_instance_id,
+    w.callback_id,
+    l.is_internal
+FROM waited AS w
+JOIN main.callback_label AS l ON w.callback_id = l.callback_id
+LEFT JOIN meanwhile AS m ON w.callback_instance_id = m.callback_instance_id
+ORDER BY w.run_id, w.start_ns, w.callback_instance_id

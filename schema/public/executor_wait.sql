@@ -1,0 +1,135 @@
+-- name: main.executor_wait
+-- description: How long runs of callbacks waited in their executor, and what for. When exactly an
+--     input arrived is not in a trace, so that time is given as bounds: it became ready between
+--     earliest_ns and latest_ns. It could not start (busy) while all threads of the executor ran
+--     callbacks, or one ran that it excludes; what else passed was the network, an idle executor,
+--     or its own overhead. Runs nested in others are left out: these are served by an executor
+--     inside of a callback.
+-- grain: one row per run of a callback that is not nested in another
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: callback_instance_id BIGINT  Run of a callback that waited
+-- column: executor_id BIGINT  Its executor
+-- column: thread_id BIGINT  Thread that ran it
+-- column: callback_id BIGINT  Its callback
+-- column: since VARCHAR  What origin_ns is: 'publication' (its end), 'stamp' (of a message whose
+--     publication is not known, by the clock of its host), 'request' (sent), 'timer' (due);
+--     NULL: not known
+-- column: origin_ns BIGINT [epoch ns]  Since when it can have been due
+-- column: earliest_ns BIGINT [epoch ns]  It was not ready before; NULL: not known
+-- column: latest_ns BIGINT [epoch ns]  It was ready by then
+-- column: start_ns BIGINT [epoch ns]  callback_start
+-- column: wait_ns BIGINT [ns]  From origin_ns to start_ns
+-- column: busy_min_ns BIGINT [ns]  Executor busy with other runs from latest_ns on
+-- column: busy_max_ns BIGINT [ns]  Executor busy with other runs from earliest_ns on
+-- column: blocked_max_ns BIGINT [ns]  Part of busy_max_ns for which a thread was free, but a
+--     callback ran that never runs beside this one
+-- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
+-- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- needs: derive.callback_ready, derive.executor_busy, derive.executor_poll,
+--     derive.executor_blocked, derive.callback_exclusion, store.thread, derive.process_clock,
+--     derive.corrected_ns
+WITH ready AS (
+    SELECT
+        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
+        earliest_ns, latest_ns, start_ns, is_loss_affected
+    FROM derive.callback_ready
+),
+moment AS (
+    SELECT callback_instance_id, callback_id, executor_id, 'earliest' AS which, earliest_ns AS at_ns
+    FROM ready
+    WHERE earliest_ns IS NOT NULL
+    UNION ALL
+    SELECT callback_instance_id, callback_id, executor_id, 'latest', latest_ns FROM ready
+    UNION ALL
+    SELECT callback_instance_id, callback_id, executor_id, 'start', start_ns FROM ready
+),
+-- How much of each kind of time there was up to a moment: the difference of two such sums is what
+-- there was between them.
+busy AS (
+    SELECT
+        m.callback_instance_id,
+        m.callback_id,
+        m.which,
+        m.at_ns,
+        coalesce(b.before_ns + least(m.at_ns, b.end_ns) - b.start_ns, 0) AS until_ns
+    FROM moment AS m
+    ASOF LEFT JOIN derive.executor_busy AS b
+        ON m.executor_id = b.executor_id AND m.at_ns >= b.start_ns
+),
+blocked AS (
+    SELECT
+        m.callback_instance_id,
+        m.which,
+        CASE
+            WHEN b.end_ns IS NULL THEN 0
+            WHEN m.at_ns >= b.end_ns THEN b.before_ns + b.blocked_ns
+            ELSE b.before_ns + m.at_ns - b.start_ns - (m.until_ns - b.start_busy_ns)
+        END AS until_ns
+    FROM (
+        SELECT y.callback_instance_id, y.which, y.at_ns, y.until_ns, e.kind, e.exclusion_id
+        FROM busy AS y
+        JOIN derive.callback_exclusion AS e ON y.callback_id = e.callback_id
+    ) AS m
+    ASOF LEFT JOIN derive.executor_blocked AS b
+        ON m.kind = b.kind AND m.exclusion_id = b.exclusion_id AND m.at_ns >= b.start_ns
+),
+idle AS (
+    SELECT
+        m.callback_instance_id,
+        m.which,
+        CASE WHEN e.executor_id IS NOT NULL THEN
+            coalesce(w.before_ns + least(m.at_ns, w.end_ns) - w.start_ns, 0)
+        END AS until_ns
+    FROM moment AS m
+    ASOF LEFT JOIN derive.executor_poll AS w
+        ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
+    LEFT JOIN (SELECT DISTINCT executor_id FROM derive.executor_poll) AS e
+        ON m.executor_id = e.executor_id
+    WHERE m.which <> 'latest'
+),
+until AS (
+    SELECT callback_instance_id, 'busy_' || which AS what, until_ns FROM busy
+    UNION ALL
+    SELECT callback_instance_id, 'blocked_' || which, until_ns FROM blocked
+    UNION ALL
+    SELECT callback_instance_id, 'idle_' || which, until_ns FROM idle
+),
+passed AS (
+    SELECT
+        callback_instance_id,
+        max(CASE WHEN what = 'busy_earliest' THEN until_ns END) AS busy_earliest_ns,
+        max(CASE WHEN what = 'busy_latest' THEN until_ns END) AS busy_latest_ns,
+        max(CASE WHEN what = 'busy_start' THEN until_ns END) AS busy_start_ns,
+        max(CASE WHEN what = 'blocked_earliest' THEN until_ns END) AS blocked_earliest_ns,
+        max(CASE WHEN what = 'blocked_latest' THEN until_ns END) AS blocked_latest_ns,
+        max(CASE WHEN what = 'blocked_start' THEN until_ns END) AS blocked_start_ns,
+        max(CASE WHEN what = 'idle_earliest' THEN until_ns END) AS idle_earliest_ns,
+        max(CASE WHEN what = 'idle_start' THEN until_ns END) AS idle_start_ns
+    FROM until
+    GROUP BY callback_instance_id
+)
+SELECT
+    r.run_id,
+    r.callback_instance_id,
+    r.executor_id,
+    r.thread_id,
+    r.callback_id,
+    r.since,
+    derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
+    derive.corrected_ns(r.earliest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS earliest_ns,
+    derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
+    derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+    r.start_ns - r.origin_ns AS wait_ns,
+    p.busy_start_ns - p.busy_latest_ns
+    + coalesce(p.blocked_start_ns - p.blocked_latest_ns, 0) AS busy_min_ns,
+    p.busy_start_ns - p.busy_earliest_ns
+    + coalesce(p.blocked_start_ns - p.blocked_earliest_ns, 0) AS busy_max_ns,
+    CASE WHEN r.earliest_ns IS NOT NULL
+        THEN coalesce(p.blocked_start_ns - p.blocked_earliest_ns, 0)
+    END AS blocked_max_ns,
+    p.idle_start_ns - p.idle_earliest_ns AS idle_ns,
+    r.is_loss_affected
+FROM ready AS r
+JOIN store.thread AS t ON r.thread_id = t.thread_id
+JOIN derive.process_clock AS c ON t.process_id = c.process_id
+JOIN passed AS p ON r.callback_instance_id = p.callback_instance_id

@@ -1,0 +1,93 @@
+-- name: derive.callback_ready
+-- description: Between which moments the input of a callback became ready in its executor. Not
+--     before its release, nor before the subscription was made. In an executor of one thread also
+--     not before it last went to sleep, nor before the last polling point but one, which would
+--     have found it (unless that callback ran in between: then more of its input may have
+--     waited). Ready at the latest when the executor last learned what is ready before it picked
+--     this callback.
+-- grain: one row per run of a callback that is not nested in another
+-- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
+--     store.executor_thread, store.executor_state, store.thread_break
+WITH release AS (
+    SELECT
+        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
+        r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, s.thread_count
+    FROM derive.callback_release AS r
+    JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
+),
+-- A thread among several picks what it runs when it begins to look, not when it runs it: another
+-- one may have gone to wait in the meantime.
+picked AS (
+    SELECT callback_instance_id, executor_id, start_ns AS picked_ns
+    FROM release
+    WHERE thread_count = 1
+    UNION ALL
+    SELECT r.callback_instance_id, r.executor_id, s.start_ns
+    FROM (SELECT * FROM release WHERE thread_count > 1) AS r
+    ASOF JOIN (
+        SELECT thread_id, start_ns FROM store.executor_state WHERE state = 'process'
+    ) AS s ON r.thread_id = s.thread_id AND r.start_ns >= s.start_ns
+),
+polled AS (
+    SELECT p.callback_instance_id, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns
+    FROM picked AS p
+    ASOF JOIN derive.executor_poll AS w
+        ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
+),
+broken AS (
+    SELECT x.executor_id, b.resumed_ns
+    FROM store.thread_break AS b
+    JOIN store.executor_thread AS x ON b.thread_id = x.thread_id
+),
+known AS (
+    SELECT
+        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
+        r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, r.thread_count, b.resumed_ns,
+        CASE WHEN p.polled_ns < b.resumed_ns THEN NULL ELSE p.polled_ns END AS polled_ns,
+        CASE
+            WHEN p.previous_end_ns < b.resumed_ns THEN NULL
+            WHEN p.previous_end_ns <= r.previous_start_ns THEN NULL
+            WHEN r.thread_count = 1 THEN p.previous_end_ns
+        END AS not_polled_ns,
+        CASE WHEN r.thread_count = 1 AND coalesce(p.asleep_ns >= b.resumed_ns, true)
+            THEN p.asleep_ns END AS asleep_ns
+    FROM release AS r
+    LEFT JOIN polled AS p ON r.callback_instance_id = p.callback_instance_id
+    ASOF LEFT JOIN broken AS b ON r.executor_id = b.executor_id AND r.start_ns >= b.resumed_ns
+),
+confined AS (
+    SELECT
+        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
+        origin_ns, subscribed_ns, latest_ns, thread_count, resumed_ns, polled_ns,
+        greatest(not_polled_ns, asleep_ns) AS not_ready_ns
+    FROM known
+),
+bounded AS (
+    SELECT
+        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
+        thread_count, resumed_ns, latest_ns,
+        CASE WHEN since = 'timer' THEN greatest(origin_ns, not_ready_ns) ELSE origin_ns END
+            AS origin_ns,
+        CASE WHEN origin_ns IS NOT NULL OR not_ready_ns IS NOT NULL
+            THEN least(greatest(origin_ns, subscribed_ns, not_ready_ns), start_ns)
+        END AS earliest_ns,
+        least(latest_ns, polled_ns) AS polled_ns
+    FROM confined
+)
+SELECT
+    run_id,
+    executor_id,
+    thread_id,
+    callback_id,
+    callback_instance_id,
+    since,
+    origin_ns,
+    earliest_ns,
+    -- Published after the polling point: the queue was full, and it took the place of an older
+    -- message.
+    greatest(CASE WHEN polled_ns < earliest_ns THEN latest_ns ELSE polled_ns END, earliest_ns)
+        AS latest_ns,
+    start_ns,
+    thread_count,
+    coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
+FROM bounded

@@ -1,0 +1,114 @@
+-- name: derive.callback_release
+-- description: Since when a run of a callback can have been due (its release): a message since the
+--     end of its publication, where the two clocks can be compared, else since its stamp; a request
+--     since it was sent; a timer since the first instant after its previous run that is a whole
+--     number of periods after its creation (unless it ran before that: it was reset). And by when
+--     it was due for certain. Times are those of the executor's clock, those of others brought
+--     to it.
+-- grain: one row per run of a callback that is not nested in another
+-- needs: store.callback_instance, store.executor_thread, store.callback, store.timer,
+--     store.subscription, store.take, store.link_transport, store.publication, store.request,
+--     store.thread, derive.clock_comparable, derive.process_clock, derive.corrected_ns
+WITH every_run AS (
+    SELECT
+        run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns, take_id,
+        request_id, depth,
+        lag(start_ns) OVER (
+            PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
+        ) AS previous_start_ns
+    FROM store.callback_instance
+),
+message AS (
+    SELECT
+        t.take_id,
+        t.taken_ns,
+        s.created_ns,
+        CASE
+            WHEN l.publication_id IS NULL AND t.source_timestamp_ns <= t.taken_ns
+                THEN t.source_timestamp_ns
+            WHEN p.is_comparable THEN t.taken_ns - greatest(
+                derive.corrected_ns(t.taken_ns, tc.offset_ns, tc.drift_ppb, tc.reference_ns)
+                - derive.corrected_ns(b.end_ns, bc.offset_ns, bc.drift_ppb, bc.reference_ns),
+                0
+            )
+        END AS origin_ns,
+        CASE WHEN l.publication_id IS NULL THEN 'stamp' ELSE 'publication' END AS since
+    FROM store.take AS t
+    JOIN derive.process_clock AS tc ON t.process_id = tc.process_id
+    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
+    LEFT JOIN store.link_transport AS l ON t.take_id = l.take_id
+    LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
+    LEFT JOIN derive.process_clock AS bc ON b.process_id = bc.process_id
+    LEFT JOIN derive.clock_comparable AS p
+        ON b.process_id = p.process_id AND t.process_id = p.other_process_id
+),
+-- A timer is due at creation + k periods. Its creation is recorded a little after the first
+-- of these instants begins to count: a hundredth of the period is left for that.
+timer_next AS (
+    SELECT
+        i.callback_instance_id,
+        i.start_ns,
+        i.previous_start_ns,
+        t.period_ns,
+        t.created_ns + t.period_ns * (
+            (i.previous_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns + 1
+        ) AS next_ns
+    FROM every_run AS i
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+    JOIN store.timer AS t ON c.timer_id = t.timer_id
+    WHERE i.previous_start_ns IS NOT NULL AND t.period_ns > 0 AND i.depth = 1
+),
+timer_due AS (
+    SELECT
+        callback_instance_id,
+        previous_start_ns + period_ns AS latest_ns,
+        CASE
+            WHEN next_ns <= start_ns THEN next_ns
+            WHEN next_ns - period_ns > previous_start_ns THEN next_ns - period_ns
+            WHEN next_ns - start_ns <= period_ns // 100 THEN start_ns
+        END AS due_ns
+    FROM timer_next
+),
+request AS (
+    SELECT
+        q.request_id,
+        CASE WHEN p.is_comparable THEN q.taken_ns - greatest(
+            derive.corrected_ns(q.taken_ns, rc.offset_ns, rc.drift_ppb, rc.reference_ns)
+            - derive.corrected_ns(q.sent_ns, sc.offset_ns, sc.drift_ppb, sc.reference_ns),
+            0
+        ) END AS origin_ns,
+        q.taken_ns
+    FROM store.request AS q
+    LEFT JOIN store.thread AS sender ON q.sender_thread_id = sender.thread_id
+    LEFT JOIN store.thread AS receiver ON q.receiver_thread_id = receiver.thread_id
+    LEFT JOIN derive.clock_comparable AS p
+        ON sender.process_id = p.process_id AND receiver.process_id = p.other_process_id
+    LEFT JOIN derive.process_clock AS sc ON sender.process_id = sc.process_id
+    LEFT JOIN derive.process_clock AS rc ON receiver.process_id = rc.process_id
+)
+SELECT
+    i.run_id,
+    x.executor_id,
+    i.thread_id,
+    i.callback_id,
+    i.callback_instance_id,
+    i.start_ns,
+    i.previous_start_ns,
+    CASE
+        WHEN d.due_ns IS NOT NULL THEN 'timer'
+        WHEN q.origin_ns IS NOT NULL THEN 'request'
+        WHEN m.origin_ns IS NOT NULL THEN m.since
+    END AS since,
+    CASE
+        WHEN d.due_ns IS NOT NULL THEN d.due_ns
+        WHEN q.origin_ns IS NOT NULL THEN least(q.origin_ns, i.start_ns)
+        ELSE m.origin_ns
+    END AS origin_ns,
+    m.created_ns AS subscribed_ns,
+    least(d.latest_ns, q.taken_ns, m.taken_ns, i.start_ns) AS latest_ns
+FROM every_run AS i
+JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+LEFT JOIN message AS m ON i.take_id = m.take_id
+LEFT JOIN timer_due AS d ON i.callback_instance_id = d.callback_instance_id
+LEFT JOIN request AS q ON i.request_id = q.request_id
+WHERE i.depth = 1

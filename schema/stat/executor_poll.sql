@@ -1,0 +1,34 @@
+-- name: derive.executor_poll
+-- description: The moments at which executors learned what is ready: the ends of their waits
+--     (polling points). What is not found there waits for the next one. With the sum of all time
+--     spent waiting before. A wait for less than a millisecond may have found something ready at
+--     once; in a longer one nothing was ready when it began. What a callback that spins waits for
+--     is no business of its executor.
+-- grain: one row per wait of an executor that was seen to end
+-- needs: store.executor_state, derive.executor_run
+WITH wait AS (
+    SELECT run_id, executor_id, thread_id, start_ns, end_ns
+    FROM store.executor_state
+    WHERE state = 'wait' AND end_ns IS NOT NULL AND executor_id IS NOT NULL
+),
+own AS (
+    SELECT w.run_id, w.executor_id, w.start_ns, w.end_ns
+    FROM wait AS w
+    ASOF LEFT JOIN derive.executor_run AS r
+        ON w.thread_id = r.thread_id AND w.start_ns >= r.start_ns
+    WHERE r.end_ns IS NULL OR r.end_ns <= w.start_ns
+)
+SELECT
+    run_id,
+    executor_id,
+    start_ns,
+    end_ns,
+    lag(end_ns) OVER in_time AS previous_end_ns,
+    max(CASE WHEN end_ns - start_ns >= 1000000 THEN start_ns END) OVER (
+        in_time ROWS UNBOUNDED PRECEDING
+    ) AS asleep_ns,
+    coalesce(sum(end_ns - start_ns) OVER (
+        in_time ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+    ), 0)::BIGINT AS before_ns
+FROM own
+WINDOW in_time AS (PARTITION BY run_id, executor_id ORDER BY end_ns)

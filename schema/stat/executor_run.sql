@@ -1,0 +1,23 @@
+-- name: derive.executor_run
+-- description: The runs of callbacks that occupied threads of executors, numbered on each thread in
+--     order of time. Runs nested in others are part of these. They never overlap on one thread,
+--     which is what makes sums over any stretch of time two look-ups. Times are those of the
+--     executor's clock.
+-- grain: one row per run of a callback that is not nested in another
+-- needs: store.callback_instance, store.executor_thread
+SELECT
+    i.run_id,
+    x.executor_id,
+    i.thread_id,
+    i.callback_id,
+    i.callback_instance_id,
+    i.start_ns,
+    coalesce(i.end_ns, i.start_ns) AS end_ns,
+    i.take_id,
+    i.request_id,
+    row_number() OVER (
+        PARTITION BY i.run_id, i.thread_id ORDER BY i.start_ns, i.callback_instance_id
+    ) AS position
+FROM store.callback_instance AS i
+JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+WHERE i.depth = 1
