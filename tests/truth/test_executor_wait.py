@@ -1,0 +1,102 @@
+"""When inputs really arrived in simulated executors, against the bounds that the trace gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ingested import ingest_one, require_reader
+
+from msgflow.sim import executor_thread, simulate
+from msgflow.sim.callbacks import TimerObject
+from msgflow.sim.transport import Middleware
+
+SCENARIOS = ["demo", "executors", "multi_threaded", "nested", "overload"]
+_LENGTH = 0.2
+_ARRIVED = """
+SELECT w.earliest_ns, a.arrived_ns, w.latest_ns
+FROM executor_wait AS w
+JOIN callback_instance AS i USING (callback_instance_id)
+JOIN take AS t ON i.take_id = t.take_id
+JOIN subscription AS s ON t.subscription_id = s.subscription_id
+JOIN process AS p ON i.process_id = p.process_id
+JOIN host AS h ON p.host_id = h.host_id
+JOIN arrival AS a
+    ON h.hostname = a.hostname
+    AND p.pid = a.pid
+    AND s.rmw_handle = a.handle
+    AND t.source_timestamp_ns = a.stamp_ns
+"""
+_DUE = """
+SELECT w.earliest_ns, w.origin_ns, d.due_ns, w.latest_ns
+FROM executor_wait AS w
+JOIN callback AS c USING (callback_id)
+JOIN process AS p ON c.process_id = p.process_id
+JOIN host AS h ON p.host_id = h.host_id
+ASOF JOIN due AS d
+    ON h.hostname = d.hostname
+    AND p.pid = d.pid
+    AND c.callback_handle = d.callback
+    AND w.start_ns >= d.called_ns
+WHERE c.kind = 'timer'
+"""
+
+
+class Witness:
+    """Sees messages arrive and timers called."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.arrivals: list[tuple[Any, ...]] = []
+        self.calls: list[tuple[Any, ...]] = []
+        arrive, run_timer = Middleware.arrive, executor_thread._RUN[TimerObject]
+
+        def seen(middleware: Middleware, time: int, delivery: Any) -> None:
+            subscription, message = delivery
+            process = subscription.process
+            moment = time + process.machine.epoch
+            place = process.machine.hostname, process.pid, subscription.rmw_handle
+            self.arrivals.append((*place, message.stamp_ns, moment))
+            arrive(middleware, time, delivery)
+
+        def called(thread: Any, middleware: Any, timer: TimerObject, time: int) -> Any:
+            epoch = thread.machine.epoch
+            place = thread.machine.hostname, thread.process.pid, timer.callback
+            self.calls.append((*place, time + epoch, timer.due + epoch))
+            return run_timer(thread, middleware, timer, time)
+
+        monkeypatch.setattr(Middleware, "arrive", seen)
+        handlers: dict[type, Callable[..., Any]] = {**executor_thread._RUN, TimerObject: called}
+        monkeypatch.setattr(executor_thread, "_RUN", handlers)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_inputs_arrive_within_their_bounds(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    require_reader()
+    witness = Witness(monkeypatch)
+    simulation = simulate(name, tmp_path / name, factor=_LENGTH)
+    ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
+    connection = ingested.connection
+    connection.execute(
+        "CREATE TEMP TABLE arrival "
+        "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
+    )
+    connection.execute(
+        "CREATE TEMP TABLE due "
+        "(hostname VARCHAR, pid INTEGER, callback UBIGINT, called_ns BIGINT, due_ns BIGINT)"
+    )
+    connection.executemany("INSERT INTO arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
+    connection.executemany("INSERT INTO due VALUES (?, ?, ?, ?, ?)", witness.calls)
+    arrived, due = ingested.rows(_ARRIVED), ingested.rows(_DUE)
+    connection.close()
+    assert len(arrived) > 50
+    for earliest, moment, latest in arrived:
+        assert earliest is None or earliest <= moment
+        assert moment <= latest
+    assert len(due) > 50
+    for earliest, origin, moment, latest in due:
+        assert origin is None or (earliest <= origin == moment <= latest)
+    assert sum(origin is None for _, origin, _, _ in due) <= 10
