@@ -303,7 +303,8 @@ CREATE TABLE store.publication (
     start_event_id      BIGINT,                  -- First layer seen [event order]
     end_event_id        BIGINT,                  -- Last layer seen [event order]
     callback_event_id   BIGINT,                  -- Last begin or end of a callback before it; NULL: none [event order]
-    is_loss_affected    BOOLEAN                  -- A gap right before or after it on its thread may hide a layer; NULL: not known
+    is_loss_affected    BOOLEAN,                 -- A gap right before or after it on its thread may hide a layer; NULL: not known
+    next_event_ns       BIGINT                   -- Next event of the thread, where it has no stamp; NULL: none, or a gap may hide it [epoch ns]
 );
 
 -- One row per message handed over to a subscription.
@@ -330,6 +331,21 @@ CREATE TABLE store.failed_take (
     process_id      BIGINT NOT NULL,             -- Process it lives in -> process.process_id
     thread_id       BIGINT NOT NULL,             -- Thread it happened on -> thread.thread_id
     failed_ns       BIGINT NOT NULL              -- Moment of the attempt [epoch ns]
+);
+
+-- One row per enqueue, dequeue or clearing of an intra-process ring buffer.
+CREATE TABLE store.ring_buffer_event (
+    run_id         BIGINT NOT NULL,              -- Run that the row belongs to -> run.run_id
+    trace_id       BIGINT NOT NULL,              -- Trace it was recorded in -> trace.trace_id
+    process_id     BIGINT NOT NULL,              -- Process it lives in -> process.process_id
+    kind           VARCHAR NOT NULL,             -- 'enqueue', 'dequeue' or 'clear'
+    buffer_handle  UBIGINT,                      -- Address of the ring buffer; an address, valid in its process until reused
+    slot           BIGINT,                       -- Index in the buffer; NULL: all
+    at_ns          BIGINT NOT NULL,              -- Moment of the event [epoch ns]
+    publication_id BIGINT,                       -- Message put in; NULL: the replay of one kept for late subscriptions -> publication.publication_id
+    take_id        BIGINT,                       -- Message taken out -> take.take_id
+    is_overwriting BOOLEAN NOT NULL,             -- An older message was lost from the slot
+    event_id       BIGINT                        -- The event [event order]
 );
 
 -- One row per run of a callback.
@@ -401,6 +417,27 @@ CREATE TABLE store.thread_break (
     resumed_event_id BIGINT                      -- First event of the thread behind the gap [event order]
 );
 
+-- One row per stretch of time in which stamps run along a clock of the traces.
+CREATE TABLE store.stamp_clock (
+    run_id        BIGINT NOT NULL,               -- Run that the row belongs to -> run.run_id
+    clock_id      BIGINT NOT NULL,               -- Clock of the traces -> clock.clock_id
+    at_ns         BIGINT NOT NULL,               -- Middle of the stretch, time of the traces [epoch ns]
+    start_ns      BIGINT NOT NULL,               -- Begin of the stretch [epoch ns]
+    end_ns        BIGINT NOT NULL,               -- End of the stretch, exclusive [epoch ns]
+    difference_ns BIGINT NOT NULL,               -- Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]
+    drift_ppb     BIGINT,                        -- Change of the difference in the stretch [ppb]
+    message_count BIGINT                         -- Messages that agree with it
+);
+
+-- One row per message whose publication was found, or could not be told, by time.
+CREATE TABLE store.nearest_message (
+    run_id              BIGINT NOT NULL,         -- Run that the row belongs to -> run.run_id
+    topic_name          VARCHAR NOT NULL,        -- Topic of the message
+    source_timestamp_ns BIGINT NOT NULL,         -- Stamp of the message, clock of ROS [epoch ns]
+    publication_id      BIGINT,                  -- Where it came from; NULL: several could be it -> publication.publication_id
+    candidate_count     BIGINT                   -- Publications that it could have been
+);
+
 -- One row per take whose publication is known.
 CREATE TABLE store.link_transport (
     run_id           BIGINT NOT NULL,            -- Run that the row belongs to -> run.run_id
@@ -414,12 +451,12 @@ CREATE TABLE store.link_transport (
     is_loss_affected BOOLEAN NOT NULL            -- A gap of the trace may hide a better partner
 );
 
--- One row per callback run that led to a publication.
+-- One row per callback run, or take outside of any, that led to a publication.
 CREATE TABLE store.link_causal (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id
-    callback_instance_id BIGINT NOT NULL,        -- Cause -> callback_instance.callback_instance_id
+    callback_instance_id BIGINT,                 -- Cause; NULL: the take itself -> callback_instance.callback_instance_id
     publication_id       BIGINT NOT NULL,        -- Effect -> publication.publication_id
-    take_id              BIGINT,                 -- Message that the cause was called with -> take.take_id
+    take_id              BIGINT,                 -- Message that led to it -> take.take_id
     subscription_id      BIGINT,                 -- Subscription of that message -> subscription.subscription_id
     publisher_id         BIGINT,                 -- Publisher of the effect -> publisher.publisher_id
     kind                 VARCHAR NOT NULL,       -- 'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'

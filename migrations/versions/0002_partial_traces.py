@@ -1,13 +1,15 @@
 """What partial traces need.
 
-Publications know the callback event before them; marks of what gaps may hide, failed takes, and
-what is missing; where the records of threads break; callback groups.
+Publications know the callback event before them, and when their thread went on; marks of what gaps
+may hide, failed takes, and what is missing; messages told by time, ring buffers, takes by hand;
+where the records of threads break; callback groups.
 
 Frozen: it does not follow later changes of msgflow/db/tables.py.
 """
 
 import sqlalchemy as sa
 from alembic import op
+from duckdb_engine.datatypes import UBigInteger
 
 revision = "0002"
 down_revision = "0001"
@@ -87,6 +89,7 @@ def upgrade() -> None:
     )
     _create_thread_break()
     _create_callback_groups()
+    _create_links()
 
 
 def _create_thread_break() -> None:
@@ -137,8 +140,114 @@ def _create_callback_groups() -> None:
     )
 
 
+def _create_links() -> None:
+    op.execute("ALTER TABLE store.publication ADD COLUMN next_event_ns BIGINT")
+    _comment(
+        "COLUMN store.publication.next_event_ns",
+        "Next event of the thread, where it has no stamp; NULL: none, or a gap may hide it "
+        "[epoch ns]",
+    )
+    op.execute("ALTER TABLE store.link_causal ALTER COLUMN callback_instance_id DROP NOT NULL")
+    _comment(
+        "TABLE store.link_causal",
+        "One row per callback run, or take outside of any, that led to a publication",
+    )
+    _comment("COLUMN store.link_causal.callback_instance_id", "Cause; NULL: the take itself")
+    _comment("COLUMN store.link_causal.take_id", "Message that led to it")
+    op.create_table(
+        "ring_buffer_event",
+        sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
+        sa.Column("trace_id", sa.BigInteger(), nullable=False, comment="Trace it was recorded in"),
+        sa.Column("process_id", sa.BigInteger(), nullable=False, comment="Process it lives in"),
+        sa.Column("kind", sa.String(), nullable=False, comment="'enqueue', 'dequeue' or 'clear'"),
+        sa.Column(
+            "buffer_handle",
+            UBigInteger(),
+            comment="Address of the ring buffer; an address, valid in its process until reused",
+        ),
+        sa.Column("slot", sa.BigInteger(), comment="Index in the buffer; NULL: all"),
+        sa.Column(
+            "at_ns", sa.BigInteger(), nullable=False, comment="Moment of the event [epoch ns]"
+        ),
+        sa.Column(
+            "publication_id",
+            sa.BigInteger(),
+            comment="Message put in; NULL: the replay of one kept for late subscriptions",
+        ),
+        sa.Column("take_id", sa.BigInteger(), comment="Message taken out"),
+        sa.Column(
+            "is_overwriting",
+            sa.Boolean(),
+            nullable=False,
+            comment="An older message was lost from the slot",
+        ),
+        sa.Column("event_id", sa.BigInteger(), comment="The event [event order]"),
+        schema="store",
+        comment="One row per enqueue, dequeue or clearing of an intra-process ring buffer",
+    )
+    op.create_table(
+        "stamp_clock",
+        sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
+        sa.Column("clock_id", sa.BigInteger(), nullable=False, comment="Clock of the traces"),
+        sa.Column(
+            "at_ns",
+            sa.BigInteger(),
+            nullable=False,
+            comment="Middle of the stretch, time of the traces [epoch ns]",
+        ),
+        sa.Column(
+            "start_ns", sa.BigInteger(), nullable=False, comment="Begin of the stretch [epoch ns]"
+        ),
+        sa.Column(
+            "end_ns",
+            sa.BigInteger(),
+            nullable=False,
+            comment="End of the stretch, exclusive [epoch ns]",
+        ),
+        sa.Column(
+            "difference_ns",
+            sa.BigInteger(),
+            nullable=False,
+            comment="Clock of ROS less clock of the traces, with the shortest delay of a stamp "
+            "[ns]",
+        ),
+        sa.Column(
+            "drift_ppb", sa.BigInteger(), comment="Change of the difference in the stretch [ppb]"
+        ),
+        sa.Column("message_count", sa.BigInteger(), comment="Messages that agree with it"),
+        schema="store",
+        comment="One row per stretch of time in which stamps run along a clock of the traces",
+    )
+    op.create_table(
+        "nearest_message",
+        sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
+        sa.Column("topic_name", sa.String(), nullable=False, comment="Topic of the message"),
+        sa.Column(
+            "source_timestamp_ns",
+            sa.BigInteger(),
+            nullable=False,
+            comment="Stamp of the message, clock of ROS [epoch ns]",
+        ),
+        sa.Column(
+            "publication_id",
+            sa.BigInteger(),
+            comment="Where it came from; NULL: several could be it",
+        ),
+        sa.Column(
+            "candidate_count", sa.BigInteger(), comment="Publications that it could have been"
+        ),
+        schema="store",
+        comment="One row per message whose publication was found, or could not be told, by time",
+    )
+
+
 def downgrade() -> None:
     """Drop the columns and tables."""
+    for table in ("nearest_message", "stamp_clock", "ring_buffer_event"):
+        op.drop_table(table, schema="store")
+    op.execute("DELETE FROM store.link_causal WHERE callback_instance_id IS NULL")
+    op.execute("ALTER TABLE store.link_causal ALTER COLUMN callback_instance_id SET NOT NULL")
+    op.execute("ALTER TABLE store.publication DROP COLUMN next_event_ns")
     for table in ("callback_group_member", "callback_group", "thread_break"):
         op.drop_table(table, schema="store")
     for table in ("orphan_take", "undelivered", "failed_take"):
@@ -155,3 +264,7 @@ def _required(name: str, comment: str) -> sa.Column[int]:
 def _add_column(table: str, name: str, kind: sa.types.TypeEngine[object], comment: str) -> None:
     op.add_column(table, sa.Column(name, kind), schema="store")
     op.execute(f"COMMENT ON COLUMN store.{table}.{name} IS '{comment}'")
+
+
+def _comment(of: str, text: str) -> None:
+    op.execute(f"COMMENT ON {of} IS '{text.replace(chr(39), chr(39) * 2)}'")

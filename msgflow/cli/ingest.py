@@ -55,6 +55,12 @@ def command(
         bool,
         typer.Option("--strict", help="Refuse damaged traces, keep nothing"),
     ] = False,
+    ignore: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--ignore", metavar="PATTERN", help="Leave out events of these names, such as 'dds:*'"
+        ),
+    ] = None,
     memory_limit: Annotated[
         str | None,
         typer.Option(
@@ -86,6 +92,7 @@ def command(
                 keep_staging=keep_staging,
                 reader=reader.value,
                 strict=strict,
+                ignore=ignore or [],
                 progress=progress,
             )
         if not quiet:

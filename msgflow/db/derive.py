@@ -9,8 +9,9 @@ from msgflow.db import objects
 if TYPE_CHECKING:
     import duckdb
 
-# Tables of `store` that hold the rows of the view of that name in `derive`.
-DERIVED = ("link_transport", "link_causal")
+# Tables of `store` that hold the rows of the view of that name in `derive`, each after those that
+# it is derived from.
+DERIVED = ("stamp_clock", "nearest_message", "link_transport", "link_causal")
 
 # Likewise, of what is missing: they need the links, and the topics learned from them.
 DERIVED_FROM_LINKS = ("orphan_take", "undelivered")
@@ -44,9 +45,9 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         run_id: the run; nothing happens to others.
     """
     _forget_topics(con, run_id)
+    _learn_topics(con, run_id)
     for name in DERIVED:
         _store(con, name, run_id)
-    _learn_topics(con, run_id)
     for name in DERIVED_FROM_LINKS:
         _store(con, name, run_id)
     con.execute(

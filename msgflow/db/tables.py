@@ -486,6 +486,10 @@ publication = _table(
     _order("end_event_id", "Last layer seen"),
     _order("callback_event_id", "Last begin or end of a callback before it; NULL: none"),
     _loss_affected("A gap right before or after it on its thread may hide a layer"),
+    _time(
+        "next_event_ns",
+        "Next event of the thread, where it has no stamp; NULL: none, or a gap may hide it",
+    ),
 )
 
 take = _table(
@@ -514,6 +518,26 @@ failed_take = _table(
     _process(),
     _thread(),
     _time("failed_ns", "Moment of the attempt", required=True),
+)
+
+ring_buffer_event = _table(
+    "ring_buffer_event",
+    "One row per enqueue, dequeue or clearing of an intra-process ring buffer",
+    _run(),
+    _trace(),
+    _process(),
+    _text("kind", "'enqueue', 'dequeue' or 'clear'", required=True),
+    _handle("buffer_handle", "Address of the ring buffer"),
+    _count("slot", "Index in the buffer; NULL: all"),
+    _time("at_ns", "Moment of the event", required=True),
+    _reference(
+        "publication_id",
+        "Message put in; NULL: the replay of one kept for late subscriptions",
+        to="publication.publication_id",
+    ),
+    _reference("take_id", "Message taken out", to="take.take_id"),
+    _flag("is_overwriting", "An older message was lost from the slot"),
+    _order("event_id", "The event"),
 )
 
 callback_instance = _table(
@@ -604,6 +628,38 @@ thread_break = _table(
 
 # --- links ---------------------------------------------------------------------------------------
 
+stamp_clock = _table(
+    "stamp_clock",
+    "One row per stretch of time in which stamps run along a clock of the traces",
+    _run(),
+    _reference("clock_id", "Clock of the traces", to="clock.clock_id", required=True),
+    _time("at_ns", "Middle of the stretch, time of the traces", required=True),
+    _time("start_ns", "Begin of the stretch", required=True),
+    _time("end_ns", "End of the stretch, exclusive", required=True),
+    _column(
+        "difference_ns",
+        BigInteger,
+        "Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]",
+        required=True,
+    ),
+    _count("drift_ppb", "Change of the difference in the stretch [ppb]"),
+    _count("message_count", "Messages that agree with it"),
+)
+
+nearest_message = _table(
+    "nearest_message",
+    "One row per message whose publication was found, or could not be told, by time",
+    _run(),
+    _text("topic_name", "Topic of the message", required=True),
+    _time("source_timestamp_ns", "Stamp of the message, clock of ROS", required=True),
+    _reference(
+        "publication_id",
+        "Where it came from; NULL: several could be it",
+        to="publication.publication_id",
+    ),
+    _count("candidate_count", "Publications that it could have been"),
+)
+
 link_transport = _table(
     "link_transport",
     "One row per take whose publication is known",
@@ -629,13 +685,15 @@ link_transport = _table(
 
 link_causal = _table(
     "link_causal",
-    "One row per callback run that led to a publication",
+    "One row per callback run, or take outside of any, that led to a publication",
     _run(),
     _reference(
-        "callback_instance_id", "Cause", to="callback_instance.callback_instance_id", required=True
+        "callback_instance_id",
+        "Cause; NULL: the take itself",
+        to="callback_instance.callback_instance_id",
     ),
     _reference("publication_id", "Effect", to="publication.publication_id", required=True),
-    _reference("take_id", "Message that the cause was called with", to="take.take_id"),
+    _reference("take_id", "Message that led to it", to="take.take_id"),
     _reference(
         "subscription_id", "Subscription of that message", to="subscription.subscription_id"
     ),

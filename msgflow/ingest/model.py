@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.tables import metadata
 from msgflow.ingest.catalogue import load
+from msgflow.ingest.reported import restore
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -39,6 +40,7 @@ def build(
             they are built.
         built: called with the name of each object, after it was built.
     """
+    restore(con)
     headers = objects.load("model")
     dropped: set[str] = set()
     for position, header in enumerate(headers):

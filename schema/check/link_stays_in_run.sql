@@ -30,5 +30,10 @@ SELECT l.run_id, 'causal', l.publication_id
 FROM store.link_causal AS l
 LEFT JOIN publication AS b ON l.run_id = b.run_id
 LEFT JOIN callback_instance AS i ON l.run_id = i.run_id
+LEFT JOIN take AS t ON l.run_id = t.run_id
 WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
-    OR coalesce(l.callback_instance_id NOT BETWEEN i.first_id AND i.last_id, true)
+    OR coalesce(
+        l.callback_instance_id NOT BETWEEN i.first_id AND i.last_id,
+        l.callback_instance_id IS NOT NULL
+    )
+    OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, l.take_id IS NOT NULL)

@@ -3,8 +3,8 @@
 -- grain: one row per word that is not
 -- severity: error
 -- needs: store.loss_interval, store.clock, store.callback, store.annotation, store.take,
---     store.executor_state, store.link_transport, store.link_causal, store.undelivered,
---     store.orphan_take, store.diagnostic
+--     store.executor_state, store.ring_buffer_event, store.link_transport, store.link_causal,
+--     store.undelivered, store.orphan_take, store.diagnostic
 SELECT DISTINCT run_id, 'loss_interval.kind' AS place, kind AS word
 FROM store.loss_interval
 WHERE kind NOT IN ('loss', 'packets', 'pause')
@@ -32,6 +32,10 @@ UNION ALL
 SELECT DISTINCT run_id, 'executor_state.state', state
 FROM store.executor_state
 WHERE state NOT IN ('wait', 'process', 'execute')
+UNION ALL
+SELECT DISTINCT run_id, 'ring_buffer_event.kind', kind
+FROM store.ring_buffer_event
+WHERE kind NOT IN ('enqueue', 'dequeue', 'clear')
 UNION ALL
 SELECT DISTINCT run_id, 'link_transport.method', method
 FROM store.link_transport

@@ -1,6 +1,7 @@
 -- name: derive.flow_link
 -- description: All links in one shape: publication to take, take to the callback run that it was
---     for, callback run to publication. Self loops are left out: flows do not pass through them.
+--     for, callback run (or a take outside of any) to publication. Self loops are left out: flows
+--     do not pass through them.
 -- grain: one row per link
 -- needs: store.link_transport, store.link_causal, store.callback_instance
 SELECT
@@ -21,7 +22,8 @@ WHERE take_id IS NOT NULL
 UNION ALL
 SELECT
     run_id,
-    'callback_instance', callback_instance_id,
+    CASE WHEN callback_instance_id IS NULL THEN 'take' ELSE 'callback_instance' END,
+    coalesce(callback_instance_id, take_id),
     'publication', publication_id,
     kind
 FROM store.link_causal

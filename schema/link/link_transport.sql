@@ -6,12 +6,19 @@
 --     take (on hosts with different clocks: within the publication), or a gap of the receiver's
 --     trace likewise, the better candidate may be in it.
 -- grain: one row per take whose publication is known
--- needs: derive.link_transport_exact, derive.trace_gap, store.publication, store.publisher,
+-- needs: derive.link_transport_exact, derive.link_transport_nearest,
+--     derive.link_transport_ring_buffer, derive.trace_gap, store.publication, store.publisher,
 --     store.take, store.subscription, store.node, store.process, store.host
 WITH link AS (
     SELECT
         run_id, publication_id, take_id, method, candidate_count, false AS is_loss_affected
     FROM derive.link_transport_exact
+    UNION ALL
+    SELECT run_id, publication_id, take_id, method, candidate_count, is_loss_affected
+    FROM derive.link_transport_nearest
+    UNION ALL
+    SELECT run_id, publication_id, take_id, method, candidate_count, is_loss_affected
+    FROM derive.link_transport_ring_buffer
 ),
 guess AS (
     SELECT

@@ -1,26 +1,39 @@
 -- name: derive.link_transport_exact
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
---     known. A topic unknown on a side counts only where the stamp alone has a single candidate in
---     the run, and does not put one publication on two topics. Of several publications with equal
---     topic and stamp the k-th belongs to the k-th such take of a subscription, so that none is
---     received twice. Equal values need no clocks: a take may seem to precede.
+--     known, whether from their own initialisation or from other messages of the two (then
+--     `exact_stamp`). A topic unknown on a side counts only where the stamp alone has a single
+--     candidate in the run, and does not put one publication on two topics. Of several publications
+--     with equal topic and stamp the k-th belongs to the k-th such take of a subscription, so that
+--     none is received twice. Equal values need no clocks: a take may seem to precede.
 -- grain: one row per take whose publication is known by its stamp
--- needs: store.publication, store.publisher, store.take, store.subscription
-WITH published AS (
+-- needs: derive.topic_group, store.publication, store.publisher, store.take, store.subscription
+WITH unnamed AS (
+    SELECT run_id, kind, id, 'group ' || group_id AS topic_name
+    FROM derive.topic_group
+    WHERE topic_name IS NULL
+),
+published AS (
     SELECT
-        b.run_id, b.publication_id, b.source_timestamp_ns, b.start_event_id, p.topic_name
+        b.run_id, b.publication_id, b.source_timestamp_ns, b.start_event_id,
+        coalesce(p.topic_name, g.topic_name) AS topic_name,
+        p.topic_name IS NOT NULL AND NOT coalesce(p.is_topic_learned, false) AS is_own_topic
     FROM store.publication AS b
     LEFT JOIN store.publisher AS p
         ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
+    LEFT JOIN unnamed AS g
+        ON b.publisher_id = g.id AND b.run_id = g.run_id AND g.kind = 'publisher'
     WHERE b.source_timestamp_ns <> 0
 ),
 received AS (
     SELECT
         t.run_id, t.take_id, t.source_timestamp_ns, t.subscription_id, t.start_event_id,
-        s.topic_name
+        coalesce(s.topic_name, g.topic_name) AS topic_name,
+        s.topic_name IS NOT NULL AND NOT coalesce(s.is_topic_learned, false) AS is_own_topic
     FROM store.take AS t
     LEFT JOIN store.subscription AS s
         ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
+    LEFT JOIN unnamed AS g
+        ON t.subscription_id = g.id AND t.run_id = g.run_id AND g.kind = 'subscription'
     WHERE t.source_timestamp_ns <> 0
 ),
 repeated_publication AS (
@@ -46,6 +59,7 @@ candidate AS (
         p.start_event_id AS publication_event_id,
         r.topic_name AS take_topic,
         coalesce(r.topic_name = p.topic_name, false) AS is_topic_known,
+        CASE WHEN r.is_own_topic AND p.is_own_topic THEN 'exact' ELSE 'exact_stamp' END AS method,
         q.run_id IS NOT NULL OR u.run_id IS NOT NULL AS is_repeated
     FROM received AS r
     JOIN published AS p
@@ -63,7 +77,7 @@ candidate AS (
 counted AS (
     SELECT
         run_id, take_id, subscription_id, source_timestamp_ns, take_event_id, publication_id,
-        publication_event_id, is_topic_known,
+        publication_event_id, is_topic_known, method,
         count(*) OVER same_take AS candidate_count,
         count(CASE WHEN is_topic_known THEN 1 END) OVER same_take AS known_count,
         min(take_topic) OVER same_publication IS DISTINCT FROM max(take_topic)
@@ -81,7 +95,7 @@ unknown_topic AS (
 ),
 ordered AS (
     SELECT
-        run_id, publication_id, take_id, known_count,
+        run_id, publication_id, take_id, method, known_count,
         row_number() OVER (
             PARTITION BY run_id, take_id ORDER BY publication_event_id
         ) AS publication_position,
@@ -91,11 +105,11 @@ ordered AS (
     FROM counted
     WHERE is_topic_known
 )
-SELECT run_id, publication_id, take_id, 'exact' AS method, 1::BIGINT AS candidate_count
+SELECT run_id, publication_id, take_id, method, 1::BIGINT AS candidate_count
 FROM candidate
 WHERE is_topic_known AND NOT is_repeated
 UNION ALL
-SELECT run_id, publication_id, take_id, 'exact', known_count
+SELECT run_id, publication_id, take_id, method, known_count
 FROM ordered
 WHERE publication_position = take_position
 UNION ALL

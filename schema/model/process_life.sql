@@ -99,7 +99,7 @@ split AS (
         )
 ),
 start AS (
-    SELECT host_id, pid_ns, vpid, 0::BIGINT AS from_event_id
+    SELECT host_id, pid_ns, vpid, -9223372036854775807 AS from_event_id
     FROM staging.thread_presence
     GROUP BY ALL
     UNION ALL

@@ -2,7 +2,8 @@
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
 -- needs: staging.publication_call, staging.publication_origin, staging.publisher,
---     staging.callback_left_over, staging.callback_pair, staging.beside_gap
+--     staging.callback_left_over, staging.callback_pair, staging.beside_gap,
+--     staging.publication_next
 WITH publisher_of AS (
     SELECT o.start_event_id, p.publisher_id
     FROM staging.publication_origin AS o
@@ -57,7 +58,8 @@ SELECT
     c.end_event_id,
     CASE WHEN q.start_event_id IS NULL THEN c.callback_event_id ELSE q.callback_event_id END
         AS callback_event_id,
-    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL AS is_loss_affected
+    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL AS is_loss_affected,
+    x.next_event_ns
 FROM staging.publication_call AS c
 JOIN numbered AS n ON c.start_event_id = n.start_event_id
 LEFT JOIN publisher_of AS p ON c.start_event_id = p.start_event_id
@@ -66,3 +68,4 @@ LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
     ON c.start_event_id = behind.event_id
 LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE NOT is_behind) AS before
     ON c.end_event_id = before.event_id
+LEFT JOIN staging.publication_next AS x ON c.start_event_id = x.start_event_id

@@ -40,14 +40,16 @@ JOIN main.take AS t ON i.take_id = t.take_id
 UNION ALL
 SELECT
     l.run_id,
-    'callback_instance',
-    l.callback_instance_id,
+    CASE WHEN l.callback_instance_id IS NULL THEN 'take' ELSE 'callback_instance' END,
+    coalesce(l.callback_instance_id, l.take_id),
     'publication',
     l.publication_id,
     l.kind,
-    i.start_ns,
+    coalesce(i.start_ns, t.taken_ns),
     b.start_ns
 FROM main.link_causal AS l
-JOIN main.callback_instance AS i
+LEFT JOIN main.callback_instance AS i
     ON l.callback_instance_id = i.callback_instance_id
+LEFT JOIN main.take AS t
+    ON l.callback_instance_id IS NULL AND l.take_id = t.take_id
 JOIN main.publication AS b ON l.publication_id = b.publication_id

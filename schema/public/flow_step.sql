@@ -58,7 +58,10 @@ WITH RECURSIVE origin AS MATERIALIZED (
 ),
 -- Effects on ROS's own topics: no branches of the picture.
 aside AS MATERIALIZED (
-    SELECT l.callback_instance_id, derive.vertex_key('publication', l.publication_id) AS key
+    SELECT
+        CASE WHEN l.callback_instance_id IS NULL THEN derive.vertex_key('take', l.take_id)
+            ELSE derive.vertex_key('callback_instance', l.callback_instance_id) END AS from_key,
+        derive.vertex_key('publication', l.publication_id) AS key
     FROM store.link_causal AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE p.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
@@ -120,7 +123,7 @@ cut AS (
 left_out AS (
     SELECT s.key, count(*) AS internal_count
     FROM aside AS a
-    JOIN shown AS s ON s.kind = 'callback_instance' AND a.callback_instance_id = s.id
+    JOIN shown AS s ON a.from_key = s.key
     ANTI JOIN vertex AS v ON a.key = v.key
     WHERE NOT s.is_backward
     GROUP BY s.key
@@ -151,7 +154,7 @@ described AS MATERIALIZED (
         NULL,
         CASE
             WHEN x.id IS NOT NULL THEN 'publication'
-            WHEN i.take_id IS NULL THEN 'callback'
+            WHEN i.take_id IS NULL AND y.take_id IS NULL THEN 'callback'
         END,
         x.reason
     FROM vertex AS v
@@ -161,6 +164,10 @@ described AS MATERIALIZED (
     LEFT JOIN store.node AS n ON s.node_id = n.node_id
     LEFT JOIN derive.flow_end AS x ON x.kind = 'take' AND t.take_id = x.id
     LEFT JOIN store.callback_instance AS i ON t.take_id = i.take_id
+    LEFT JOIN (
+        SELECT DISTINCT take_id FROM store.link_causal WHERE kind = 'take_adjacent'
+    ) AS y
+        ON t.take_id = y.take_id
     WHERE v.kind = 'take'
     UNION ALL
     SELECT
@@ -194,7 +201,9 @@ SELECT
     a.from_id,
     a.link_kind,
     CASE
-        WHEN a.link_kind IN ('transport', 'callback', 'periodic_async', 'partial_sync')
+        WHEN a.link_kind IN (
+            'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent'
+        )
             THEN d.start_ns - f.end_ns
     END AS wait_ns,
     coalesce(lt.candidate_count, lc.candidate_count) AS candidate_count,
@@ -219,8 +228,9 @@ LEFT JOIN described AS f ON a.from_key = f.key
 LEFT JOIN store.link_transport AS lt
     ON a.link_kind = 'transport' AND a.to_id = lt.take_id AND a.from_id = lt.publication_id
 LEFT JOIN store.link_causal AS lc
-    ON a.from_kind = 'callback_instance'
-    AND a.from_id = lc.callback_instance_id
+    ON a.from_kind
+        = CASE WHEN lc.callback_instance_id IS NULL THEN 'take' ELSE 'callback_instance' END
+    AND a.from_id = coalesce(lc.callback_instance_id, lc.take_id)
     AND a.to_id = lc.publication_id
     AND a.link_kind = lc.kind
 LEFT JOIN store.thread AS h ON d.thread_id = h.thread_id

@@ -6,7 +6,7 @@
 -- grain: one row per take whose publication is not known
 -- needs: store.take, store.link_transport, store.subscription, store.publisher,
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
---     derive.take_candidate
+--     derive.take_candidate, store.nearest_message
 CREATE OR REPLACE MACRO derive.orphan_take(of_run) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT t.take_id, t.subscription_id, t.source_timestamp_ns AS stamp_ns, s.topic_name
@@ -87,6 +87,10 @@ SELECT
         WHEN j.has_none_left THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
             SELECT take_id FROM derive.take_candidate WHERE run_id = of_run
+        ) OR (o.topic_name, o.stamp_ns) IN (
+            SELECT (topic_name, source_timestamp_ns)
+            FROM store.nearest_message
+            WHERE run_id = of_run AND publication_id IS NULL
         ) THEN 'ambiguous'
         WHEN j.take_id IS NULL OR NOT (j.has_ended OR j.has_stampless)
             THEN 'publisher_not_traced'

@@ -180,7 +180,7 @@ def test_a_node_that_hears_itself_on_tf_is_a_self_loop(system: RosSystem, analys
             system.subscription(thread, handle, topic, node=node)
             loop = topic != "/a" and thread is TALKER and node != 0x3
             expected[topic, thread.pid, node] = loop
-        system.publish(TALKER, stamp, stamp)
+        system.publish(Thread(100, 101), stamp, stamp)
         for thread, node in ((TALKER, 0x1), (TALKER, 0x2), (TALKER, 0x3), (other, 0x1)):
             system.take(thread, 0x20 + 0x10 * stamp + node, stamp)
     model = analyse(system)

@@ -69,7 +69,7 @@ def checker(shared_traces: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_jazzy", "pingpong"])
+@pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_humble", "sync_1_1_jazzy", "pingpong"])
 def test_scores(
     recordings: Callable[[str], Ingested],
     shared_traces: Path,

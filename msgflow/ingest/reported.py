@@ -1,0 +1,90 @@
+"""Initialisation that CARET reports again when a recording starts late.
+
+Such an event says what was initialised before; its own time is only that of the report. It takes
+the place of the event that was not recorded: before all others, in the order in which the objects
+were really initialised.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.ingest.catalogue import load
+
+if TYPE_CHECKING:
+    import duckdb
+
+    from msgflow.ingest.catalogue import Tracepoint
+
+_AGAIN = "ros2_caret:"
+_FIRST = "ros2:"
+
+# A context that is reported again starts no new life of its process.
+_LEFT_OUT = {"ros2_caret:rcl_init"}
+
+# Event ids of what came before the recording: below all that readers give.
+_BEFORE = -(1 << 61)
+
+_LEADING = ("ts_ns", "trace_index", "cpu_id", "thread_index")
+
+
+def restore(con: duckdb.DuckDBPyConnection) -> None:
+    """Add what was reported again to `raw`, except what was recorded when it happened."""
+    reported = _reported()
+    if not any(con.execute(f"SELECT 1 FROM raw.{r.table} LIMIT 1").fetchall() for r, _ in reported):
+        return
+    con.execute(
+        "CREATE TEMP TABLE reported AS SELECT event_id, "
+        f"{_BEFORE} + row_number() OVER (ORDER BY init_timestamp NULLS FIRST, event_id) AS place "
+        "FROM ("
+        + " UNION ALL ".join(
+            f"SELECT event_id, init_timestamp FROM raw.{again.table}" for again, _ in reported
+        )
+        + ")"
+    )
+    for again, first in reported:
+        con.execute(_insert(again, first))
+    con.execute("DROP TABLE reported")
+
+
+def _reported() -> list[tuple[Tracepoint, Tracepoint]]:
+    tracepoints = load().tracepoints
+    return [
+        (tracepoint, tracepoints[_FIRST + tracepoint.event])
+        for name, tracepoint in tracepoints.items()
+        if name.startswith(_AGAIN)
+        and name not in _LEFT_OUT
+        and _FIRST + tracepoint.event in tracepoints
+        and any(field.name == "init_timestamp" for field in tracepoint.fields)
+    ]
+
+
+def _insert(again: Tracepoint, first: Tracepoint) -> str:
+    known = {field.name for field in first.fields}
+    payload = [field.name for field in again.fields if field.name in known]
+    columns = ", ".join(f'"{name}"' for name in ("event_id", *_LEADING, *payload))
+    values = ", ".join(f'a."{name}"' for name in (*_LEADING, *payload))
+    same = " AND ".join(f'a."{name}" IS NOT DISTINCT FROM o."{name}"' for name in payload)
+    told = ", ".join(f'e."{field.name}"' for field in again.fields)
+    process = "p.trace_index AS host, p.pid_ns, p.vpid"
+    return f"""
+INSERT INTO raw.{first.table} ({columns})
+SELECT r.place, {values}
+FROM (
+    SELECT e.*, {process}
+    FROM raw.{again.table} AS e
+    JOIN raw.thread AS p ON e.thread_index = p.thread_index
+    QUALIFY row_number() OVER (
+        PARTITION BY p.trace_index, p.pid_ns, p.vpid, {told}
+        ORDER BY e.event_id
+    ) = 1
+) AS a
+JOIN reported AS r ON a.event_id = r.event_id
+ANTI JOIN (
+    SELECT e.*, {process}
+    FROM raw.{first.table} AS e
+    JOIN raw.thread AS p ON e.thread_index = p.thread_index
+) AS o
+    ON a.host = o.host AND a.pid_ns IS NOT DISTINCT FROM o.pid_ns AND a.vpid = o.vpid
+    AND o.ts_ns <= a.ts_ns AND {same}
+"""

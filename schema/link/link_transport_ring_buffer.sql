@@ -1,0 +1,49 @@
+-- name: derive.link_transport_ring_buffer
+-- description: Messages between nodes of one process, by the slot of the ring buffer: what is taken
+--     out was put in last, unless the buffer was cleared or made anew meanwhile, or a gap of the
+--     trace may hide that it was used again.
+-- grain: one row per dequeue whose publication is known
+-- needs: store.ring_buffer_event, store.loss_interval
+WITH slot_use AS (
+    SELECT
+        run_id, trace_id, process_id, buffer_handle, kind, at_ns, take_id, event_id,
+        lag(kind) OVER in_slot AS previous_kind,
+        lag(event_id) OVER in_slot AS previous_event_id,
+        lag(at_ns) OVER in_slot AS previous_ns,
+        lag(publication_id) OVER in_slot AS publication_id
+    FROM store.ring_buffer_event
+    WHERE kind <> 'clear'
+    WINDOW in_slot AS (
+        PARTITION BY run_id, process_id, buffer_handle, slot ORDER BY event_id
+    )
+),
+cleared AS (
+    SELECT s.run_id, s.take_id
+    FROM slot_use AS s
+    ASOF JOIN (SELECT * FROM store.ring_buffer_event WHERE kind = 'clear') AS c
+        ON s.run_id = c.run_id
+        AND s.process_id = c.process_id
+        AND s.buffer_handle = c.buffer_handle
+        AND s.event_id > c.event_id
+    WHERE c.event_id > s.previous_event_id
+),
+behind_gap AS (
+    SELECT s.run_id, s.take_id
+    FROM slot_use AS s
+    ASOF JOIN store.loss_interval AS l ON s.trace_id = l.trace_id AND s.at_ns > l.start_ns
+    WHERE l.start_ns >= s.previous_ns
+)
+SELECT
+    s.run_id,
+    s.publication_id,
+    s.take_id,
+    'ring_buffer' AS method,
+    1::BIGINT AS candidate_count,
+    false AS is_loss_affected
+FROM slot_use AS s
+ANTI JOIN cleared AS c ON s.take_id = c.take_id
+ANTI JOIN behind_gap AS g ON s.take_id = g.take_id
+WHERE s.kind = 'dequeue'
+    AND s.previous_kind = 'enqueue'
+    AND s.publication_id IS NOT NULL
+    AND s.take_id IS NOT NULL

@@ -1,0 +1,181 @@
+-- name: derive.nearest_message
+-- kind: macro
+-- description: Messages matched with publications that carry no stamp. A message was stamped after
+--     its publication was written, and before the publishing thread went on. Per publisher a
+--     message has one publication and a publication one message, the nearest of each other. Where
+--     the thread goes on late, the delays that are usual for the publisher bound the search. A
+--     message with a publication of several publishers, or one of two messages that may both be of
+--     one publication, has none: that would be a guess.
+-- grain: one row per message that has, or might have, a publication
+-- param: only_run BIGINT  Run to look at
+-- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock
+CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
+WITH clock AS (
+    SELECT
+        clock_id, start_ns, difference_ns, drift_ppb, at_ns,
+        (end_ns - start_ns) // 1000000 + 4000 AS tolerance_ns,
+        row_number() OVER on_clock = 1 AS is_first,
+        lag(difference_ns) OVER on_clock AS previous_ns,
+        lead(difference_ns) OVER on_clock AS next_ns,
+        at_ns - lag(at_ns) OVER on_clock AS since_previous_ns,
+        lead(at_ns) OVER on_clock - at_ns AS until_next_ns
+    FROM store.stamp_clock
+    WHERE run_id = only_run
+    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
+),
+course AS (
+    SELECT
+        clock_id,
+        CASE WHEN is_first THEN -9223372036854775807 ELSE start_ns END AS start_ns,
+        difference_ns, drift_ppb, at_ns, tolerance_ns, previous_ns, next_ns,
+        abs(difference_ns - previous_ns) > 50000 + since_previous_ns // 5000
+            AS has_jumped_before,
+        abs(next_ns - difference_ns) > 50000 + until_next_ns // 5000 AS has_jumped_after
+    FROM clock
+),
+located AS (
+    SELECT
+        b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.publication_id, b.written_ns,
+        b.next_event_ns,
+        c.tolerance_ns, c.previous_ns, c.next_ns, c.has_jumped_before, c.has_jumped_after,
+        c.difference_ns
+        + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns
+    FROM derive.unstamped_publication(only_run) AS b
+    ASOF JOIN course AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
+),
+-- Around a jump of the clock a publication may be on either side of it.
+published AS MATERIALIZED (
+    SELECT
+        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        written_ns + difference_ns - tolerance_ns AS origin_ns,
+        next_event_ns + difference_ns AS until_ns
+    FROM located
+    UNION ALL
+    SELECT
+        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        written_ns + previous_ns - tolerance_ns, next_event_ns + previous_ns
+    FROM located
+    WHERE has_jumped_before
+    UNION ALL
+    SELECT
+        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        written_ns + next_ns - tolerance_ns, next_event_ns + next_ns
+    FROM located
+    WHERE has_jumped_after
+),
+publisher AS (
+    SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located
+),
+message AS MATERIALIZED (
+    SELECT
+        m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id,
+        min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END) AS taken_ns
+    FROM derive.unstamped_message(only_run) AS m
+    JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
+    GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id
+),
+after AS MATERIALIZED (
+    SELECT
+        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.until_ns,
+        m.source_timestamp_ns - p.origin_ns AS delay_ns,
+        row_number() OVER (
+            PARTITION BY p.publication_id
+            ORDER BY m.source_timestamp_ns - p.origin_ns, m.source_timestamp_ns
+        ) AS place
+    FROM message AS m
+    ASOF JOIN published AS p
+        ON m.publisher_id = p.publisher_id AND m.source_timestamp_ns >= p.origin_ns
+    WHERE m.source_timestamp_ns < coalesce(
+        p.until_ns + p.tolerance_ns // 4, p.origin_ns + 1000000000
+    )
+        AND coalesce(p.written_ns < m.taken_ns, true)
+),
+-- How much of the time the publisher was writing: what lies within by chance.
+share AS (
+    SELECT
+        publisher_id,
+        sum(until_ns - origin_ns) / greatest(max(origin_ns) - min(origin_ns), 1) AS writing
+    FROM published
+    GROUP BY publisher_id
+),
+-- Delays that lie close together, or begin close to nothing, are those of the publisher itself;
+-- others may be chance, where chance is not small.
+usual AS (
+    SELECT
+        q.publisher_id,
+        CASE
+            WHEN s.writing <= 0.2 THEN 1000000000
+            WHEN q.quantiles[3] <= 2 * q.quantiles[2] OR q.quantiles[1] <= 200000
+                THEN greatest(5000000, 4 * q.quantiles[4])
+            ELSE 5000000
+        END AS limit_ns,
+        q.quantiles[5] AS usual_ns,
+        q.quantiles[3] - q.quantiles[2] AS spread_ns
+    FROM (
+        SELECT
+            publisher_id,
+            quantile_disc(delay_ns, [0.1, 0.25, 0.75, 0.9, 0.99]) AS quantiles
+        FROM after
+        WHERE place = 1
+        GROUP BY publisher_id
+    ) AS q
+    JOIN share AS s ON q.publisher_id = s.publisher_id
+),
+plausible AS (
+    SELECT
+        a.publisher_id, a.source_timestamp_ns, a.publication_id, a.place,
+        a.place = 2 AND a.delay_ns <= u.usual_ns AS is_rival
+    FROM after AS a
+    JOIN usual AS u ON a.publisher_id = u.publisher_id
+    WHERE a.delay_ns <= CASE WHEN a.until_ns IS NULL THEN greatest(1000000, 2 * u.usual_ns)
+        ELSE u.limit_ns END
+),
+rivalled AS (
+    SELECT DISTINCT publication_id FROM plausible WHERE is_rival
+),
+first_match AS MATERIALIZED (
+    SELECT p.publisher_id, p.source_timestamp_ns, p.publication_id, r.publication_id IS NOT NULL
+        AS is_rivalled
+    FROM plausible AS p
+    LEFT JOIN rivalled AS r ON p.publication_id = r.publication_id
+    WHERE p.place = 1 OR p.is_rival
+),
+-- The difference of the clocks contains the shortest delay of some publisher.
+before AS (
+    SELECT
+        m.publisher_id, m.source_timestamp_ns, p.publication_id,
+        p.origin_ns - m.source_timestamp_ns AS lead_ns,
+        greatest(p.tolerance_ns, least((p.until_ns - p.origin_ns) // 4, u.spread_ns)) AS limit_ns
+    FROM message AS m
+    ANTI JOIN first_match AS f
+        ON m.publisher_id = f.publisher_id AND m.source_timestamp_ns = f.source_timestamp_ns
+    ASOF JOIN published AS p
+        ON m.publisher_id = p.publisher_id AND m.source_timestamp_ns < p.origin_ns
+    LEFT JOIN usual AS u ON m.publisher_id = u.publisher_id
+    WHERE coalesce(p.written_ns < m.taken_ns, true)
+),
+second_match AS (
+    SELECT b.publisher_id, b.source_timestamp_ns, b.publication_id, false AS is_rivalled
+    FROM before AS b
+    ANTI JOIN first_match AS f ON b.publication_id = f.publication_id
+    WHERE b.lead_ns <= b.limit_ns
+    QUALIFY row_number() OVER (
+        PARTITION BY b.publication_id ORDER BY b.lead_ns, b.source_timestamp_ns
+    ) = 1
+),
+matched AS (
+    SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM first_match
+    UNION ALL
+    SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM second_match
+)
+SELECT
+    m.run_id,
+    m.topic_name,
+    m.source_timestamp_ns,
+    CASE WHEN count(*) = 1 AND NOT bool_or(x.is_rivalled) THEN any_value(x.publication_id) END
+        AS publication_id,
+    count(*) AS candidate_count
+FROM matched AS x
+JOIN message AS m
+    ON x.publisher_id = m.publisher_id AND x.source_timestamp_ns = m.source_timestamp_ns
+GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns

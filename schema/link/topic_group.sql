@@ -1,0 +1,74 @@
+-- name: derive.topic_group
+-- description: Which publishers and subscriptions whose topic is not known are on one topic, as far
+--     as messages tell. A stamp that one publication of the run has belongs to one message: its
+--     publisher and those who took it are on one topic, and so is whatever else such messages join
+--     to any of them. The name is that of the members that have one; members of several names teach
+--     nothing. Pairs that next to none of the messages of both sides speak for are chance.
+-- grain: one row per publisher or subscription without a topic of its own that messages join
+-- needs: store.publication, store.publisher, store.take, store.subscription
+WITH RECURSIVE endpoint AS (
+    SELECT
+        run_id, publisher_id AS vertex,
+        CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END AS topic_name,
+        is_internal
+    FROM store.publisher
+    UNION ALL
+    SELECT
+        run_id, -subscription_id,
+        CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END,
+        is_internal
+    FROM store.subscription
+),
+concerned AS (
+    SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL
+),
+published AS (
+    SELECT b.run_id, b.source_timestamp_ns, any_value(b.publisher_id) AS publisher_id
+    FROM store.publication AS b
+    SEMI JOIN concerned AS c ON b.run_id = c.run_id
+    WHERE b.source_timestamp_ns <> 0
+    GROUP BY b.run_id, b.source_timestamp_ns
+    HAVING count(*) = 1
+),
+pair AS (
+    SELECT p.publisher_id, t.subscription_id, count(*) AS message_count
+    FROM published AS p
+    JOIN store.take AS t
+        ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
+    WHERE p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
+    GROUP BY p.publisher_id, t.subscription_id
+),
+likely AS (
+    SELECT publisher_id, -subscription_id AS subscription_vertex
+    FROM pair
+    QUALIFY 10 * message_count >= max(message_count) OVER (PARTITION BY publisher_id)
+        OR 10 * message_count >= max(message_count) OVER (PARTITION BY subscription_id)
+),
+edge AS MATERIALIZED (
+    SELECT publisher_id AS from_vertex, subscription_vertex AS to_vertex FROM likely
+    UNION ALL
+    SELECT subscription_vertex, publisher_id FROM likely
+),
+reached (start, vertex) AS (
+    SELECT vertex, vertex
+    FROM endpoint
+    WHERE topic_name IS NULL AND vertex IN (SELECT from_vertex FROM edge)
+    UNION
+    SELECT r.start, e.to_vertex
+    FROM reached AS r
+    JOIN endpoint AS p ON r.vertex = p.vertex AND p.topic_name IS NULL
+    JOIN edge AS e ON r.vertex = e.from_vertex
+)
+SELECT
+    s.run_id,
+    CASE WHEN r.start > 0 THEN 'publisher' ELSE 'subscription' END AS kind,
+    abs(r.start) AS id,
+    min(CASE WHEN p.topic_name IS NULL THEN r.vertex END) AS group_id,
+    any_value(p.topic_name) AS topic_name,
+    coalesce(bool_and(CASE WHEN p.topic_name IS NOT NULL THEN p.is_internal END), false)
+        AS is_internal
+FROM reached AS r
+JOIN endpoint AS s ON r.start = s.vertex
+JOIN endpoint AS p ON r.vertex = p.vertex
+GROUP BY s.run_id, r.start
+HAVING count(DISTINCT p.topic_name) <= 1

@@ -1,0 +1,31 @@
+-- name: derive.unstamped_publication
+-- kind: macro
+-- description: Publications whose message can only be told by time: those of processes that never
+--     say what stamp a message got. A publication without one in another process lost an event.
+-- grain: one row per publication on a known topic, written by a process without stamps
+-- param: only_run BIGINT  Run to look at
+-- needs: store.publication, store.publisher, store.process, store.host
+CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
+WITH unstamped AS (
+    SELECT process_id
+    FROM store.publication
+    WHERE run_id = only_run
+    GROUP BY process_id
+    HAVING count(source_timestamp_ns) = 0
+)
+SELECT
+    b.run_id,
+    h.clock_id,
+    p.topic_name,
+    b.publisher_id,
+    b.publication_id,
+    coalesce(b.rmw_ns, b.rcl_ns) AS written_ns,
+    b.next_event_ns
+FROM store.publication AS b
+JOIN unstamped AS u ON b.process_id = u.process_id
+JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+JOIN store.process AS o ON b.process_id = o.process_id
+JOIN store.host AS h ON o.host_id = h.host_id
+WHERE b.run_id = only_run
+    AND coalesce(b.rmw_ns, b.rcl_ns) IS NOT NULL
+    AND p.topic_name IS NOT NULL

@@ -1,0 +1,209 @@
+"""Messages from publication to take where publications carry no stamp: by time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from random import Random
+
+import pytest
+from ros_system import RosSystem
+from staged_events import Analyse, Thread
+
+TALKER = Thread(100)
+LISTENER = Thread(200)
+LINKS = (
+    "SELECT b.rcl_ns, t.source_timestamp_ns, l.method FROM link_transport AS l "
+    "JOIN publication AS b USING (publication_id) JOIN take AS t ON l.take_id = t.take_id "
+    "ORDER BY t.take_id"
+)
+_EPOCH = 1_700_000_000_000_000_000
+
+
+@dataclass
+class Unstamped:
+    """A system whose publishers never say what stamp a message got.
+
+    Attributes:
+        system: the events.
+        truth: (time of rcl_publish, stamp) of each message that was published in the trace.
+    """
+
+    system: RosSystem
+    random: Random = field(default_factory=lambda: Random(7))
+    truth: list[tuple[int, int]] = field(default_factory=list)
+
+    def difference(self, _time: int) -> int:
+        return 0
+
+    def message(
+        self,
+        time: int,
+        thread: Thread = TALKER,
+        *,
+        handle: int = 0x10,
+        reader: int = 0x20,
+        delay: int = 12_000,
+        is_traced: bool = True,
+        is_taken: bool = True,
+    ) -> int:
+        """Publish inside a timer callback and take 200 µs later; returns the stamp."""
+        time += self.random.randrange(80_000)
+        add = self.system.add
+        add("ros2:callback_start", thread, ts=time, callback=0xC1, is_intra_process=0)
+        if is_traced:
+            add("ros2:rclcpp_publish", thread, ts=time + 5_000, message=0xA)
+            add("ros2:rcl_publish", thread, ts=time + 6_000, publisher_handle=handle, message=0xA)
+            add("ros2:rmw_publish", thread, ts=time + 7_000, message=0xA)
+        made = time + 7_000 + delay + self.random.randrange(delay // 2)
+        stamp = made + self.difference(made)
+        add("ros2:callback_end", thread, ts=made + 20_000, callback=0xC1)
+        if is_taken:
+            self.system.add(
+                "ros2:rmw_take",
+                LISTENER,
+                ts=made + 200_000 + self.random.randrange(50_000),
+                rmw_subscription_handle=reader + 0x1000,
+                message=0xB,
+                source_timestamp=stamp,
+                taken=1,
+            )
+            self.system.add("ros2:rcl_take", LISTENER, ts=self.system._now + 1_000, message=0xB)
+        if is_traced and is_taken:
+            self.truth.append((time + 6_000, stamp))
+        return stamp
+
+
+class Slewed(Unstamped):
+    """The clock of ROS gains 20 µs per second, and jumps back by 3 ms after four seconds."""
+
+    def difference(self, time: int) -> int:
+        elapsed = time - _EPOCH
+        return elapsed * 20 // 1_000_000 - (3_000_000 if elapsed > 4_000_000_000 else 0)
+
+
+@pytest.fixture
+def unstamped(system: RosSystem) -> Unstamped:
+    """A publisher and a subscription of /a in two processes."""
+    system.wait(_EPOCH - 10_000_000)
+    system.publisher(TALKER, 0x10, "/a")
+    system.subscription(LISTENER, 0x20, "/a")
+    return Unstamped(system)
+
+
+def expected(truth: list[tuple[int, int]]) -> list[tuple[int, int, str]]:
+    return [(published, stamp, "nearest") for published, stamp in truth]
+
+
+def test_every_message_has_its_publication(unstamped: Unstamped, analyse: Analyse) -> None:
+    for n in range(40):
+        unstamped.message(_EPOCH + n * 10_000_000)
+    assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
+
+
+def test_what_is_not_in_the_trace_has_no_link(unstamped: Unstamped, analyse: Analyse) -> None:
+    """Neither messages whose publication is lost, nor publications nobody took."""
+    for n in range(60):
+        unstamped.message(
+            _EPOCH + n * 10_000_000,
+            is_traced=unstamped.random.random() < 0.7,
+            is_taken=unstamped.random.random() < 0.8,
+        )
+    assert 0 < len(unstamped.truth) < 50
+    assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
+
+
+def test_the_messages_of_an_untraced_publisher_have_no_link(
+    unstamped: Unstamped, analyse: Analyse
+) -> None:
+    for n in range(40):
+        unstamped.message(_EPOCH + n * 10_000_000)
+        unstamped.message(_EPOCH + n * 10_000_000 + 3_000_000, Thread(300), is_traced=False)
+    assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
+
+
+def test_a_long_write_is_no_obstacle(unstamped: Unstamped, analyse: Analyse) -> None:
+    """Ten megabytes are stamped milliseconds after the write began."""
+    for n in range(40):
+        unstamped.message(_EPOCH + n * 100_000_000, delay=8_000_000)
+    assert analyse(unstamped.system).rows(LINKS) == expected(unstamped.truth)
+
+
+def test_a_process_that_stamps_lost_an_event(unstamped: Unstamped, analyse: Analyse) -> None:
+    """Its other publications say what their messages look like: nothing is matched by time."""
+    for n in range(10):
+        unstamped.message(_EPOCH + n * 10_000_000)
+    unstamped.system.publish(TALKER, 0x10, 12345)
+    assert analyse(unstamped.system).rows(LINKS) == []
+
+
+def test_a_stamp_that_some_publication_has_is_no_message_of_another(
+    unstamped: Unstamped, analyse: Analyse
+) -> None:
+    stamper = Thread(400)
+    stamps = [unstamped.message(_EPOCH + n * 10_000_000) for n in range(10)]
+    unstamped.system.publisher(stamper, 0x10, "/a")
+    unstamped.system.publish(stamper, 0x10, stamps[3])
+    rows = analyse(unstamped.system).rows(LINKS)
+    assert [row[2] for row in rows].count("exact") == 1
+    assert [row for row in rows if row[2] == "nearest"] == expected(
+        [pair for pair in unstamped.truth if pair[1] != stamps[3]]
+    )
+
+
+def test_two_publishers_at_once_are_ambiguous(unstamped: Unstamped, analyse: Analyse) -> None:
+    """Two processes write at the same moment, and one message arrives: it may be of either."""
+    other = Thread(300)
+    unstamped.system.publisher(other, 0x10, "/a")
+    for n in range(20):
+        unstamped.message(_EPOCH + n * 10_000_000)
+    for n in range(20):
+        unstamped.message(_EPOCH + 5_000_000 + n * 10_000_000, other)
+    at = _EPOCH + 500_000_000
+    for thread, shift in ((TALKER, 0), (other, 1_000)):
+        unstamped.system.add("ros2:rclcpp_publish", thread, ts=at + shift, message=0xA)
+        unstamped.system.add(
+            "ros2:rcl_publish", thread, ts=at + shift + 1_000, publisher_handle=0x10, message=0xA
+        )
+        unstamped.system.add("ros2:rmw_publish", thread, ts=at + shift + 2_000, message=0xA)
+        unstamped.system.add("ros2:callback_end", thread, ts=at + shift + 40_000, callback=0xC1)
+    unstamped.system.add("ros2:rmw_take", LISTENER, ts=at + 200_000, taken=1, message=0xB,
+                         rmw_subscription_handle=0x1020, source_timestamp=at + 17_000)  # fmt: skip
+    model = analyse(unstamped.system)
+    assert model.rows(LINKS) == sorted(expected(unstamped.truth), key=lambda row: row[1])
+    assert model.rows(
+        "SELECT source_timestamp_ns, candidate_count FROM store.nearest_message "
+        "WHERE publication_id IS NULL"
+    ) == [(at + 17_000, 2)]
+    assert model.column("SELECT DISTINCT reason FROM store.orphan_take") == ["ambiguous"]
+
+
+def test_a_clock_that_drifts_and_jumps_is_followed(system: RosSystem, analyse: Analyse) -> None:
+    """Links are right all the way; around the jump some may be missing."""
+    slewed = Slewed(system)
+    system.wait(_EPOCH - 10_000_000)
+    system.publisher(TALKER, 0x10, "/a")
+    system.subscription(LISTENER, 0x20, "/a")
+    for n in range(800):
+        slewed.message(_EPOCH + n * 10_000_000, is_traced=slewed.random.random() < 0.9)
+    model = analyse(system)
+    links = {(published, stamp) for published, stamp, _ in model.rows(LINKS)}
+    assert links <= set(slewed.truth)
+    assert len(links) >= 0.98 * len(slewed.truth)
+
+
+def test_a_gap_after_the_publication_makes_the_link_doubtful(
+    unstamped: Unstamped, analyse: Analyse
+) -> None:
+    """What the thread did next may be lost: the usual delay alone bounds the search."""
+    for n in range(20):
+        unstamped.message(_EPOCH + n * 10_000_000)
+    published = unstamped.truth[4][0]
+    unstamped.system.add_packet(
+        published - 10_000, published + 4_000, last_event=published + 1_500, discarded=3
+    )
+    model = analyse(unstamped.system)
+    assert model.rows(LINKS) == expected(unstamped.truth)
+    assert model.column(
+        "SELECT b.rcl_ns FROM link_transport AS l JOIN publication AS b USING (publication_id) "
+        "WHERE l.is_loss_affected"
+    ) == [published]

@@ -1,0 +1,141 @@
+"""Messages between nodes of one process, by the slots of ring buffers."""
+
+from __future__ import annotations
+
+import pytest
+from ros_system import RosSystem
+from staged_events import Analyse, Thread
+
+TALKER = Thread(100)
+LISTENER = Thread(100, 101)
+LINKS = (
+    "SELECT b.intra_ns, t.taken_ns, l.method FROM link_transport AS l "
+    "JOIN publication AS b USING (publication_id) JOIN take AS t ON l.take_id = t.take_id "
+    "WHERE t.method = 'ring_buffer' ORDER BY t.take_id"
+)
+
+
+class Intra:
+    """A publisher and a subscription of /a in one process, with the buffer between them."""
+
+    def __init__(self, system: RosSystem) -> None:
+        self.system = system
+        system.publisher(TALKER, 0x10, "/a")
+        system.subscription(LISTENER, 0x20, "/a", callback=0xCB)
+        system.buffer(LISTENER, 0xB0, 0x20 + 0x2000)
+
+    def publish(self, *slots: int, buffer: int = 0xB0) -> int:
+        at = self.system.add(
+            "ros2:rclcpp_intra_publish", TALKER, publisher_handle=0x10, message=0xA
+        )
+        for slot in slots:
+            self.enqueue(slot, buffer=buffer)
+        return at
+
+    def enqueue(self, slot: int, *, buffer: int = 0xB0) -> int:
+        return self.system.add(
+            "ros2:rclcpp_ring_buffer_enqueue",
+            TALKER,
+            buffer=buffer,
+            index=slot,
+            size=1,
+            overwritten=0,
+        )
+
+    def dequeue(self, slot: int, *, buffer: int = 0xB0) -> int:
+        at = self.system.add(
+            "ros2:rclcpp_ring_buffer_dequeue", LISTENER, buffer=buffer, index=slot, size=0
+        )
+        self.system.start(LISTENER, 0xCB, intra=True)
+        self.system.end(LISTENER, 0xCB)
+        return at
+
+
+@pytest.fixture
+def intra(system: RosSystem) -> Intra:
+    return Intra(system)
+
+
+def test_the_latest_message_of_the_slot(intra: Intra, analyse: Analyse) -> None:
+    first, second = intra.publish(0), intra.publish(1)
+    taken = [intra.dequeue(0), intra.dequeue(1)]
+    third = intra.publish(0)
+    taken.append(intra.dequeue(0))
+    assert analyse(intra.system).rows(LINKS) == [
+        (published, at, "ring_buffer")
+        for published, at in zip((first, second, third), taken, strict=True)
+    ]
+
+
+def test_an_overwritten_message_is_not_received(intra: Intra, analyse: Analyse) -> None:
+    intra.publish(0)
+    second = intra.publish(0)
+    taken = intra.dequeue(0)
+    assert analyse(intra.system).rows(LINKS) == [(second, taken, "ring_buffer")]
+
+
+def test_a_message_is_taken_out_once(intra: Intra, analyse: Analyse) -> None:
+    published = intra.publish(0)
+    taken = intra.dequeue(0)
+    intra.dequeue(0)
+    assert analyse(intra.system).rows(LINKS) == [(published, taken, "ring_buffer")]
+
+
+@pytest.mark.parametrize("event", ["clear", "construct"])
+def test_a_buffer_cleared_or_made_anew_is_empty(intra: Intra, analyse: Analyse, event: str) -> None:
+    intra.publish(0)
+    if event == "clear":
+        intra.system.add("ros2:rclcpp_ring_buffer_clear", LISTENER, buffer=0xB0)
+    else:
+        intra.system.buffer(LISTENER, 0xB0, 0x20 + 0x2000)
+    intra.dequeue(0)
+    assert analyse(intra.system).rows(LINKS) == []
+
+
+def test_a_gap_may_hide_another_use_of_the_slot(intra: Intra, analyse: Analyse) -> None:
+    intra.publish(0)
+    intra.system.lose(cpu=3)
+    intra.dequeue(0)
+    assert analyse(intra.system).rows(LINKS) == []
+
+
+def test_buffers_of_other_processes_are_others(intra: Intra, analyse: Analyse) -> None:
+    intra.publish(0)
+    other = Thread(200)
+    intra.system.add("ros2:rclcpp_ring_buffer_dequeue", other, buffer=0xB0, index=0, size=0)
+    assert analyse(intra.system).rows(LINKS) == []
+
+
+def test_one_message_into_several_buffers(intra: Intra, analyse: Analyse) -> None:
+    intra.system.subscription(LISTENER, 0x21, "/a", callback=0xCC)
+    intra.system.buffer(LISTENER, 0xB1, 0x21 + 0x2000)
+    published = intra.publish(0)
+    intra.enqueue(0, buffer=0xB1)
+    taken = [intra.dequeue(0), intra.dequeue(0, buffer=0xB1)]
+    assert analyse(intra.system).rows(LINKS) == [(published, at, "ring_buffer") for at in taken]
+
+
+def test_a_replay_for_a_late_subscription_is_no_publication(intra: Intra, analyse: Analyse) -> None:
+    """Which message is replayed is not said."""
+    intra.publish(0, buffer=0xB9)
+    intra.system.start(TALKER, 0xC9)
+    intra.enqueue(0)
+    intra.system.end(TALKER, 0xC9)
+    intra.dequeue(0)
+    model = analyse(intra.system)
+    assert model.rows(LINKS) == []
+    assert model.value("SELECT count(*) FROM publication") == 1
+
+
+def test_the_copy_through_the_middleware_is_a_message_too(intra: Intra, analyse: Analyse) -> None:
+    """It is taken without a callback, and has the same publication."""
+    intra.publish(0)
+    intra.system.publish(TALKER, 0x10, 777)
+    intra.dequeue(0)
+    intra.system.take(LISTENER, 0x20, 777)
+    model = analyse(intra.system)
+    assert model.rows(
+        "SELECT l.publication_id, l.method, i.callback_instance_id IS NOT NULL "
+        "FROM link_transport AS l LEFT JOIN callback_instance AS i USING (take_id) "
+        "ORDER BY l.take_id"
+    ) == [(1, "ring_buffer", True), (1, "exact", False)]

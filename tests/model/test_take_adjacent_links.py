@@ -1,0 +1,101 @@
+"""Publications after a take by hand: rclpy, wait sets."""
+
+from __future__ import annotations
+
+import pytest
+from ros_system import RosSystem
+from staged_events import Analyse, Thread
+
+SOURCE = Thread(100)
+PYTHON = Thread(200, None, "python3")
+SINK = Thread(300)
+LINKS = (
+    "SELECT b.source_timestamp_ns, t.source_timestamp_ns, l.kind, l.callback_instance_id "
+    "FROM link_causal AS l JOIN publication AS b USING (publication_id) "
+    "LEFT JOIN take AS t ON l.take_id = t.take_id ORDER BY b.publication_id"
+)
+
+
+@pytest.fixture
+def relay(system: RosSystem) -> RosSystem:
+    """SOURCE → /a → PYTHON → /b → SINK, the one in the middle without rclcpp."""
+    system.publisher(SOURCE, 0x10, "/a")
+    system.subscription(PYTHON, 0x20, "/a")
+    system.publisher(PYTHON, 0x11, "/b")
+    system.subscription(SINK, 0x21, "/b", callback=0xCB)
+    return system
+
+
+def test_until_the_next_take(relay: RosSystem, analyse: Analyse) -> None:
+    relay.publish(PYTHON, 0x11, 1, layers="rcl rmw")
+    relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
+    relay.publish(PYTHON, 0x11, 2, layers="rcl rmw")
+    relay.publish(PYTHON, 0x11, 3, layers="rcl rmw")
+    relay.take(PYTHON, 0x20, 12, layers="rmw rcl")
+    relay.publish(PYTHON, 0x11, 4, layers="rcl rmw")
+    relay.publish(Thread(200, 201), 0x11, 5, layers="rcl rmw")
+    assert analyse(relay).rows(LINKS) == [
+        (2, 11, "take_adjacent", None),
+        (3, 11, "take_adjacent", None),
+        (4, 12, "take_adjacent", None),
+    ]
+
+
+def test_a_run_of_a_callback_is_a_better_cause(relay: RosSystem, analyse: Analyse) -> None:
+    """And after one has begun, or the executor went on, the message by hand is none."""
+    relay.take(SINK, 0x21, 11)
+    relay.start(SINK, 0xC1)
+    relay.publish(SINK, 0x12, 1)
+    relay.end(SINK, 0xC1)
+    relay.publish(SINK, 0x12, 2)
+    relay.take(SINK, 0x21, 12)
+    relay.ready(SINK)
+    relay.publish(SINK, 0x12, 3)
+    assert [row[:3] for row in analyse(relay).rows(LINKS)] == [(1, 11, "direct")]
+
+
+def test_not_across_a_gap(relay: RosSystem, analyse: Analyse) -> None:
+    relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
+    relay.lose()
+    relay.publish(PYTHON, 0x11, 2, layers="rcl rmw")
+    assert analyse(relay).rows(LINKS) == []
+
+
+def test_flows_pass_through(relay: RosSystem, analyse: Analyse) -> None:
+    relay.publish(SOURCE, 0x10, 11)
+    relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
+    relay.publish(PYTHON, 0x11, 12, layers="rcl rmw")
+    relay.take(SINK, 0x21, 12)
+    relay.start(SINK, 0xCB)
+    relay.end(SINK, 0xCB)
+    model = analyse(relay)
+    assert model.rows(
+        "SELECT from_kind, from_id, to_kind, to_id, link_kind FROM flow_edge ORDER BY from_ns"
+    ) == [
+        ("publication", 1, "take", 1, "transport"),
+        ("take", 1, "publication", 2, "take_adjacent"),
+        ("publication", 2, "take", 2, "transport"),
+        ("take", 2, "callback_instance", 1, "callback"),
+    ]
+    assert model.rows("SELECT kind, id FROM flow_forward('publication', 1) ORDER BY kind, id") == [
+        ("callback_instance", 1),
+        ("publication", 1),
+        ("publication", 2),
+        ("take", 1),
+        ("take", 2),
+    ]
+    assert model.rows(
+        "SELECT h.topics, e.status, e.take_id FROM end_to_end([1], NULL, NULL, 'callback_start', "
+        "'callback_end', 0, 9223372036854775807) AS e "
+        "JOIN flow_path([1], NULL, NULL) AS h USING (path_id)"
+    ) == [(["/a", "/b"], "reached", 2)]
+    assert model.rows(
+        "SELECT depth, kind, link_kind, wait_ns IS NOT NULL, missing "
+        "FROM flow_step('publication', 1, direction := 'forward') ORDER BY depth"
+    ) == [
+        (0, "publication", None, False, None),
+        (1, "take", "transport", True, None),
+        (2, "publication", "take_adjacent", True, None),
+        (3, "take", "transport", True, None),
+        (4, "callback_instance", "callback", True, None),
+    ]
