@@ -30,10 +30,10 @@ guess AS (
             AS received_from_ns,
         t.taken_ns
     FROM link AS l
-    JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
+    JOIN store.publication AS b ON l.publication_id = b.publication_id
     JOIN store.process AS bp ON b.process_id = bp.process_id
     JOIN store.host AS bh ON bp.host_id = bh.host_id
-    JOIN store.take AS t ON l.take_id = t.take_id AND l.run_id = t.run_id
+    JOIN store.take AS t ON l.take_id = t.take_id
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id
     WHERE l.method <> 'exact' OR l.candidate_count > 1
@@ -73,10 +73,10 @@ SELECT
     ) AS is_self_loop,
     l.is_loss_affected OR x.take_id IS NOT NULL AS is_loss_affected
 FROM link AS l
-JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
-LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
-JOIN store.take AS t ON l.take_id = t.take_id AND l.run_id = t.run_id
+JOIN store.publication AS b ON l.publication_id = b.publication_id
+LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+JOIN store.take AS t ON l.take_id = t.take_id
 LEFT JOIN store.subscription AS s
-    ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
-LEFT JOIN store.node AS n ON s.node_id = n.node_id AND s.run_id = n.run_id
-LEFT JOIN exposed AS x ON l.run_id = x.run_id AND l.take_id = x.take_id
+    ON t.subscription_id = s.subscription_id
+LEFT JOIN store.node AS n ON s.node_id = n.node_id
+LEFT JOIN exposed AS x ON l.take_id = x.take_id
