@@ -11,13 +11,18 @@
 --     store.take, store.subscription, store.node, store.process, store.host
 WITH link AS (
     SELECT
-        run_id, publication_id, take_id, method, candidate_count, false AS is_loss_affected
+        run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
+        false AS is_loss_affected
     FROM derive.link_transport_exact
     UNION ALL
-    SELECT run_id, publication_id, take_id, method, candidate_count, is_loss_affected
+    SELECT
+        run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
+        is_loss_affected
     FROM derive.link_transport_nearest
     UNION ALL
-    SELECT run_id, publication_id, take_id, method, candidate_count, is_loss_affected
+    SELECT
+        run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
+        is_loss_affected
     FROM derive.link_transport_ring_buffer
 ),
 guess AS (
@@ -59,8 +64,8 @@ SELECT
     l.run_id,
     l.publication_id,
     l.take_id,
-    b.publisher_id,
-    t.subscription_id,
+    l.publisher_id,
+    l.subscription_id,
     l.method,
     l.candidate_count,
     coalesce(
@@ -73,10 +78,8 @@ SELECT
     ) AS is_self_loop,
     l.is_loss_affected OR x.take_id IS NOT NULL AS is_loss_affected
 FROM link AS l
-JOIN store.publication AS b ON l.publication_id = b.publication_id
-LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-JOIN store.take AS t ON l.take_id = t.take_id
+LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 LEFT JOIN store.subscription AS s
-    ON t.subscription_id = s.subscription_id
+    ON l.subscription_id = s.subscription_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id

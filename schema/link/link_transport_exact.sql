@@ -14,7 +14,7 @@ WITH unnamed AS (
 ),
 published AS (
     SELECT
-        b.run_id, b.publication_id, b.source_timestamp_ns, b.start_event_id,
+        b.run_id, b.publication_id, b.publisher_id, b.source_timestamp_ns, b.start_event_id,
         coalesce(p.topic_name, g.topic_name) AS topic_name,
         p.topic_name IS NOT NULL AND NOT coalesce(p.is_topic_learned, false) AS is_own_topic
     FROM store.publication AS b
@@ -56,6 +56,7 @@ candidate AS (
         r.source_timestamp_ns,
         r.start_event_id AS take_event_id,
         p.publication_id,
+        p.publisher_id,
         p.start_event_id AS publication_event_id,
         r.topic_name AS take_topic,
         coalesce(r.topic_name = p.topic_name, false) AS is_topic_known,
@@ -77,7 +78,7 @@ candidate AS (
 counted AS (
     SELECT
         run_id, take_id, subscription_id, source_timestamp_ns, take_event_id, publication_id,
-        publication_event_id, is_topic_known, method,
+        publisher_id, publication_event_id, is_topic_known, method,
         count(*) OVER same_take AS candidate_count,
         count(CASE WHEN is_topic_known THEN 1 END) OVER same_take AS known_count,
         min(take_topic) OVER same_publication IS DISTINCT FROM max(take_topic)
@@ -89,13 +90,13 @@ counted AS (
         same_publication AS (PARTITION BY run_id, publication_id)
 ),
 unknown_topic AS (
-    SELECT run_id, publication_id, take_id
+    SELECT run_id, publication_id, take_id, publisher_id, subscription_id
     FROM counted
     WHERE known_count = 0 AND candidate_count = 1 AND NOT has_several_topics
 ),
 ordered AS (
     SELECT
-        run_id, publication_id, take_id, method, known_count,
+        run_id, publication_id, take_id, publisher_id, subscription_id, method, known_count,
         row_number() OVER (
             PARTITION BY run_id, take_id ORDER BY publication_event_id
         ) AS publication_position,
@@ -105,13 +106,15 @@ ordered AS (
     FROM counted
     WHERE is_topic_known
 )
-SELECT run_id, publication_id, take_id, method, 1::BIGINT AS candidate_count
+SELECT
+    run_id, publication_id, take_id, publisher_id, subscription_id, method,
+    1::BIGINT AS candidate_count
 FROM candidate
 WHERE is_topic_known AND NOT is_repeated
 UNION ALL
-SELECT run_id, publication_id, take_id, method, known_count
+SELECT run_id, publication_id, take_id, publisher_id, subscription_id, method, known_count
 FROM ordered
 WHERE publication_position = take_position
 UNION ALL
-SELECT run_id, publication_id, take_id, 'exact_stamp', 1
+SELECT run_id, publication_id, take_id, publisher_id, subscription_id, 'exact_stamp', 1
 FROM unknown_topic

@@ -5,7 +5,8 @@
 -- needs: store.nearest_message, store.take, store.subscription, store.publication,
 --     store.loss_interval
 WITH received AS (
-    SELECT t.run_id, t.take_id, m.publication_id, m.candidate_count
+    SELECT
+        t.run_id, t.take_id, t.subscription_id, m.publication_id, m.candidate_count
     FROM store.nearest_message AS m
     JOIN store.subscription AS s ON m.run_id = s.run_id AND m.topic_name = s.topic_name
     JOIN store.take AS t
@@ -29,8 +30,11 @@ SELECT
     r.run_id,
     r.publication_id,
     r.take_id,
+    b.publisher_id,
+    r.subscription_id,
     'nearest' AS method,
     r.candidate_count,
     a.publication_id IS NOT NULL AS is_loss_affected
 FROM received AS r
+JOIN store.publication AS b ON r.publication_id = b.publication_id
 LEFT JOIN affected AS a ON r.publication_id = a.publication_id

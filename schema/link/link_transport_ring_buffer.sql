@@ -3,7 +3,7 @@
 --     out was put in last, unless the buffer was cleared or made anew meanwhile, or a gap of the
 --     trace may hide that it was used again.
 -- grain: one row per dequeue whose publication is known
--- needs: store.ring_buffer_event, store.loss_interval
+-- needs: store.ring_buffer_event, store.loss_interval, store.publication, store.take
 WITH slot_use AS (
     SELECT
         run_id, trace_id, process_id, buffer_handle, kind, at_ns, take_id, event_id,
@@ -37,13 +37,15 @@ SELECT
     s.run_id,
     s.publication_id,
     s.take_id,
+    b.publisher_id,
+    t.subscription_id,
     'ring_buffer' AS method,
     1::BIGINT AS candidate_count,
     false AS is_loss_affected
 FROM slot_use AS s
+JOIN store.publication AS b ON s.publication_id = b.publication_id
+JOIN store.take AS t ON s.take_id = t.take_id
 ANTI JOIN cleared AS c ON s.take_id = c.take_id
 ANTI JOIN behind_gap AS g ON s.take_id = g.take_id
 WHERE s.kind = 'dequeue'
     AND s.previous_kind = 'enqueue'
-    AND s.publication_id IS NOT NULL
-    AND s.take_id IS NOT NULL

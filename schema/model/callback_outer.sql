@@ -4,30 +4,31 @@
 --     until the first event of their thread that cannot be inside: the next begin or end of a
 --     callback, executor event, or event behind a gap.
 -- grain: one row per such run
--- needs: staging.callback_event, staging.callback_pair, staging.executor_event,
---     staging.callback_gap, staging.thread
-WITH open_run AS (
-    SELECT start_event_id, thread_id, previous_executor_event_id
-    FROM staging.callback_pair
-    WHERE end_event_id IS NULL
-),
-closed_by AS (
+-- needs: staging.callback_event, staging.callback_pair, staging.callback_open,
+--     staging.executor_event,
+--     staging.executor_first, staging.callback_gap, staging.thread
+WITH closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
-    FROM open_run AS o
+    FROM staging.callback_open AS o
     JOIN staging.callback_event AS e
         ON o.start_event_id = e.previous_callback_event_id AND o.thread_id = e.thread_id
     GROUP BY o.start_event_id
     UNION ALL
     SELECT o.start_event_id, min(x.event_id)
-    FROM open_run AS o
+    FROM staging.callback_open AS o
     JOIN staging.executor_event AS x
-        ON o.thread_id = x.thread_id
-        AND o.previous_executor_event_id IS NOT DISTINCT FROM x.previous_event_id
+        ON o.previous_executor_event_id = x.previous_event_id
+        AND o.thread_id = x.thread_id
         AND x.event_id > o.start_event_id
     GROUP BY o.start_event_id
     UNION ALL
+    SELECT o.start_event_id, x.event_id
+    FROM staging.callback_open AS o
+    JOIN staging.executor_first AS x
+        ON o.thread_id = x.thread_id AND x.event_id > o.start_event_id
+    UNION ALL
     SELECT o.start_event_id, g.event_id
-    FROM open_run AS o
+    FROM staging.callback_open AS o
     ASOF JOIN staging.callback_gap AS g
         ON o.thread_id = g.thread_id AND o.start_event_id < g.event_id
 ),

@@ -1,7 +1,8 @@
 -- name: staging.executor_event
 -- kind: inline
--- description: What executors say of themselves, with what they said before on the same thread.
---     These are most of the events of many traces, which is why they are not copied.
+-- description: What executors say of themselves, with what they said before on the same thread;
+--     before `from_event_id` that was another life of the process. These are most of the events of
+--     many traces, which is why they are not copied.
 -- grain: one row per executor event
 -- needs: staging.context, raw
 WITH event AS (
@@ -25,11 +26,10 @@ SELECT
     e.ts_ns,
     c.thread_id,
     e.kind,
-    -- What an earlier life of the process did is not what this one did before.
-    CASE WHEN e.previous_executor_event_id >= c.from_event_id THEN e.previous_executor_event_id END
-        AS previous_event_id,
+    e.previous_executor_event_id AS previous_event_id,
     e.previous_executor_ts_ns AS previous_ns,
-    e.previous_executor_label AS previous_kind
+    e.previous_executor_label AS previous_kind,
+    c.from_event_id
 FROM event AS e
 JOIN staging.context AS c
     ON e.thread_index = c.thread_index

@@ -5,7 +5,7 @@
 --     name belongs to the one of which it ran most.
 -- grain: one row per thread that runs callbacks or emits executor events
 -- needs: staging.callback_instance, staging.callback_group_entry, staging.callback_group_owner,
---     staging.executor_event, staging.thread
+--     staging.executor_first, staging.thread
 WITH RECURSIVE served AS (
     SELECT e.callback_id, g.executor_event_id
     FROM staging.callback_group_entry AS e
@@ -44,8 +44,7 @@ tie AS (
     SELECT other_thread_id, thread_id FROM neighbour
 ),
 spinning AS (
-    SELECT DISTINCT thread_id
-    FROM staging.executor_event
+    SELECT thread_id FROM staging.executor_first
 ),
 member AS (
     SELECT thread_id FROM runs

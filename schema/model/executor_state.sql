@@ -15,7 +15,7 @@ WITH state AS (
     FROM staging.executor_event AS e
     LEFT JOIN (SELECT event_id FROM staging.behind_gap WHERE sequence = 'executor') AS g
         ON e.event_id = g.event_id
-    WHERE e.previous_event_id IS NOT NULL
+    WHERE e.previous_event_id >= e.from_event_id
     UNION ALL
     SELECT thread_id, arg_max(kind, event_id), arg_max(ts_ns, event_id), NULL, max(event_id)
     FROM staging.executor_event

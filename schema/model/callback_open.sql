@@ -1,0 +1,8 @@
+-- name: staging.callback_open
+-- description: Runs of callbacks that were never seen to end. Apart, since they are few, which
+--     decides how what closes them is best looked for.
+-- grain: one row per such run
+-- needs: staging.callback_pair
+SELECT start_event_id, thread_id, previous_executor_event_id
+FROM staging.callback_pair
+WHERE end_event_id IS NULL
