@@ -59,7 +59,8 @@ CREATE TABLE staging.damage (
 
 def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     """Attach `raw` at `path`, with an empty table per tracepoint, and `staging` in memory."""
-    con.execute(f"ATTACH '{_quoted(path)}' AS raw")
+    # What is staged is of no use after a crash.
+    con.execute(f"ATTACH '{_quoted(path)}' AS raw (RECOVERY_MODE no_wal_writes)")
     con.execute("ATTACH ':memory:' AS staging")
     catalogue = load()
     tracepoints = list(catalogue.tracepoints.values())
