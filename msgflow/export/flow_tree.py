@@ -27,6 +27,8 @@ _NOT_SEEN = {
     "publication": "its publication was not seen",
     "take": "its message was not seen",
     "callback": "no callback was seen",
+    "sending": "its sending was not seen",
+    "response": "no response was seen",
 }
 
 
@@ -136,6 +138,11 @@ class _Painter:
             # Else who published it stands on the line of the callback run.
             is_alone = link is None or not item.causes
             return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
+        if node["kind"] == "request":
+            is_alone = link is None or not item.causes
+            return f"{place}  requests {label}" if is_alone else f"requests {label}"
+        if node["kind"] == "response":
+            return f"{place}  Client({label})"
         if node["kind"] == "callback_instance":
             return f"{place}  {label}"
         return f"{place}  Subscription({label})"
@@ -145,11 +152,16 @@ class _Painter:
         if node["kind"] == "subscription":
             return [f"not taken: {_reason(link)}"]
         details = [_waits(edge) for _, edge in item.causes if edge["link_kind"] == "transport"]
-        if link is not None and link["link_kind"] not in ("transport", "direct"):
+        if link is not None and link["link_kind"] not in ("transport", "direct", "callback"):
             details.append(_waits(link))
-        if item.handover is not None:
-            details.append(f"wait {format_cell(item.handover['wait_ns'], 'ns')}")
-        if node["missing"] == "end":
+        handover = item.handover
+        if handover is None and link is not None and link["link_kind"] == "callback":
+            handover = link
+        if handover is not None:
+            details.append(f"wait {format_cell(handover['wait_ns'], 'ns')}")
+        if node["kind"] in ("request", "response"):
+            details += _transport(node)
+        elif node["missing"] == "end":
             details.append("ran NA: never seen to end")
         elif node["kind"] == "callback_instance":
             details.append(f"ran {format_duration(node['end_ns'] - node['start_ns'])}")
@@ -159,7 +171,7 @@ class _Painter:
             if vertex is not None and vertex["missing"] in _NOT_SEEN:
                 why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
                 details.append(f"NA: {_NOT_SEEN[vertex['missing']]}{why}")
-        if node["kind"] != "publication" or not item.causes:
+        if node["kind"] not in ("publication", "request") or not item.causes:
             host = f" on {_printable(node['host'])}" if self.has_hosts else ""
             details.append(f"thread {_printable(node['thread'])}{host}")
         if node["symbol"]:
@@ -180,6 +192,12 @@ def _waits(edge: Row) -> str:
     if edge["is_loss_affected"]:
         doubts.append("events were lost here")
     return f"{text} ({', '.join(doubts)})" if doubts else text
+
+
+def _transport(node: Row) -> list[str]:
+    if node["missing"] == "sending" or node["end_ns"] is None:
+        return []
+    return [f"transport {format_duration(node['end_ns'] - node['start_ns'])}"]
 
 
 def _reason(row: Row | None) -> str:

@@ -123,7 +123,7 @@ def test_limits_are_said(robot: Database) -> None:
     flow = robot.flow("/image", direction="forward", depth=1)
     assert flow.is_cut
     assert flow.notes == [
-        "1 message on topics of ROS itself left out; --internal shows them",
+        "1 message on topics and services of ROS itself left out; --internal shows them",
         "the flow goes on at 1 place beyond --depth 1",
     ]
     cut = robot.flow("/image", direction="forward", limit=3)
