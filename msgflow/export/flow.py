@@ -173,7 +173,9 @@ def _notes(flow: Flow) -> list[str]:
     hidden = sum(node["internal_count"] or 0 for node in flow.nodes.values())
     if hidden:
         messages = "1 message" if hidden == 1 else f"{hidden} messages"
-        notes.append(f"{messages} on topics and services of ROS itself left out; --internal shows them")
+        notes.append(
+            f"{messages} on topics and services of ROS itself left out; --internal shows them"
+        )
     cut = [node for node in flow.nodes.values() if node["cut_count"]]
     by_depth = sum(abs(node["depth"]) >= flow.depth * STEPS_PER_MESSAGE for node in cut)
     for number, option, value in (

@@ -157,9 +157,7 @@ def test_what_cannot_be_told_is_not_guessed(system: RosSystem, analyse: Analyse)
     assert sorted(analysis.rows(REQUESTS), key=str) == sorted(
         [(1, sent[0], None, None), (1, sent[1], None, None), (1, None, taken, None)], key=str
     )
-    assert analysis.rows(
-        "SELECT count FROM diagnostic WHERE name = 'ambiguous_request'"
-    ) == [(1,)]
+    assert analysis.rows("SELECT count FROM diagnostic WHERE name = 'ambiguous_request'") == [(1,)]
 
 
 def test_two_services_of_one_name(system: RosSystem, analyse: Analyse) -> None:
@@ -321,7 +319,12 @@ def test_a_service_without_callbacks(system: RosSystem, analyse: Analyse) -> Non
     system.take_response(CLIENT, 0x10, 1, stamp=5)
     analysis = analyse(system)
     assert analysis.rows("SELECT * EXCLUDE (run_id) FROM flow_edge") == [
-        ("request", 1, "response", 1, "service", *analysis.rows(
-            "SELECT q.taken_ns, r.sent_ns FROM request AS q, response AS r"
-        )[0])
+        (
+            "request",
+            1,
+            "response",
+            1,
+            "service",
+            *analysis.rows("SELECT q.taken_ns, r.sent_ns FROM request AS q, response AS r")[0],
+        )
     ]
