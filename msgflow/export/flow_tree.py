@@ -23,12 +23,19 @@ if TYPE_CHECKING:
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 60
 _INDENT = 4
-_NOT_SEEN = {
-    "publication": "its publication was not seen",
-    "take": "its message was not seen",
+_REQUEST = {
     "callback": "no callback was seen",
     "sending": "its sending was not seen",
     "response": "no response was seen",
+}
+_NOT_SEEN = {
+    "take": {
+        "publication": "its publication was not seen",
+        "callback": "no callback was seen",
+    },
+    "callback_instance": {"take": "its message was not seen"},
+    "request": _REQUEST,
+    "response": _REQUEST,
 }
 
 
@@ -168,9 +175,9 @@ class _Painter:
         elif node["kind"] == "publication" and node["end_ns"] is not None:
             details.append(f"in {format_duration(node['end_ns'] - node['start_ns'])}")
         for vertex in (item.take, node):
-            if vertex is not None and vertex["missing"] in _NOT_SEEN:
+            if vertex is not None and vertex["missing"] in _NOT_SEEN.get(vertex["kind"], {}):
                 why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
-                details.append(f"NA: {_NOT_SEEN[vertex['missing']]}{why}")
+                details.append(f"NA: {_NOT_SEEN[vertex['kind']][vertex['missing']]}{why}")
         if node["kind"] not in ("publication", "request") or not item.causes:
             host = f" on {_printable(node['host'])}" if self.has_hosts else ""
             details.append(f"thread {_printable(node['thread'])}{host}")
@@ -195,8 +202,10 @@ def _waits(edge: Row) -> str:
 
 
 def _transport(node: Row) -> list[str]:
-    if node["missing"] == "sending" or node["end_ns"] is None:
+    if node["missing"] == "sending":
         return []
+    if node["end_ns"] is None:
+        return ["NA: it was not taken"]
     return [f"transport {format_duration(node['end_ns'] - node['start_ns'])}"]
 
 
