@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 60
 _INDENT = 4
+# Links that say something of the effect, whichever way the flow is drawn, or nothing at all.
+_OF_EFFECT = ("transport", "service", "callback", "direct")
 _REQUEST = {
     "callback": "no callback was seen",
     "sending": "its sending was not seen",
@@ -158,14 +160,15 @@ class _Painter:
         node = item.node
         if node["kind"] == "subscription":
             return [f"not taken: {_reason(link)}"]
-        details = [_waits(edge) for _, edge in item.causes if edge["link_kind"] == "transport"]
-        if link is not None and link["link_kind"] not in ("transport", "direct", "callback"):
+        details = [
+            _waits(edge) for _, edge in item.causes if edge["link_kind"] in ("transport", "service")
+        ]
+        if link is not None and link["link_kind"] not in _OF_EFFECT:
             details.append(_waits(link))
-        handover = item.handover
-        if handover is None and link is not None and link["link_kind"] == "callback":
-            handover = link
-        if handover is not None:
-            details.append(f"wait {format_cell(handover['wait_ns'], 'ns')}")
+        requested = [edge for _, edge in item.causes if edge["link_kind"] == "callback"]
+        for edge in [item.handover, *requested]:
+            if edge is not None:
+                details.append(f"wait {format_cell(edge['wait_ns'], 'ns')}")
         if node["kind"] in ("request", "response"):
             details += _transport(node)
         elif node["missing"] == "end":

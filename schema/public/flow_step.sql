@@ -27,8 +27,8 @@
 -- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback run; the take; when the
 --     request or response was sent (taken, where that is all there is)
 -- column: end_ns BIGINT [epoch ns]  Its end; when the request or response was taken
--- column: node VARCHAR  Node, or process in brackets; of requests and responses that of the client
---     (of the service, where no client is known)
+-- column: node VARCHAR  Node, or process in brackets; of requests and responses that of the client,
+--     ? where it is not known
 -- column: label VARCHAR  What it is: a topic or service, or what triggers the callback
 -- column: topic_name VARCHAR  Topic of the message
 -- column: symbol VARCHAR  Function of the callback
@@ -77,7 +77,9 @@ aside AS MATERIALIZED (
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE p.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
     UNION ALL
-    SELECT l.callback_instance_id, derive.vertex_key('request', l.request_id)
+    SELECT
+        derive.vertex_key('callback_instance', l.callback_instance_id),
+        derive.vertex_key('request', l.request_id)
     FROM store.link_request AS l
     JOIN store.request AS q ON l.request_id = q.request_id
     JOIN store.client AS c ON q.client_id = c.client_id
@@ -206,7 +208,8 @@ described AS MATERIALIZED (
         v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
         coalesce(q.sender_thread_id, q.receiver_thread_id),
         h.process_id,
-        derive.node_label(n.full_name, o.name, o.pid),
+        CASE WHEN c.client_id IS NULL THEN '?'
+            ELSE derive.node_label(n.full_name, o.name, o.pid) END,
         coalesce(c.service_name, s.service_name, '?'),
         NULL,
         NULL,
@@ -222,9 +225,8 @@ described AS MATERIALIZED (
     JOIN store.thread AS h ON coalesce(q.sender_thread_id, q.receiver_thread_id) = h.thread_id
     LEFT JOIN store.client AS c ON q.client_id = c.client_id
     LEFT JOIN store.service AS s ON q.service_id = s.service_id
-    JOIN store.process AS o ON coalesce(c.process_id, s.process_id) = o.process_id
-    LEFT JOIN store.node AS n
-        ON CASE WHEN c.client_id IS NULL THEN s.node_id ELSE c.node_id END = n.node_id
+    LEFT JOIN store.process AS o ON c.process_id = o.process_id
+    LEFT JOIN store.node AS n ON c.node_id = n.node_id
     LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
         ON q.request_id = r.request_id
     WHERE v.kind = 'request'
@@ -233,7 +235,8 @@ described AS MATERIALIZED (
         v.key, v.kind, v.id, v.depth, r.run_id, coalesce(r.sent_ns, r.taken_ns), r.taken_ns,
         coalesce(r.receiver_thread_id, r.sender_thread_id),
         h.process_id,
-        derive.node_label(n.full_name, o.name, o.pid),
+        CASE WHEN c.client_id IS NULL THEN '?'
+            ELSE derive.node_label(n.full_name, o.name, o.pid) END,
         coalesce(c.service_name, s.service_name, '?'),
         NULL,
         NULL,
@@ -247,9 +250,8 @@ described AS MATERIALIZED (
     JOIN store.thread AS h ON coalesce(r.receiver_thread_id, r.sender_thread_id) = h.thread_id
     LEFT JOIN store.client AS c ON r.client_id = c.client_id
     LEFT JOIN store.service AS s ON r.service_id = s.service_id
-    JOIN store.process AS o ON coalesce(c.process_id, s.process_id) = o.process_id
-    LEFT JOIN store.node AS n
-        ON CASE WHEN c.client_id IS NULL THEN s.node_id ELSE c.node_id END = n.node_id
+    LEFT JOIN store.process AS o ON c.process_id = o.process_id
+    LEFT JOIN store.node AS n ON c.node_id = n.node_id
     WHERE v.kind = 'response'
 ),
 arrow AS MATERIALIZED (

@@ -94,15 +94,14 @@ def test_calls_of_services(empty_database: Path, tmp_path: Path) -> None:
     assert flow.notes == [
         "1 message on topics and services of ROS itself left out; --internal shows them"
     ]
-    assert [line.strip().split("  ")[2] for line in answered[1:]] == [
-        "Client(/add)",
-        "Service(/add)",
-        "requests /add",
-        "Subscription(/tick)",
-        "publishes /tick",
-        "Timer(1 ms)",
+    assert answered[1:5] == [
+        f"  +0 ns  /caller  Client(/add)  service 2 ns  transport 18 ns{thread}",
+        f" -52 ns  /server  Service(/add)  wait 10 ns  ran 50 ns{thread}  add",
+        "-142 ns  requests /add  transport 80 ns",
+        "-152 ns  /caller  Subscription(/tick)  transport 78 ns  wait 10 ns  ran 30 ns"
+        f"{thread}  on_tick",
     ]
-    assert unknown[1] == (f"  +0 ns  /server  requests /add  NA: its sending was not seen{thread}")
+    assert unknown[1] == (f"  +0 ns  ?  requests /add  NA: its sending was not seen{thread}")
 
 
 def test_backward_ends_at_one_cause_twice(robot: Database) -> None:
