@@ -192,6 +192,8 @@ class Database:
         publication_id: int | None = None,
         take_id: int | None = None,
         callback_instance_id: int | None = None,
+        request_id: int | None = None,
+        response_id: int | None = None,
         run: str | int | None = None,
         direction: str = "both",
         depth: int = DEFAULT_DEPTH,
@@ -207,11 +209,13 @@ class Database:
             publication_id: identity of a publication.
             take_id: identity of a take.
             callback_instance_id: identity of a run of a callback.
+            request_id: identity of a request to a service.
+            response_id: identity of a response of a service.
             run: a name or an id, for `topic` only; the latest run when None.
             direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
             depth: most messages in a row, each way.
-            limit: most publications, takes and callback runs.
-            internal: follow what is published on ROS's own topics too.
+            limit: most publications, takes, callback runs, requests and responses.
+            internal: follow what goes to ROS's own topics and services too.
 
         Raises:
             UsageError: not exactly one thing to start from, or one that does not exist.
@@ -225,11 +229,14 @@ class Database:
             "publication": publication_id,
             "take": take_id,
             "callback_instance": callback_instance_id,
+            "request": request_id,
+            "response": response_id,
         }
         starts = [Start(kind, number) for kind, number in given.items() if number is not None]
         if len(starts) + (topic is not None) != 1:
             raise UsageError(
-                "a flow starts from one thing: a topic, a publication, a take or a callback run",
+                "a flow starts from one thing: a topic, a publication, a take, a callback run, "
+                "a request or a response",
                 "msgflow flow --topic /chatter --at 2.5s, or msgflow flow --publication 1",
             )
         if starts and not at is run is None:

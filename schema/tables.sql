@@ -394,7 +394,8 @@ CREATE TABLE store.response (
     taken_ns             BIGINT,                 -- rmw_take_response [epoch ns]
     sender_thread_id     BIGINT,                 -- Thread that sent it -> thread.thread_id
     receiver_thread_id   BIGINT,                 -- Thread that took it -> thread.thread_id
-    callback_instance_id BIGINT                  -- Service callback it came from -> callback_instance.callback_instance_id
+    callback_instance_id BIGINT,                 -- Service callback it came from -> callback_instance.callback_instance_id
+    request_id           BIGINT                  -- Request that it answers -> request.request_id
 );
 
 -- One row per interval between two executor events of a thread.

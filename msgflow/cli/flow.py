@@ -68,6 +68,14 @@ def command(
             rich_help_panel=_START,
         ),
     ] = None,
+    request: Annotated[
+        int | None,
+        typer.Option("--request", metavar="ID", help="request_id", rich_help_panel=_START),
+    ] = None,
+    response: Annotated[
+        int | None,
+        typer.Option("--response", metavar="ID", help="response_id", rich_help_panel=_START),
+    ] = None,
     run: RunOption = None,
     direction: Annotated[
         Direction,
@@ -94,7 +102,7 @@ def command(
             metavar="N",
             min=1,
             max=10_000,
-            help="Most publications, takes and callback runs",
+            help="Most publications, takes, callback runs, requests and responses",
             rich_help_panel=SELECTION,
         ),
     ] = 1_000,
@@ -121,7 +129,8 @@ def command(
 ) -> None:
     """Print the flow of one message: what it was caused by, and what it caused.
 
-    A line is a publication, or a message taken with the callback run it was for.
+    A line is a publication, a message taken with the callback run it was for, a request, or a
+    response taken by its client.
 
     Times count from the first line. NA is what the trace does not show.
     """
@@ -135,6 +144,8 @@ def command(
             publication_id=publication,
             take_id=take,
             callback_instance_id=callback_instance,
+            request_id=request,
+            response_id=response,
             run=run,
             direction=direction.value,
             depth=depth,

@@ -598,6 +598,7 @@ response = _table(
         "Service callback it came from",
         to="callback_instance.callback_instance_id",
     ),
+    _reference("request_id", "Request that it answers", to="request.request_id"),
 )
 
 executor_state = _table(

@@ -151,7 +151,7 @@ def read_flow(
         direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
         depth: most messages in a row, each way.
         limit: most vertices.
-        internal: follow effects on ROS's own topics too.
+        internal: follow effects on ROS's own topics and services too.
 
     Raises:
         UsageError: what to start from does not exist, or an argument cannot be.
@@ -173,7 +173,9 @@ def _notes(flow: Flow) -> list[str]:
     hidden = sum(node["internal_count"] or 0 for node in flow.nodes.values())
     if hidden:
         messages = "1 message" if hidden == 1 else f"{hidden} messages"
-        notes.append(f"{messages} on topics of ROS itself left out; --internal shows them")
+        notes.append(
+            f"{messages} on topics and services of ROS itself left out; --internal shows them"
+        )
     cut = [node for node in flow.nodes.values() if node["cut_count"]]
     by_depth = sum(abs(node["depth"]) >= flow.depth * STEPS_PER_MESSAGE for node in cut)
     for number, option, value in (

@@ -82,7 +82,7 @@ def _items(flow: Flow) -> dict[Key, Item]:
     calls: dict[Key, list[Row]] = defaultdict(list)
     for edge in flow.edges:
         if edge["link_kind"] == "callback":
-            calls["take", edge["from_id"]].append(edge)
+            calls[edge["from_kind"], edge["from_id"]].append(edge)
     items: dict[Key, Item] = {}
     for key, node in flow.nodes.items():
         if node["kind"] not in ("take", "subscription"):

@@ -23,10 +23,21 @@ if TYPE_CHECKING:
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 60
 _INDENT = 4
-_NOT_SEEN = {
-    "publication": "its publication was not seen",
-    "take": "its message was not seen",
+# Links that say something of the effect, whichever way the flow is drawn, or nothing at all.
+_OF_EFFECT = ("transport", "service", "callback", "direct")
+_REQUEST = {
     "callback": "no callback was seen",
+    "sending": "its sending was not seen",
+    "response": "no response was seen",
+}
+_NOT_SEEN = {
+    "take": {
+        "publication": "its publication was not seen",
+        "callback": "no callback was seen",
+    },
+    "callback_instance": {"take": "its message was not seen"},
+    "request": _REQUEST,
+    "response": _REQUEST,
 }
 
 
@@ -136,6 +147,11 @@ class _Painter:
             # Else who published it stands on the line of the callback run.
             is_alone = link is None or not item.causes
             return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
+        if node["kind"] == "request":
+            is_alone = link is None or not item.causes
+            return f"{place}  requests {label}" if is_alone else f"requests {label}"
+        if node["kind"] == "response":
+            return f"{place}  Client({label})"
         if node["kind"] == "callback_instance":
             return f"{place}  {label}"
         return f"{place}  Subscription({label})"
@@ -144,22 +160,28 @@ class _Painter:
         node = item.node
         if node["kind"] == "subscription":
             return [f"not taken: {_reason(link)}"]
-        details = [_waits(edge) for _, edge in item.causes if edge["link_kind"] == "transport"]
-        if link is not None and link["link_kind"] not in ("transport", "direct"):
+        details = [
+            _waits(edge) for _, edge in item.causes if edge["link_kind"] in ("transport", "service")
+        ]
+        if link is not None and link["link_kind"] not in _OF_EFFECT:
             details.append(_waits(link))
-        if item.handover is not None:
-            details.append(f"wait {format_cell(item.handover['wait_ns'], 'ns')}")
-        if node["missing"] == "end":
+        requested = [edge for _, edge in item.causes if edge["link_kind"] == "callback"]
+        for edge in [item.handover, *requested]:
+            if edge is not None:
+                details.append(f"wait {format_cell(edge['wait_ns'], 'ns')}")
+        if node["kind"] in ("request", "response"):
+            details += _transport(node)
+        elif node["missing"] == "end":
             details.append("ran NA: never seen to end")
         elif node["kind"] == "callback_instance":
             details.append(f"ran {format_duration(node['end_ns'] - node['start_ns'])}")
         elif node["kind"] == "publication" and node["end_ns"] is not None:
             details.append(f"in {format_duration(node['end_ns'] - node['start_ns'])}")
         for vertex in (item.take, node):
-            if vertex is not None and vertex["missing"] in _NOT_SEEN:
+            if vertex is not None and vertex["missing"] in _NOT_SEEN.get(vertex["kind"], {}):
                 why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
-                details.append(f"NA: {_NOT_SEEN[vertex['missing']]}{why}")
-        if node["kind"] != "publication" or not item.causes:
+                details.append(f"NA: {_NOT_SEEN[vertex['kind']][vertex['missing']]}{why}")
+        if node["kind"] not in ("publication", "request") or not item.causes:
             host = f" on {_printable(node['host'])}" if self.has_hosts else ""
             details.append(f"thread {_printable(node['thread'])}{host}")
         if node["symbol"]:
@@ -180,6 +202,14 @@ def _waits(edge: Row) -> str:
     if edge["is_loss_affected"]:
         doubts.append("events were lost here")
     return f"{text} ({', '.join(doubts)})" if doubts else text
+
+
+def _transport(node: Row) -> list[str]:
+    if node["missing"] == "sending":
+        return []
+    if node["end_ns"] is None:
+        return ["NA: it was not taken"]
+    return [f"transport {format_duration(node['end_ns'] - node['start_ns'])}"]
 
 
 def _reason(row: Row | None) -> str:

@@ -33,11 +33,13 @@ GROUP BY views.view_name
 ORDER BY views.view_name
 """
 # When the thing of a row happened, by the first of these columns that a view has …
-_TIMES = ("start_ns", "taken_ns", "sent_ns", "at_ns", "from_ns")
+_TIMES = ("start_ns", "sent_ns", "taken_ns", "at_ns", "from_ns")
+# (of a request or response whose sending was not seen: when it was taken)
+_SENT = "coalesce(sent_ns, taken_ns)"
 # … else when the first of these things happened: of a link, its cause.
 _THINGS = (
-    ("request", "sent_ns"),
-    ("response", "sent_ns"),
+    ("request", _SENT),
+    ("response", _SENT),
     ("callback_instance", "start_ns"),
     ("publication", "start_ns"),
     ("take", "taken_ns"),
@@ -99,7 +101,8 @@ class Selection:
             return None
         for name in _TIMES:
             if name in columns:
-                return f"{name} >= $start_ns AND {name} < $end_ns"
+                time = _SENT if name == "sent_ns" else name
+                return f"{time} >= $start_ns AND {time} < $end_ns"
         for thing, name in _THINGS:
             if f"{thing}_id" in columns:
                 return (

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 DIRECTIONS = ("forward", "backward", "both")
-KINDS = ("publication", "take", "callback_instance")
+KINDS = ("publication", "take", "callback_instance", "request", "response")
 STEPS_PER_MESSAGE = 3
 MOST_VERTICES = 10_000
 
@@ -141,7 +141,7 @@ def read_steps(
         direction: one of `DIRECTIONS`.
         depth: most messages in a row, each way.
         limit: most vertices.
-        internal: follow effects on ROS's own topics too.
+        internal: follow effects on ROS's own topics and services too.
 
     Raises:
         UsageError: a direction, depth or limit that cannot be.

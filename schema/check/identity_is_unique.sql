@@ -1,8 +1,9 @@
 -- name: check.identity_is_unique
--- description: Publications, takes and runs of callbacks have an identity of their own.
+-- description: Publications, takes, runs of callbacks, requests and responses have an identity of
+--     their own.
 -- grain: one row per identity used twice
 -- severity: error
--- needs: store.publication, store.take, store.callback_instance
+-- needs: store.publication, store.take, store.callback_instance, store.request, store.response
 SELECT run_id, 'publication' AS kind, publication_id AS id
 FROM store.publication
 GROUP BY run_id, publication_id
@@ -16,4 +17,14 @@ UNION ALL
 SELECT run_id, 'callback_instance', callback_instance_id
 FROM store.callback_instance
 GROUP BY run_id, callback_instance_id
+HAVING count(*) > 1
+UNION ALL
+SELECT run_id, 'request', request_id
+FROM store.request
+GROUP BY run_id, request_id
+HAVING count(*) > 1
+UNION ALL
+SELECT run_id, 'response', response_id
+FROM store.response
+GROUP BY run_id, response_id
 HAVING count(*) > 1

@@ -1,9 +1,11 @@
 -- name: derive.flow_link
--- description: All links in one shape: publication to take, take to the callback run that it was
---     for, callback run (or a take outside of any) to publication. Self loops are left out: flows
---     do not pass through them.
+-- description: All links in one shape: publication to take, take or request to the callback run
+--     that it was for, callback run (or a take outside of any) to publication, callback run to
+--     request or response. Where no service callback was traced, a response comes from its
+--     request. Self loops are left out: flows do not pass through them.
 -- grain: one row per link
--- needs: store.link_transport, store.link_causal, store.callback_instance
+-- needs: store.link_transport, store.link_causal, store.callback_instance, store.link_request,
+--     store.link_response, store.response
 SELECT
     run_id,
     'publication' AS from_kind, publication_id AS from_id,
@@ -27,3 +29,35 @@ SELECT
     'publication', publication_id,
     kind
 FROM store.link_causal
+UNION ALL
+SELECT
+    run_id,
+    'callback_instance', callback_instance_id,
+    'request', request_id,
+    'direct'
+FROM store.link_request
+WHERE callback_instance_id IS NOT NULL
+UNION ALL
+SELECT
+    run_id,
+    'request', request_id,
+    'callback_instance', callback_instance_id,
+    'callback'
+FROM store.callback_instance
+WHERE request_id IS NOT NULL
+UNION ALL
+SELECT
+    l.run_id,
+    'callback_instance', l.callback_instance_id,
+    'response', l.response_id,
+    CASE WHEN l.callback_instance_id = r.callback_instance_id THEN 'service' ELSE 'direct' END
+FROM store.link_response AS l
+JOIN store.response AS r ON l.response_id = r.response_id
+UNION ALL
+SELECT
+    run_id,
+    'request', request_id,
+    'response', response_id,
+    'service'
+FROM store.response
+WHERE callback_instance_id IS NULL AND request_id IS NOT NULL

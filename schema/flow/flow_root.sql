@@ -1,16 +1,28 @@
 -- name: derive.flow_root
 -- description: Where the flow of each publication can be said to begin: with the run of the timer
---     (or other callback without a message) that published it, else with the publication itself.
---     It is a source where no taken message led to it.
+--     (or other callback without a message) that published it or called the service that did,
+--     else with the publication itself. It is a source where no taken message led to it.
 -- grain: one row per publication on a topic of the application
--- needs: store.publication, store.publisher, store.link_causal
-WITH cause AS (
+-- needs: store.publication, store.publisher, store.link_causal, store.callback_instance,
+--     derive.flow_caller
+WITH run AS (
+    SELECT l.run_id, l.publication_id, l.callback_instance_id, l.take_id
+    FROM store.link_causal AS l
+    ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
+    UNION ALL
+    SELECT l.run_id, l.publication_id, i.callback_instance_id, i.take_id
+    FROM store.link_causal AS l
+    JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
+    JOIN store.callback_instance AS i ON c.caller_id = i.callback_instance_id
+    ANTI JOIN derive.flow_caller AS f ON c.caller_id = f.callback_instance_id
+),
+cause AS (
     SELECT
         run_id,
         publication_id,
         bool_or(take_id IS NOT NULL) AS has_message,
         min(CASE WHEN take_id IS NULL THEN callback_instance_id END) AS callback_instance_id
-    FROM store.link_causal
+    FROM run
     GROUP BY run_id, publication_id
 )
 SELECT

@@ -1,8 +1,10 @@
 -- name: staging.callback
 -- description: Callback objects. One that ran but whose creation was not traced gets a row, and
---     learns its subscription from the takes that it was called with (the most frequent).
+--     learns its subscription or service from the messages that it was called with (the most
+--     frequent).
 -- grain: one row per callback object
--- needs: staging.callback_known, staging.callback_binding, staging.subscription, staging.take
+-- needs: staging.callback_known, staging.callback_binding, staging.subscription, staging.take,
+--     staging.service, staging.service_event, staging.request_callback
 WITH learned AS (
     SELECT
         b.process_id,
@@ -12,6 +14,18 @@ WITH learned AS (
     FROM staging.callback_binding AS b
     JOIN staging.take AS t ON b.start_event_id = t.callback_start_event_id
     WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
+    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
+),
+learned_service AS (
+    SELECT
+        b.process_id,
+        b.callback_handle,
+        b.callback_event_id,
+        mode(s.service_id ORDER BY s.service_id) AS service_id
+    FROM staging.callback_binding AS b
+    JOIN staging.request_callback AS r ON b.start_event_id = r.start_event_id
+    JOIN staging.service_event AS e ON r.take_event_id = e.event_id
+    JOIN staging.service AS s ON e.service_event_id = s.event_id
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),
 never_added AS (
@@ -33,11 +47,15 @@ every_callback AS (
 ),
 complete AS (
     SELECT
-        c.event_id, c.process_id, c.timer_id, c.service_id, c.callback_handle, c.symbol,
-        c.created_ns,
+        c.event_id, c.process_id, c.timer_id, c.callback_handle, c.symbol, c.created_ns,
         coalesce(c.subscription_id, l.subscription_id) AS subscription_id,
-        CASE WHEN c.kind = 'unknown' AND l.subscription_id IS NOT NULL THEN 'subscription'
-            ELSE c.kind END AS kind,
+        coalesce(c.service_id, v.service_id) AS service_id,
+        CASE
+            WHEN c.kind <> 'unknown' THEN c.kind
+            WHEN l.subscription_id IS NOT NULL THEN 'subscription'
+            WHEN v.service_id IS NOT NULL THEN 'service'
+            ELSE c.kind
+        END AS kind,
         c.node_id
     FROM every_callback AS c
     LEFT JOIN learned AS l
@@ -46,6 +64,12 @@ complete AS (
         AND c.process_id = l.process_id
         AND c.callback_handle = l.callback_handle
         AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
+    LEFT JOIN learned_service AS v
+        ON c.service_id IS NULL
+        AND c.kind IN ('unknown', 'service')
+        AND c.process_id = v.process_id
+        AND c.callback_handle = v.callback_handle
+        AND c.callback_event_id IS NOT DISTINCT FROM v.callback_event_id
 )
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS callback_id,

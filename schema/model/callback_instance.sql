@@ -3,7 +3,7 @@
 --     each is nested in.
 -- grain: one row per run of a callback
 -- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take,
---     staging.beside_gap
+--     staging.beside_gap, staging.request_origin
 WITH callback_of AS (
     SELECT b.start_event_id, c.callback_id
     FROM staging.callback_binding AS b
@@ -74,9 +74,10 @@ touched AS (
 )
 SELECT
     n.callback_instance_id, n.trace_id, n.callback_id, n.process_id, n.thread_id, n.start_ns,
-    n.end_ns, n.take_id, NULL::BIGINT AS request_id, n.is_intra_process, p.parent_id, n.depth,
+    n.end_ns, n.take_id, q.request_id, n.is_intra_process, p.parent_id, n.depth,
     n.start_event_id, n.end_event_id, n.effective_end_event_id,
     g.callback_instance_id IS NOT NULL AS is_loss_affected
 FROM numbered AS n
 LEFT JOIN nested AS p ON n.callback_instance_id = p.callback_instance_id
 LEFT JOIN touched AS g ON n.callback_instance_id = g.callback_instance_id
+LEFT JOIN staging.request_origin AS q ON n.start_event_id = q.callback_start_event_id

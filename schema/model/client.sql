@@ -1,25 +1,34 @@
 -- name: staging.client
--- description: Service clients, with the GID by which servers know them (since Kilted).
+-- description: Service clients. A handle that was used but never initialised in the trace gets a
+--     row without node, and the name of the service that it turned out to call.
 -- grain: one row per client
--- needs: staging.located, staging.object_node, staging.is_internal_service, staging.gid_bytes
-WITH rmw_init AS (
-    SELECT event_id, process_id, rmw_client_handle, staging.gid_bytes(gid) AS gid
-    FROM staging.located('ros2_rmw_client_init')
+-- needs: staging.client_known, staging.client_event, staging.client_gid, staging.service_use,
+--     staging.service_known, staging.is_internal_service
+WITH learned AS (
+    SELECT u.client_event_id, mode(s.service_name ORDER BY s.service_name) AS service_name
+    FROM staging.service_use AS u
+    JOIN staging.service_known AS s ON u.service_event_id = s.event_id
+    GROUP BY u.client_event_id
+),
+every_client AS (
+    SELECT event_id, process_id, node_id, service_name, client_handle, rmw_handle, created_ns
+    FROM staging.client_known
+    UNION ALL
+    SELECT e.event_id, e.process_id, NULL, l.service_name, NULL, e.rmw_handle, NULL
+    FROM staging.client_event AS e
+    LEFT JOIN learned AS l ON e.event_id = l.client_event_id
+    WHERE e.is_inferred AND e.event_id = e.client_event_id
 )
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS client_id,
     c.process_id,
-    n.node_id,
+    c.node_id,
     c.service_name,
     c.client_handle,
-    c.rmw_client_handle AS rmw_handle,
-    r.gid,
-    c.ts_ns AS created_ns,
+    c.rmw_handle,
+    g.gid,
+    c.created_ns,
     staging.is_internal_service(c.service_name) AS is_internal,
     c.event_id
-FROM staging.located('ros2_rcl_client_init') AS c
-ASOF LEFT JOIN rmw_init AS r
-    ON c.process_id = r.process_id
-    AND c.rmw_client_handle = r.rmw_client_handle
-    AND c.event_id >= r.event_id
-LEFT JOIN staging.object_node AS n ON c.event_id = n.event_id
+FROM every_client AS c
+LEFT JOIN staging.client_gid AS g ON c.event_id = g.client_event_id

@@ -4,7 +4,9 @@
 -- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
 --     staging.callback_instance, staging.callback_left_over,
 --     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host,
---     staging.trace_overlap, staging.source, staging.publisher_known, staging.subscription_known
+--     staging.trace_overlap, staging.source, staging.publisher_known, staging.subscription_known,
+--     staging.client, staging.service, staging.client_event, staging.service_event,
+--     staging.client_gid, staging.request_pair
 WITH unmatched_end AS (
     SELECT trace_index
     FROM staging.callback_left_over
@@ -44,6 +46,19 @@ inferred AS (
     SELECT 'subscription', process_id FROM staging.subscription WHERE is_inferred
     UNION ALL
     SELECT 'callback', process_id FROM staging.callback WHERE created_ns IS NULL
+    UNION ALL
+    SELECT 'client', process_id FROM staging.client WHERE created_ns IS NULL
+    UNION ALL
+    SELECT 'service', process_id FROM staging.service WHERE created_ns IS NULL
+),
+ambiguous_request AS (
+    SELECT DISTINCT t.event_id
+    FROM staging.service_event AS t
+    JOIN staging.client_gid AS g ON t.gid = g.gid
+    JOIN staging.client_event AS s
+        ON g.client_event_id = s.client_event_id AND t.sequence_number = s.sequence_number
+    ANTI JOIN staging.request_pair AS p ON t.event_id = p.take_event_id
+    WHERE t.is_request AND s.is_request
 )
 SELECT
     trace_index + 1 AS trace_id,
@@ -160,4 +175,14 @@ SELECT
     || string_agg(DISTINCT topic_name, ', ' ORDER BY topic_name)
 FROM initialised
 WHERE topic_name = previous_topic
+HAVING count(*) > 0
+UNION ALL
+SELECT
+    NULL,
+    'ambiguous_request',
+    'warning',
+    count(*),
+    'requests taken by a service that several of the same client and number could have been: they '
+    || 'are left without a sender'
+FROM ambiguous_request
 HAVING count(*) > 0

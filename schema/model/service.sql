@@ -1,17 +1,33 @@
 -- name: staging.service
--- description: Services. No tracepoint tells their GID.
+-- description: Services. A handle that was used but never initialised in the trace gets a row
+--     without node, and the name that its clients call it by.
 -- grain: one row per service
--- needs: staging.located, staging.object_node, staging.is_internal_service
+-- needs: staging.service_known, staging.service_event, staging.service_use,
+--     staging.client_known, staging.is_internal_service
+WITH learned AS (
+    SELECT u.service_event_id, mode(c.service_name ORDER BY c.service_name) AS service_name
+    FROM staging.service_use AS u
+    JOIN staging.client_known AS c ON u.client_event_id = c.event_id
+    GROUP BY u.service_event_id
+),
+every_service AS (
+    SELECT event_id, process_id, node_id, service_name, service_handle, rmw_handle, created_ns
+    FROM staging.service_known
+    UNION ALL
+    SELECT e.event_id, e.process_id, NULL, l.service_name, NULL, e.rmw_handle, NULL
+    FROM staging.service_event AS e
+    LEFT JOIN learned AS l ON e.event_id = l.service_event_id
+    WHERE e.is_inferred AND e.event_id = e.service_event_id
+)
 SELECT
-    row_number() OVER (ORDER BY s.event_id) AS service_id,
-    s.process_id,
-    n.node_id,
-    s.service_name,
-    s.service_handle,
-    s.rmw_service_handle AS rmw_handle,
+    row_number() OVER (ORDER BY event_id) AS service_id,
+    process_id,
+    node_id,
+    service_name,
+    service_handle,
+    rmw_handle,
     NULL::BLOB AS gid,
-    s.ts_ns AS created_ns,
-    staging.is_internal_service(s.service_name) AS is_internal,
-    s.event_id
-FROM staging.located('ros2_rcl_service_init') AS s
-LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id
+    created_ns,
+    staging.is_internal_service(service_name) AS is_internal,
+    event_id
+FROM every_service

@@ -1,12 +1,15 @@
 -- name: main.flow_both
 -- kind: macro
--- description: The flow of one message: everything that a publication, take or callback run causes
---     and is caused by, itself included. What its causes lead to besides is left out.
+-- description: The flow of one message: everything that a publication, take, callback run, request
+--     or response causes and is caused by, itself included. What its causes lead to besides is
+--     left out.
 -- grain: one row per vertex
--- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
 -- param: max_depth INTEGER = NULL  Most steps; any number when NULL
--- column: kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- column: id BIGINT  Identity of the vertex
 -- needs: main.flow_forward, main.flow_backward
 CREATE OR REPLACE MACRO main.flow_both(start_kind, start_id, max_depth := NULL) AS TABLE

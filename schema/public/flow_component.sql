@@ -1,12 +1,14 @@
 -- name: main.flow_component
 -- kind: macro
--- description: Everything that a publication, take or callback run is connected with in any
---     direction, itself included.
+-- description: Everything that a publication, take, callback run, request or response is connected
+--     with in any direction, itself included.
 -- grain: one row per vertex
--- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
 -- param: max_depth INTEGER = NULL  Most steps; any number when NULL
--- column: kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- column: id BIGINT  Identity of the vertex
 -- needs: derive.graph_reachable, derive.flow_link_undirected
 CREATE OR REPLACE MACRO main.flow_component(start_kind, start_id, max_depth := NULL) AS TABLE

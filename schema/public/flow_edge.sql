@@ -3,15 +3,18 @@
 --     that a message takes.
 -- grain: one row per link
 -- column: run_id BIGINT  Run that the row belongs to
--- column: from_kind VARCHAR  Cause: 'publication', 'take' or 'callback_instance'
+-- column: from_kind VARCHAR  Cause: 'publication', 'take', 'callback_instance' or 'request'
 -- column: from_id BIGINT  Identity of the cause
--- column: to_kind VARCHAR  Effect, likewise
+-- column: to_kind VARCHAR  Effect: likewise, or 'response'
 -- column: to_id BIGINT  Identity of the effect
--- column: link_kind VARCHAR  'transport', 'callback', or the kind of the causal link
--- column: from_ns BIGINT [epoch ns]  End of the publication, the take, or start of the callback run
--- column: to_ns BIGINT [epoch ns]  Take, start of the callback run, or start of the publication
+-- column: link_kind VARCHAR  'transport', 'callback', 'service' (from a request to its response),
+--     or the kind of the causal link
+-- column: from_ns BIGINT [epoch ns]  End of the publication, the take (also of a request), or start
+--     of the callback run
+-- column: to_ns BIGINT [epoch ns]  Take, start of the callback run or publication, or sending of
+--     the request or response
 -- needs: main.link_transport, main.link_causal, main.publication, main.take,
---     main.callback_instance
+--     main.callback_instance, main.link_request, main.link_response, main.request, main.response
 SELECT
     l.run_id,
     'publication' AS from_kind,
@@ -53,3 +56,54 @@ LEFT JOIN main.callback_instance AS i
 LEFT JOIN main.take AS t
     ON l.callback_instance_id IS NULL AND l.take_id = t.take_id
 JOIN main.publication AS b ON l.publication_id = b.publication_id
+UNION ALL
+SELECT
+    l.run_id,
+    'callback_instance',
+    l.callback_instance_id,
+    'request',
+    l.request_id,
+    'direct',
+    i.start_ns,
+    q.sent_ns
+FROM main.link_request AS l
+JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+JOIN main.request AS q ON l.request_id = q.request_id
+UNION ALL
+SELECT
+    i.run_id,
+    'request',
+    q.request_id,
+    'callback_instance',
+    i.callback_instance_id,
+    'callback',
+    q.taken_ns,
+    i.start_ns
+FROM main.callback_instance AS i
+JOIN main.request AS q ON i.request_id = q.request_id
+UNION ALL
+SELECT
+    l.run_id,
+    'callback_instance',
+    l.callback_instance_id,
+    'response',
+    l.response_id,
+    CASE WHEN l.callback_instance_id = r.callback_instance_id THEN 'service' ELSE 'direct' END,
+    i.start_ns,
+    coalesce(r.sent_ns, r.taken_ns)
+FROM main.link_response AS l
+JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+JOIN main.response AS r ON l.response_id = r.response_id
+UNION ALL
+SELECT
+    r.run_id,
+    'request',
+    q.request_id,
+    'response',
+    r.response_id,
+    'service',
+    coalesce(q.taken_ns, q.sent_ns),
+    coalesce(r.sent_ns, r.taken_ns)
+FROM main.response AS r
+JOIN main.request AS q ON r.request_id = q.request_id
+WHERE r.callback_instance_id IS NULL

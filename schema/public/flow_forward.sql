@@ -1,12 +1,14 @@
 -- name: main.flow_forward
 -- kind: macro
--- description: Everything that a publication, take or callback run causes, directly or through
---     others, itself included.
+-- description: Everything that a publication, take, callback run, request or response causes,
+--     directly or through others, itself included.
 -- grain: one row per vertex
--- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
 -- param: max_depth INTEGER = NULL  Most steps; any number when NULL
--- column: kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- column: id BIGINT  Identity of the vertex
 -- needs: derive.graph_reachable, derive.flow_link
 CREATE OR REPLACE MACRO main.flow_forward(start_kind, start_id, max_depth := NULL) AS TABLE

@@ -1,47 +1,52 @@
 -- name: main.flow_step
 -- kind: macro
--- description: The picture of one message: what a publication, take or callback run causes, what it
---     is caused by, or both, with times, names, and what is missing where a branch ends. Vertices
---     nearest to the start come first where a limit cuts the flow.
+-- description: The picture of one message: what a publication, take, callback run, request or
+--     response causes, what it is caused by, or both, with times, names, and what is missing where
+--     a branch ends. Vertices nearest to the start come first where a limit cuts the flow.
 -- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
 --     does), and one per subscription that did not get a message
--- param: start_kind VARCHAR  'publication', 'take' or 'callback_instance'
+-- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
 -- param: max_depth INTEGER = 96  Most steps from the start; a message is three of them
 -- param: max_vertices INTEGER = 1000  Most vertices
--- param: internal BOOLEAN = false  Follow effects on ROS's own topics too
+-- param: internal BOOLEAN = false  Follow effects on ROS's own topics and services too
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: depth INTEGER  Steps from the start; negative: backward
 -- column: from_kind VARCHAR  Cause that the link comes from, as kind
 -- column: from_id BIGINT  Identity of the cause
--- column: link_kind VARCHAR  'transport', 'callback', the kind of the causal link, or 'not_taken'
---     to a subscription that did not get the message
+-- column: link_kind VARCHAR  'transport', 'callback', 'service', the kind of the causal link, or
+--     'not_taken' to a subscription that did not get the message
 -- column: wait_ns BIGINT [ns]  Time between cause and effect; NULL where the effect is part of the
 --     cause
 -- column: candidate_count BIGINT  Causes that it could have been
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
--- column: kind VARCHAR  'publication', 'take', 'callback_instance', or 'subscription' where the
---     message was not taken
+-- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request', 'response', or
+--     'subscription' where the message was not taken
 -- column: id BIGINT  Identity of the vertex
--- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback run; the take
--- column: end_ns BIGINT [epoch ns]  Its end
--- column: node VARCHAR  Node, or process in brackets
--- column: label VARCHAR  What it is: a topic, or what triggers the callback
+-- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback run; the take; when the
+--     request or response was sent (taken, where that is all there is)
+-- column: end_ns BIGINT [epoch ns]  Its end; when the request or response was taken
+-- column: node VARCHAR  Node, or process in brackets; of requests and responses that of the client,
+--     ? where it is not known
+-- column: label VARCHAR  What it is: a topic or service, or what triggers the callback
 -- column: topic_name VARCHAR  Topic of the message
 -- column: symbol VARCHAR  Function of the callback
 -- column: thread VARCHAR  Name and id of the thread
 -- column: host VARCHAR  Machine or container
 -- column: missing VARCHAR  What the trace does not show here: 'publication' that was taken, 'take'
---     of the message, 'callback' it was taken for, or the 'end' of the callback run
+--     of the message, 'callback' it was taken for, 'sending' of the request or response,
+--     'response' to the request, or the 'end' of the callback run
 -- column: reason VARCHAR  Why it is missing, as far as known
 -- column: cut_count BIGINT  Links that lead on from here beyond the limits
--- column: internal_count BIGINT  Effects on ROS's own topics that are left out
+-- column: internal_count BIGINT  Effects on ROS's own topics and services that are left out
 -- needs: store.publication, store.take, store.callback_instance, store.link_causal,
 --     store.link_transport, store.publisher, store.subscription, store.node, store.process,
---     store.thread, store.host, store.callback, derive.vertex_key, derive.vertex_kind,
+--     store.thread, store.host, store.callback, store.request, store.response, store.client,
+--     store.service, store.link_request, derive.vertex_key, derive.vertex_kind,
 --     derive.flow_link, derive.flow_end, derive.node_label,
---     main.publication, main.take, main.callback_instance, main.callback_label
+--     main.publication, main.take, main.callback_instance, main.callback_label, main.request,
+--     main.response
 CREATE OR REPLACE MACRO main.flow_step(
     start_kind, start_id, direction := 'both', max_depth := 96, max_vertices := 1000,
     internal := false
@@ -55,8 +60,14 @@ WITH RECURSIVE origin AS MATERIALIZED (
     UNION ALL
     SELECT run_id FROM store.callback_instance
     WHERE start_kind = 'callback_instance' AND callback_instance_id = start_id
+    UNION ALL
+    SELECT run_id FROM store.request
+    WHERE start_kind = 'request' AND request_id = start_id
+    UNION ALL
+    SELECT run_id FROM store.response
+    WHERE start_kind = 'response' AND response_id = start_id
 ),
--- Effects on ROS's own topics: no branches of the picture.
+-- Effects on ROS's own topics and services: no branches of the picture.
 aside AS MATERIALIZED (
     SELECT
         CASE WHEN l.callback_instance_id IS NULL THEN derive.vertex_key('take', l.take_id)
@@ -65,6 +76,14 @@ aside AS MATERIALIZED (
     FROM store.link_causal AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE p.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
+    UNION ALL
+    SELECT
+        derive.vertex_key('callback_instance', l.callback_instance_id),
+        derive.vertex_key('request', l.request_id)
+    FROM store.link_request AS l
+    JOIN store.request AS q ON l.request_id = q.request_id
+    JOIN store.client AS c ON q.client_id = c.client_id
+    WHERE c.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
 ),
 link AS (
     SELECT
@@ -184,6 +203,56 @@ described AS MATERIALIZED (
     JOIN main.callback_label AS c ON i.callback_id = c.callback_id
     LEFT JOIN store.subscription AS s ON k.subscription_id = s.subscription_id
     WHERE v.kind = 'callback_instance'
+    UNION ALL
+    SELECT
+        v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
+        coalesce(q.sender_thread_id, q.receiver_thread_id),
+        h.process_id,
+        CASE WHEN c.client_id IS NULL THEN '?'
+            ELSE derive.node_label(n.full_name, o.name, o.pid) END,
+        coalesce(c.service_name, s.service_name, '?'),
+        NULL,
+        NULL,
+        CASE
+            WHEN q.sent_ns IS NULL THEN 'sending'
+            WHEN q.taken_ns IS NULL THEN 'take'
+            WHEN q.callback_instance_id IS NULL THEN 'callback'
+            WHEN r.request_id IS NULL THEN 'response'
+        END,
+        NULL
+    FROM vertex AS v
+    JOIN main.request AS q ON v.id = q.request_id
+    JOIN store.thread AS h ON coalesce(q.sender_thread_id, q.receiver_thread_id) = h.thread_id
+    LEFT JOIN store.client AS c ON q.client_id = c.client_id
+    LEFT JOIN store.service AS s ON q.service_id = s.service_id
+    LEFT JOIN store.process AS o ON c.process_id = o.process_id
+    LEFT JOIN store.node AS n ON c.node_id = n.node_id
+    LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
+        ON q.request_id = r.request_id
+    WHERE v.kind = 'request'
+    UNION ALL
+    SELECT
+        v.key, v.kind, v.id, v.depth, r.run_id, coalesce(r.sent_ns, r.taken_ns), r.taken_ns,
+        coalesce(r.receiver_thread_id, r.sender_thread_id),
+        h.process_id,
+        CASE WHEN c.client_id IS NULL THEN '?'
+            ELSE derive.node_label(n.full_name, o.name, o.pid) END,
+        coalesce(c.service_name, s.service_name, '?'),
+        NULL,
+        NULL,
+        CASE
+            WHEN r.sent_ns IS NULL THEN 'sending'
+            WHEN r.taken_ns IS NULL THEN 'take'
+        END,
+        NULL
+    FROM vertex AS v
+    JOIN main.response AS r ON v.id = r.response_id
+    JOIN store.thread AS h ON coalesce(r.receiver_thread_id, r.sender_thread_id) = h.thread_id
+    LEFT JOIN store.client AS c ON r.client_id = c.client_id
+    LEFT JOIN store.service AS s ON r.service_id = s.service_id
+    LEFT JOIN store.process AS o ON c.process_id = o.process_id
+    LEFT JOIN store.node AS n ON c.node_id = n.node_id
+    WHERE v.kind = 'response'
 ),
 arrow AS MATERIALIZED (
     SELECT
@@ -205,6 +274,7 @@ SELECT
             'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent'
         )
             THEN d.start_ns - f.end_ns
+        WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns
     END AS wait_ns,
     coalesce(lt.candidate_count, lc.candidate_count) AS candidate_count,
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,

@@ -11,6 +11,7 @@
 -- column: sender_thread_id BIGINT  Thread that sent it
 -- column: receiver_thread_id BIGINT  Thread that took it
 -- column: callback_instance_id BIGINT  Service callback it came from
+-- column: request_id BIGINT  Request that it answers
 -- needs: store.response, store.thread, derive.corrected_ns, derive.process_clock
 SELECT
     self.response_id,
@@ -22,7 +23,8 @@ SELECT
     derive.corrected_ns(self.taken_ns, r.offset_ns, r.drift_ppb, r.reference_ns) AS taken_ns,
     self.sender_thread_id,
     self.receiver_thread_id,
-    self.callback_instance_id
+    self.callback_instance_id,
+    self.request_id
 FROM store.response AS self
 LEFT JOIN store.thread AS st ON self.sender_thread_id = st.thread_id
 LEFT JOIN derive.process_clock AS s ON st.process_id = s.process_id

@@ -72,6 +72,38 @@ def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> No
     ]
 
 
+def test_calls_of_services(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("services_forward", empty_database, tmp_path) as database:
+        flow = database.flow(callback_instance_id=5)
+        answered = str(database.flow(response_id=1, direction="backward")).splitlines()
+        unknown = str(database.flow(request_id=3, direction="forward")).splitlines()
+    thread = "  thread thread 1"
+    assert str(flow).splitlines() == [
+        "callback_instance 5, Timer(2 ms); times count from 1970-01-01T00:00:00.000000500Z",
+        f"  +0 ns  /caller  Timer(2 ms)  ran 30 ns{thread}  call  ◀",
+        "├──  +10 ns  requests /add  transport 80 ns",
+        f"│   +100 ns  /server  Service(/add)  wait 10 ns  ran 50 ns{thread}  add",
+        "│   ├── +120 ns  publishes /result  in 5 ns",
+        "│   │   +200 ns  /sink  Subscription(/result)  transport 65 ns  wait 10 ns  ran 20 ns"
+        f"{thread}  on_result",
+        f"│   └── +152 ns  /caller  Client(/add)  service 2 ns  NA: it was not taken{thread}",
+        "├──  +20 ns  requests /sub  transport 40 ns  NA: no callback was seen",
+        f"│    +70 ns  /caller  Client(/sub)  service 10 ns  transport 10 ns{thread}",
+        "└──  +26 ns  requests /sub  transport 40 ns  NA: no callback was seen",
+    ]
+    assert flow.notes == [
+        "1 message on topics and services of ROS itself left out; --internal shows them"
+    ]
+    assert answered[1:5] == [
+        f"  +0 ns  /caller  Client(/add)  service 2 ns  transport 18 ns{thread}",
+        f" -52 ns  /server  Service(/add)  wait 10 ns  ran 50 ns{thread}  add",
+        "-142 ns  requests /add  transport 80 ns",
+        "-152 ns  /caller  Subscription(/tick)  transport 78 ns  wait 10 ns  ran 30 ns"
+        f"{thread}  on_tick",
+    ]
+    assert unknown[1] == (f"  +0 ns  ?  requests /add  NA: its sending was not seen{thread}")
+
+
 def test_backward_ends_at_one_cause_twice(robot: Database) -> None:
     lines = str(robot.flow("/tracks", direction="backward")).splitlines()
     assert [line.split(" ns")[0].strip() + " ns" for line in lines[1:]] == [
@@ -123,7 +155,7 @@ def test_limits_are_said(robot: Database) -> None:
     flow = robot.flow("/image", direction="forward", depth=1)
     assert flow.is_cut
     assert flow.notes == [
-        "1 message on topics of ROS itself left out; --internal shows them",
+        "1 message on topics and services of ROS itself left out; --internal shows them",
         "the flow goes on at 1 place beyond --depth 1",
     ]
     cut = robot.flow("/image", direction="forward", limit=3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
+from typing import Any
 
 import duckdb
 import pytest
@@ -116,22 +117,32 @@ def test_a_long_cycle_costs_no_more_than_its_length(walker: duckdb.DuckDBPyConne
     ).fetchall() == [(500,)]
 
 
-# Links of any shape, as no trace would have them: run 1 with takes, publications and callback
-# runs 1 to 4, each callback run with at most one take.
+# Links of any shape, as no trace would have them: run 1 with takes, publications, callback runs,
+# requests and responses 1 to 4, each callback run with at most one take and one request.
 LINKS = st.fixed_dictionaries(
     {
         "transport": st.lists(st.tuples(st.integers(1, 4), st.integers(1, 4)), max_size=6),
         "causal": st.lists(st.tuples(st.integers(1, 4), st.integers(1, 4)), max_size=6),
         "taken": st.lists(st.none() | st.integers(1, 4), min_size=4, max_size=4),
+        "requested": st.lists(st.tuples(st.integers(1, 4), st.integers(1, 4)), max_size=4),
+        "called": st.lists(st.none() | st.integers(1, 4), min_size=4, max_size=4),
+        "answered": st.lists(st.tuples(st.integers(1, 4), st.integers(1, 4)), max_size=4),
+        "replied": st.lists(st.none() | st.integers(1, 4), min_size=4, max_size=4),
     }
 )
-KINDS = ("publication", "take", "callback_instance")
+KINDS = ("publication", "take", "callback_instance", "request", "response")
 
 
-def store_links(con: duckdb.DuckDBPyConnection, links: dict[str, list[tuple[int, int]]]) -> None:
-    con.execute("DELETE FROM store.link_transport")
-    con.execute("DELETE FROM store.link_causal")
-    con.execute("DELETE FROM store.callback_instance")
+def store_links(con: duckdb.DuckDBPyConnection, links: dict[str, list[Any]]) -> None:
+    for table in (
+        "link_transport",
+        "link_causal",
+        "link_request",
+        "link_response",
+        "callback_instance",
+        "response",
+    ):
+        con.execute(f"DELETE FROM store.{table}")
     for publication, take in links["transport"]:
         con.execute(
             "INSERT INTO store.link_transport (run_id, publication_id, take_id, method, "
@@ -144,12 +155,30 @@ def store_links(con: duckdb.DuckDBPyConnection, links: dict[str, list[tuple[int,
             "is_loss_affected) VALUES (1, ?, ?, 'direct', false)",
             [callback, publication],
         )
-    for number, take in enumerate(links["taken"], start=1):
+    for callback, request in links["requested"]:
+        con.execute(
+            "INSERT INTO store.link_request (run_id, callback_instance_id, request_id) "
+            "VALUES (1, ?, ?)",
+            [callback, request],
+        )
+    for callback, response in links["answered"]:
+        con.execute(
+            "INSERT INTO store.link_response (run_id, callback_instance_id, response_id) "
+            "VALUES (1, ?, ?)",
+            [callback, response],
+        )
+    for number, request in enumerate(links["replied"], start=1):
+        con.execute(
+            "INSERT INTO store.response (response_id, run_id, request_id) VALUES (?, 1, ?)",
+            [number, request],
+        )
+    pairs = zip(links["taken"], links["called"], strict=True)
+    for number, (take, request) in enumerate(pairs, start=1):
         con.execute(
             "INSERT INTO store.callback_instance (callback_instance_id, run_id, trace_id, "
-            "callback_id, process_id, thread_id, start_ns, take_id, is_intra_process, depth) "
-            "VALUES (?, 1, 1, 1, 1, 1, 0, ?, false, 1)",
-            [number, take],
+            "callback_id, process_id, thread_id, start_ns, take_id, request_id, "
+            "is_intra_process, depth) VALUES (?, 1, 1, 1, 1, 1, 0, ?, ?, false, 1)",
+            [number, take, request],
         )
 
 
@@ -159,7 +188,7 @@ def walk(con: duckdb.DuckDBPyConnection, macro: str, name: str, number: int) -> 
 
 @settings(EXAMPLES, max_examples=4)
 @given(links=LINKS)
-def test_directions_agree(analysis: Analysis, links: dict[str, list[tuple[int, int]]]) -> None:
+def test_directions_agree(analysis: Analysis, links: dict[str, list[Any]]) -> None:
     """Forward from a reaches b exactly when backward from b reaches a."""
     con = analysis.connection
     con.begin()

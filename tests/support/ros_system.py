@@ -14,6 +14,11 @@ RMW = 0x1000
 WRITER = 0x2000
 
 
+def gid_of(number: int, length: int = 16) -> list[int]:
+    """Return a GID told from others by its first byte; what comes after 16 bytes is garbage."""
+    return [number, *[1] * 15, *range(number, number + length - 16)]
+
+
 class RosSystem(StagedEvents):
     """Staged events with words for the sequences that belong together.
 
@@ -203,6 +208,111 @@ class RosSystem(StagedEvents):
         return min(
             self.add(f"ros2:{layer}_take", thread, message=message, **fields[layer])
             for layer in layers.split()
+        )
+
+    def client(
+        self,
+        thread: Thread,
+        handle: int,
+        service: str,
+        *,
+        gid: int | None,
+        node: int = 0x1,
+        rmw: int | None = None,
+        length: int = 16,
+    ) -> int:
+        """rmw_client_init and rcl_client_init; the former only with a GID (see `gid_of`)."""
+        rmw_handle = handle + RMW if rmw is None else rmw
+        if gid is not None:
+            self.add(
+                "ros2:rmw_client_init",
+                thread,
+                rmw_client_handle=rmw_handle,
+                gid=gid_of(gid, length),
+            )
+        return self.add(
+            "ros2:rcl_client_init",
+            thread,
+            client_handle=handle,
+            node_handle=node,
+            rmw_client_handle=rmw_handle,
+            service_name=service,
+        )
+
+    def service(
+        self, thread: Thread, handle: int, name: str, *, callback: int | None, node: int = 0x1
+    ) -> int:
+        """rcl_service_init and, with a callback, its attachment."""
+        created = self.add(
+            "ros2:rcl_service_init",
+            thread,
+            service_handle=handle,
+            node_handle=node,
+            rmw_service_handle=handle + RMW,
+            service_name=name,
+        )
+        if callback is not None:
+            self.add(
+                "ros2:rclcpp_service_callback_added",
+                thread,
+                service_handle=handle,
+                callback=callback,
+            )
+        return created
+
+    def send_request(self, thread: Thread, handle: int, number: int) -> int:
+        """rmw_send_request of the client `handle`."""
+        return self.add(
+            "ros2:rmw_send_request",
+            thread,
+            rmw_client_handle=handle + RMW,
+            sequence_number=number,
+        )
+
+    def take_request(
+        self,
+        thread: Thread,
+        handle: int,
+        number: int,
+        *,
+        gid: int,
+        taken: int = 1,
+        length: int = 16,
+    ) -> int:
+        """rmw_take_request of the service `handle`."""
+        return self.add(
+            "ros2:rmw_take_request",
+            thread,
+            rmw_service_handle=handle + RMW,
+            client_gid=gid_of(gid, length),
+            sequence_number=number,
+            taken=taken,
+        )
+
+    def send_response(
+        self, thread: Thread, handle: int, number: int, *, gid: int, stamp: int = 0
+    ) -> int:
+        """rmw_send_response of the service `handle`."""
+        return self.add(
+            "ros2:rmw_send_response",
+            thread,
+            rmw_service_handle=handle + RMW,
+            client_gid=gid_of(gid),
+            sequence_number=number,
+            timestamp=stamp,
+        )
+
+    def take_response(
+        self, thread: Thread, handle: int, number: int, *, stamp: int = 0, taken: int = 1
+    ) -> int:
+        """rmw_take_response of the client `handle`."""
+        return self.add(
+            "ros2:rmw_take_response",
+            thread,
+            rmw_client_handle=handle + RMW,
+            sequence_number=number,
+            source_timestamp=stamp,
+            taken=taken,
         )
 
     def start(self, thread: Thread, callback: int, *, intra: bool = False) -> int:

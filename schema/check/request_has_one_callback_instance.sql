@@ -1,0 +1,12 @@
+-- name: check.request_has_one_callback_instance
+-- description: A request leads to at most one run of a callback, and both say so.
+-- grain: one row per request and run of a callback that do not agree
+-- severity: error
+-- needs: store.request, store.callback_instance
+SELECT
+    coalesce(q.run_id, i.run_id) AS run_id, coalesce(q.request_id, i.request_id) AS request_id,
+    i.callback_instance_id
+FROM store.request AS q
+FULL JOIN (SELECT * FROM store.callback_instance WHERE request_id IS NOT NULL) AS i
+    ON q.request_id = i.request_id
+WHERE q.callback_instance_id IS DISTINCT FROM i.callback_instance_id

@@ -1,0 +1,20 @@
+-- name: staging.client_known
+-- description: Service clients whose initialisation was traced, with the GID by which servers know
+--     them (since Kilted).
+-- grain: one row per rcl_client_init
+-- needs: staging.located, staging.object_node, staging.client_gid_init
+SELECT
+    c.event_id,
+    c.process_id,
+    n.node_id,
+    c.service_name,
+    c.client_handle,
+    c.rmw_client_handle AS rmw_handle,
+    r.gid,
+    c.ts_ns AS created_ns
+FROM staging.located('ros2_rcl_client_init') AS c
+ASOF LEFT JOIN staging.client_gid_init AS r
+    ON c.process_id = r.process_id
+    AND c.rmw_client_handle = r.rmw_handle
+    AND c.event_id >= r.event_id
+LEFT JOIN staging.object_node AS n ON c.event_id = n.event_id

@@ -1,0 +1,9 @@
+-- name: staging.link_request
+-- description: Requests and the run of a callback that sent them; NULL where the thread did so by
+--     itself.
+-- grain: one row per request that was seen to be sent
+-- needs: staging.request_origin, staging.sender_run
+SELECT q.request_id, r.callback_instance_id
+FROM staging.request_origin AS q
+LEFT JOIN staging.sender_run AS r ON q.send_event_id = r.event_id
+WHERE q.send_event_id IS NOT NULL

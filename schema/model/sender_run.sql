@@ -1,0 +1,33 @@
+-- name: staging.sender_run
+-- description: Runs of callbacks that requests and responses were sent in: the innermost on the
+--     thread that had begun and was not over.
+-- grain: one row per request or response sent inside a run of a callback
+-- needs: staging.client_event, staging.service_event, staging.callback_instance
+WITH send AS (
+    SELECT event_id, thread_id FROM staging.client_event WHERE is_request
+    UNION ALL
+    SELECT event_id, thread_id FROM staging.service_event WHERE NOT is_request
+),
+run AS (
+    SELECT i.callback_instance_id, i.parent_id, i.thread_id, i.depth, i.start_event_id,
+        i.effective_end_event_id
+    FROM staging.callback_instance AS i
+    SEMI JOIN send AS s ON i.thread_id = s.thread_id
+),
+-- Whose run goes on after each event; where runs end at the begin of another, that one.
+edge AS (
+    SELECT thread_id, start_event_id AS event_id, callback_instance_id, 0 AS rank FROM run
+    UNION ALL
+    SELECT thread_id, effective_end_event_id, parent_id, depth FROM run
+),
+change AS (
+    SELECT
+        thread_id, event_id,
+        arg_min(coalesce(callback_instance_id, -1), rank) AS callback_instance_id
+    FROM edge
+    GROUP BY thread_id, event_id
+)
+SELECT s.event_id, c.callback_instance_id
+FROM send AS s
+ASOF JOIN change AS c ON s.thread_id = c.thread_id AND s.event_id >= c.event_id
+WHERE c.callback_instance_id > 0

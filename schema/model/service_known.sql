@@ -1,0 +1,14 @@
+-- name: staging.service_known
+-- description: Services whose initialisation was traced. No tracepoint tells their GID.
+-- grain: one row per rcl_service_init
+-- needs: staging.located, staging.object_node
+SELECT
+    s.event_id,
+    s.process_id,
+    n.node_id,
+    s.service_name,
+    s.service_handle,
+    s.rmw_service_handle AS rmw_handle,
+    s.ts_ns AS created_ns
+FROM staging.located('ros2_rcl_service_init') AS s
+LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id

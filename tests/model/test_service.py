@@ -1,0 +1,330 @@
+"""Requests and responses: both ends, the service callback between, and what sent them."""
+
+from __future__ import annotations
+
+from ros_system import RosSystem
+from staged_events import Analyse, Analysis, Thread
+
+CLIENT = Thread(100)
+SERVER = Thread(200, trace=1)
+REQUESTS = (
+    "SELECT q.sequence_number, q.sent_ns, q.taken_ns, i.start_ns FROM request AS q "
+    "LEFT JOIN callback_instance AS i USING (callback_instance_id) ORDER BY q.request_id"
+)
+RESPONSES = (
+    "SELECT r.sequence_number, q.sent_ns, r.sent_ns, r.taken_ns FROM response AS r "
+    "LEFT JOIN request AS q USING (request_id) ORDER BY r.response_id"
+)
+
+
+def hosts(system: RosSystem) -> None:
+    """A client and a service on two hosts."""
+    system.add_source(1, "beta", "other boot")
+    system.client(CLIENT, 0x10, "/add", gid=7)
+    system.service(SERVER, 0x20, "/add", callback=0xC1)
+
+
+def call(
+    system: RosSystem,
+    number: int,
+    *,
+    client: Thread = CLIENT,
+    server: Thread = SERVER,
+    gid: int = 7,
+    stamp: int | None = None,
+) -> tuple[int, int, int, int, int]:
+    """Times of a whole call: request sent, taken, callback begun, response sent, taken."""
+    stamp = number * 1_000 if stamp is None else stamp
+    sent = system.send_request(client, 0x10, number)
+    taken = system.take_request(server, 0x20, number, gid=gid)
+    start = system.start(server, 0xC1)
+    system.end(server, 0xC1)
+    answered = system.send_response(server, 0x20, number, gid=gid, stamp=stamp)
+    return (
+        sent,
+        taken,
+        start,
+        answered,
+        system.take_response(client, 0x10, number, stamp=stamp),
+    )
+
+
+def test_both_ends_of_calls(system: RosSystem, analyse: Analyse) -> None:
+    hosts(system)
+    calls = [call(system, number) for number in (1, 2)]
+    analysis = analyse(system)
+    assert analysis.rows(REQUESTS) == [
+        (n, sent, taken, start) for n, (sent, taken, start, _, _) in enumerate(calls, start=1)
+    ]
+    assert analysis.rows(RESPONSES) == [
+        (n, sent, answered, got) for n, (sent, _, _, answered, got) in enumerate(calls, start=1)
+    ]
+    assert analysis.rows(
+        "SELECT i.request_id, r.callback_instance_id = i.callback_instance_id, l.response_id "
+        "FROM callback_instance AS i JOIN response AS r USING (request_id) "
+        "JOIN link_response AS l ON i.callback_instance_id = l.callback_instance_id ORDER BY ALL"
+    ) == [(1, True, 1), (2, True, 2)]
+    assert analysis.rows(
+        "SELECT DISTINCT c.service_name, s.service_name, q.sender_thread_id <> "
+        "q.receiver_thread_id FROM request AS q JOIN client AS c USING (client_id) "
+        "JOIN service AS s USING (service_id)"
+    ) == [("/add", "/add", True)]
+
+
+def test_the_event_of_sending_may_come_last(system: RosSystem, analyse: Analyse) -> None:
+    """The middleware may know the number only after writing."""
+    hosts(system)
+    taken = system.take_request(SERVER, 0x20, 1, gid=7)
+    sent = system.send_request(CLIENT, 0x10, 1)
+    assert analyse(system).rows(REQUESTS) == [(1, sent, taken, None)]
+
+
+def test_only_16_bytes_of_a_gid_count(system: RosSystem, analyse: Analyse) -> None:
+    system.add_source(1, "beta", "other boot")
+    system.client(CLIENT, 0x10, "/add", gid=7, length=24)
+    system.service(SERVER, 0x20, "/add", callback=0xC1)
+    sent = system.send_request(CLIENT, 0x10, 1)
+    taken = system.take_request(SERVER, 0x20, 1, gid=7)
+    assert analyse(system).rows(REQUESTS) == [(1, sent, taken, None)]
+
+
+def test_attempts_that_took_nothing_are_none(system: RosSystem, analyse: Analyse) -> None:
+    hosts(system)
+    system.take_request(SERVER, 0x20, 0, gid=7, taken=0)
+    system.take_response(CLIENT, 0x10, 0, taken=0)
+    analysis = analyse(system)
+    assert analysis.value("SELECT count(*) FROM request") == 0
+    assert analysis.value("SELECT count(*) FROM response") == 0
+
+
+def test_one_side_alone(system: RosSystem, analyse: Analyse) -> None:
+    """Nothing is dropped; a client that must have sent a request is named all the same."""
+    hosts(system)
+    lonely = system.send_request(CLIENT, 0x10, 1)
+    taken = system.take_request(SERVER, 0x20, 2, gid=7)
+    stranger = system.take_request(SERVER, 0x20, 2, gid=9)
+    got = system.take_response(CLIENT, 0x10, 3, stamp=5)
+    analysis = analyse(system)
+    assert analysis.rows(
+        "SELECT client_id, service_id, sent_ns, taken_ns FROM request ORDER BY request_id"
+    ) == [(1, None, lonely, None), (1, 1, None, taken), (None, 1, None, stranger)]
+    assert analysis.rows(
+        "SELECT client_id, service_id, request_id, sent_ns, taken_ns FROM response"
+    ) == [(1, None, None, None, got)]
+
+
+def test_clients_are_told_apart(system: RosSystem, analyse: Analyse) -> None:
+    """Every client counts from 1."""
+    other = Thread(101)
+    hosts(system)
+    system.client(other, 0x10, "/add", gid=8)
+    first, second = (
+        system.send_request(CLIENT, 0x10, 1),
+        system.send_request(other, 0x10, 1),
+    )
+    late = system.take_request(SERVER, 0x20, 1, gid=8)
+    later = system.take_request(SERVER, 0x20, 1, gid=7)
+    rows = analyse(system).rows(REQUESTS)
+    assert rows == [(1, first, later, None), (1, second, late, None)]
+
+
+def test_a_client_that_came_again(system: RosSystem, analyse: Analyse) -> None:
+    """The same GID and numbers: the responses tell, although the first request is not answered."""
+    hosts(system)
+    lost = system.send_request(CLIENT, 0x10, 1)
+    again = Thread(100, name="again")
+    system.wait(1_000_000)
+    system.client(again, 0x10, "/add", gid=7)
+    sent, taken, start, answered, got = call(system, 1, client=again)
+    analysis = analyse(system)
+    assert analysis.rows(REQUESTS) == [(1, lost, None, None), (1, sent, taken, start)]
+    assert analysis.rows(RESPONSES) == [(1, sent, answered, got)]
+
+
+def test_equal_requests_without_response_go_by_order(system: RosSystem, analyse: Analyse) -> None:
+    hosts(system)
+    sent = [system.send_request(CLIENT, 0x10, 1) for _ in range(2)]
+    taken = [system.take_request(SERVER, 0x20, 1, gid=7) for _ in range(2)]
+    assert analyse(system).rows(REQUESTS) == [(1, sent[n], taken[n], None) for n in range(2)]
+
+
+def test_what_cannot_be_told_is_not_guessed(system: RosSystem, analyse: Analyse) -> None:
+    """Two equal requests were sent, one was taken."""
+    hosts(system)
+    sent = [system.send_request(CLIENT, 0x10, 1) for _ in range(2)]
+    taken = system.take_request(SERVER, 0x20, 1, gid=7)
+    analysis = analyse(system)
+    assert sorted(analysis.rows(REQUESTS), key=str) == sorted(
+        [(1, sent[0], None, None), (1, sent[1], None, None), (1, None, taken, None)], key=str
+    )
+    assert analysis.rows("SELECT count FROM diagnostic WHERE name = 'ambiguous_request'") == [(1,)]
+
+
+def test_two_services_of_one_name(system: RosSystem, analyse: Analyse) -> None:
+    """Both take the request and answer."""
+    second = Thread(201, trace=1)
+    hosts(system)
+    system.service(second, 0x20, "/add", callback=0xC1)
+    sent = system.send_request(CLIENT, 0x10, 1)
+    taken = [
+        system.take_request(SERVER, 0x20, 1, gid=7),
+        system.take_request(second, 0x20, 1, gid=7),
+    ]
+    answered = [
+        system.send_response(second, 0x20, 1, gid=7, stamp=20),
+        system.send_response(SERVER, 0x20, 1, gid=7, stamp=10),
+    ]
+    got = [
+        system.take_response(CLIENT, 0x10, 1, stamp=10),
+        system.take_response(CLIENT, 0x10, 1, stamp=20),
+    ]
+    analysis = analyse(system)
+    assert analysis.rows(REQUESTS) == [(1, sent, taken[n], None) for n in range(2)]
+    assert analysis.rows(
+        "SELECT r.sent_ns, r.taken_ns, q.taken_ns FROM response AS r "
+        "JOIN request AS q USING (request_id) ORDER BY r.response_id"
+    ) == [(answered[0], got[1], taken[1]), (answered[1], got[0], taken[0])]
+
+
+def test_started_late(system: RosSystem, analyse: Analyse) -> None:
+    """No initialisation was traced: responses tell who is who, names come from the other side."""
+    system.add_source(1, "beta", "other boot")
+    system.service(SERVER, 0x20, "/add", callback=None)
+    times = [call(system, number) for number in (41, 42)]
+    analysis = analyse(system)
+    assert analysis.rows(REQUESTS) == [
+        (n, sent, taken, start) for n, (sent, taken, start, _, _) in enumerate(times, start=41)
+    ]
+    assert analysis.rows("SELECT service_name, created_ns, hex(gid) FROM client") == [
+        ("/add", None, "07" + "01" * 15)
+    ]
+    assert analysis.rows("SELECT kind, service_id FROM callback") == [("service", 1)]
+    names = analysis.column("SELECT name FROM diagnostic ORDER BY name")
+    assert "inferred_client" in names
+    assert "inferred_service" not in names
+
+
+def test_a_service_learns_its_name(system: RosSystem, analyse: Analyse) -> None:
+    system.add_source(1, "beta", "other boot")
+    system.client(CLIENT, 0x10, "/node/get_parameters", gid=7)
+    call(system, 1)
+    assert analyse(system).rows("SELECT service_name, is_internal, created_ns FROM service") == [
+        ("/node/get_parameters", True, None)
+    ]
+
+
+def test_a_callback_behind_something_else_is_not_of_the_request(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    hosts(system)
+    system.subscription(SERVER, 0x30, "/t", callback=0xC2)
+    taken = [system.take_request(SERVER, 0x20, number, gid=7) for number in (1, 2, 3)]
+    system.start(SERVER, 0xC2)
+    system.end(SERVER, 0xC2)
+    taken.append(system.take_request(SERVER, 0x20, 4, gid=7))
+    system.ready(SERVER)
+    system.start(SERVER, 0xC1)
+    system.end(SERVER, 0xC1)
+    taken.append(system.take_request(SERVER, 0x20, 5, gid=7))
+    system.lose(trace=1)
+    system.start(SERVER, 0xC1)
+    system.end(SERVER, 0xC1)
+    taken.append(system.take_request(SERVER, 0x20, 6, gid=7))
+    start = system.start(SERVER, 0xC1)
+    rows = analyse(system).rows(
+        "SELECT q.taken_ns, i.start_ns FROM request AS q "
+        "LEFT JOIN callback_instance AS i USING (callback_instance_id) ORDER BY ALL"
+    )
+    assert rows == [*[(time, None) for time in taken[:5]], (taken[5], start)]
+
+
+def senders(analysis: Analysis) -> list[tuple[int, int | None]]:
+    return [
+        (number, start)
+        for number, start in analysis.rows(
+            "SELECT q.sequence_number, i.start_ns FROM link_request AS l "
+            "JOIN request AS q USING (request_id) LEFT JOIN callback_instance AS i "
+            "ON l.callback_instance_id = i.callback_instance_id ORDER BY ALL"
+        )
+    ]
+
+
+def test_what_sent_a_request(system: RosSystem, analyse: Analyse) -> None:
+    """The innermost run on the thread, also between and behind nested ones; or the thread."""
+    hosts(system)
+    system.send_request(CLIENT, 0x10, 1)
+    outer = system.start(CLIENT, 0xC2)
+    system.send_request(CLIENT, 0x10, 2)
+    inner = system.start(CLIENT, 0xC3)
+    system.send_request(CLIENT, 0x10, 3)
+    system.send_request(Thread(100, 101), 0x10, 4)
+    system.end(CLIENT, 0xC3)
+    system.send_request(CLIENT, 0x10, 5)
+    system.end(CLIENT, 0xC2)
+    system.send_request(CLIENT, 0x10, 6)
+    last = system.start(CLIENT, 0xC2)
+    system.send_request(CLIENT, 0x10, 7)
+    system.ready(CLIENT)
+    system.send_request(CLIENT, 0x10, 8)
+    assert senders(analyse(system)) == [
+        (1, None),
+        (2, outer),
+        (3, inner),
+        (4, None),
+        (5, outer),
+        (6, None),
+        (7, last),
+        (8, None),
+    ]
+
+
+def test_a_run_begins_where_one_that_never_ended_is_over(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    hosts(system)
+    system.start(CLIENT, 0xC2)
+    second = system.start(CLIENT, 0xC3)
+    system.send_request(CLIENT, 0x10, 1)
+    system.end(CLIENT, 0xC3)
+    system.send_request(CLIENT, 0x10, 2)
+    assert senders(analyse(system)) == [(1, second), (2, None)]
+
+
+def test_a_response_sent_later(system: RosSystem, analyse: Analyse) -> None:
+    """It comes from the service callback, and from the run that sent it."""
+    hosts(system)
+    system.send_request(CLIENT, 0x10, 1)
+    system.take_request(SERVER, 0x20, 1, gid=7)
+    asked = system.start(SERVER, 0xC1)
+    system.end(SERVER, 0xC1)
+    done = system.start(SERVER, 0xC9)
+    system.send_response(SERVER, 0x20, 1, gid=7, stamp=5)
+    system.end(SERVER, 0xC9)
+    analysis = analyse(system)
+    assert analysis.column(
+        "SELECT i.start_ns FROM link_response AS l JOIN callback_instance AS i "
+        "USING (callback_instance_id) ORDER BY ALL"
+    ) == [asked, done]
+    assert analysis.rows(
+        "SELECT link_kind, from_id FROM flow_edge WHERE to_kind = 'response' ORDER BY ALL"
+    ) == [("direct", 2), ("service", 1)]
+
+
+def test_a_service_without_callbacks(system: RosSystem, analyse: Analyse) -> None:
+    """rclpy: the response comes from the request."""
+    hosts(system)
+    system.send_request(CLIENT, 0x10, 1)
+    system.take_request(SERVER, 0x20, 1, gid=7)
+    system.send_response(SERVER, 0x20, 1, gid=7, stamp=5)
+    system.take_response(CLIENT, 0x10, 1, stamp=5)
+    analysis = analyse(system)
+    assert analysis.rows("SELECT * EXCLUDE (run_id) FROM flow_edge") == [
+        (
+            "request",
+            1,
+            "response",
+            1,
+            "service",
+            *analysis.rows("SELECT q.taken_ns, r.sent_ns FROM request AS q, response AS r")[0],
+        )
+    ]
