@@ -10,7 +10,7 @@ WITH carried AS (
 entered AS (
     SELECT
         run_id, subscription_id AS from_subscription_id, publisher_id, false AS is_source,
-        bool_and(kind IN ('periodic_async', 'partial_sync')) AS is_cached
+        bool_or(kind IN ('periodic_async', 'partial_sync')) AS is_cached
     FROM derive.flow_continuation
     GROUP BY run_id, subscription_id, publisher_id
     UNION ALL

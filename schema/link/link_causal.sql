@@ -1,9 +1,11 @@
 -- name: derive.link_causal
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
 --     events where a gap touches its run of a callback, or its take, or its publication.
--- grain: one row per run of a callback, or take outside of any, and publication that it led to
--- needs: derive.link_causal_direct, derive.link_causal_take_adjacent, store.callback_instance,
---     store.take, store.publication
+-- grain: one row per run of a callback, or take outside of any, and publication that it led to, and
+--     annotation of an indirect link
+-- needs: derive.link_causal_direct, derive.link_causal_take_adjacent,
+--     derive.link_causal_periodic_async, derive.link_causal_partial_sync,
+--     store.callback_instance, store.take, store.publication
 WITH link AS (
     SELECT
         run_id, callback_instance_id, NULL::BIGINT AS take_id, publication_id, 'direct' AS kind,
@@ -12,6 +14,16 @@ WITH link AS (
     UNION ALL
     SELECT run_id, NULL, take_id, publication_id, 'take_adjacent', NULL, 1, false
     FROM derive.link_causal_take_adjacent
+    UNION ALL
+    SELECT
+        run_id, callback_instance_id, NULL, publication_id, 'periodic_async', annotation_id,
+        candidate_count, is_loss_affected
+    FROM derive.link_causal_periodic_async
+    UNION ALL
+    SELECT
+        run_id, callback_instance_id, NULL, publication_id, 'partial_sync', annotation_id,
+        candidate_count, is_loss_affected
+    FROM derive.link_causal_partial_sync
 )
 SELECT
     l.run_id,
@@ -28,7 +40,6 @@ SELECT
     OR coalesce(l.take_id IS NOT NULL AND t.is_loss_affected, false)
     OR coalesce(b.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
-LEFT JOIN store.callback_instance AS i
-    ON l.callback_instance_id = i.callback_instance_id AND l.run_id = i.run_id
-JOIN store.publication AS b ON l.publication_id = b.publication_id AND l.run_id = b.run_id
-LEFT JOIN store.take AS t ON coalesce(l.take_id, i.take_id) = t.take_id AND l.run_id = t.run_id
+LEFT JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+JOIN store.publication AS b ON l.publication_id = b.publication_id
+LEFT JOIN store.take AS t ON coalesce(l.take_id, i.take_id) = t.take_id

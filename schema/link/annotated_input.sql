@@ -1,0 +1,161 @@
+-- name: derive.annotated_input
+-- kind: macro
+-- description: The message that each cache held when an output of an annotation was published: the
+--     latest run of the input's callback (by effective end) that ended at or before the cut, or
+--     nested inside the publishing run and before the publication. The input whose own run
+--     publishes is none of these. Runs that were under way at the cut, on other threads, could
+--     have been it as well. Nothing is linked across a gap in the record of either thread.
+-- grain: one row per annotation, publication by one of its outputs, and other input with a message
+-- param: wanted_kind VARCHAR  Kind of the annotations
+-- needs: derive.annotated_publication, derive.annotated_run, store.annotation_input,
+--     store.callback_instance, store.thread_break, store.loss_interval
+CREATE OR REPLACE MACRO derive.annotated_input(wanted_kind) AS TABLE
+WITH demand AS MATERIALIZED (
+    SELECT
+        b.run_id, b.annotation_id, b.publication_id, b.callback_instance_id AS publishing_id,
+        b.trace_id, b.thread_id, b.start_ns, b.start_event_id, b.cut_event_id,
+        i.subscription_id
+    FROM derive.annotated_publication AS b
+    JOIN store.annotation_input AS i ON b.annotation_id = i.annotation_id
+    WHERE b.kind = wanted_kind AND b.subscription_id IS DISTINCT FROM i.subscription_id
+),
+run AS MATERIALIZED (
+    SELECT
+        run_id, subscription_id, callback_instance_id, thread_id, start_event_id,
+        effective_end_event_id
+    FROM derive.annotated_run
+),
+-- Runs that end together (in a gap) are one moment: the last to begin stands for it.
+ended AS (
+    SELECT
+        run_id, subscription_id, effective_end_event_id,
+        arg_max(callback_instance_id, start_event_id) AS callback_instance_id
+    FROM run
+    GROUP BY run_id, subscription_id, effective_end_event_id
+),
+ended_on_thread AS (
+    SELECT
+        run_id, thread_id, subscription_id, effective_end_event_id,
+        arg_max(callback_instance_id, start_event_id) AS callback_instance_id,
+        max(start_event_id) AS start_event_id
+    FROM run
+    GROUP BY run_id, thread_id, subscription_id, effective_end_event_id
+),
+nested AS (
+    SELECT d.annotation_id, d.publication_id, d.subscription_id, e.callback_instance_id
+    FROM (
+        SELECT * FROM demand
+        WHERE publishing_id IN (
+            SELECT parent_id FROM store.callback_instance WHERE parent_id IS NOT NULL
+        )
+    ) AS d
+    ASOF JOIN ended_on_thread AS e
+        ON d.run_id = e.run_id
+        AND d.thread_id = e.thread_id
+        AND d.subscription_id = e.subscription_id
+        AND d.start_event_id >= e.effective_end_event_id
+    WHERE e.start_event_id > d.cut_event_id
+),
+step AS (
+    SELECT run_id, subscription_id, start_event_id AS event_id, 1 AS change FROM run
+    UNION ALL
+    SELECT run_id, subscription_id, effective_end_event_id, -1 FROM run
+),
+under_way AS (
+    SELECT
+        run_id, subscription_id, event_id,
+        sum(sum(change)) OVER (
+            PARTITION BY run_id, subscription_id ORDER BY event_id ROWS UNBOUNDED PRECEDING
+        ) AS run_count
+    FROM step
+    GROUP BY run_id, subscription_id, event_id
+),
+cached AS (
+    SELECT
+        d.run_id, d.annotation_id, d.publication_id, d.publishing_id, d.subscription_id,
+        d.trace_id, d.thread_id, d.start_ns, d.start_event_id,
+        coalesce(n.callback_instance_id, e.callback_instance_id) AS callback_instance_id,
+        1 + coalesce(u.run_count, 0) AS candidate_count
+    FROM demand AS d
+    ASOF LEFT JOIN ended AS e
+        ON d.run_id = e.run_id
+        AND d.subscription_id = e.subscription_id
+        AND d.cut_event_id >= e.effective_end_event_id
+    ASOF LEFT JOIN under_way AS u
+        ON d.run_id = u.run_id
+        AND d.subscription_id = u.subscription_id
+        AND d.cut_event_id >= u.event_id
+    LEFT JOIN nested AS n
+        ON d.annotation_id = n.annotation_id
+        AND d.publication_id = n.publication_id
+        AND d.subscription_id = n.subscription_id
+),
+found AS MATERIALIZED (
+    SELECT
+        c.run_id, c.annotation_id, c.publication_id, c.publishing_id, c.subscription_id,
+        c.callback_instance_id, c.candidate_count,
+        c.trace_id, c.thread_id, c.start_ns, c.start_event_id,
+        i.trace_id AS input_trace_id,
+        i.thread_id AS input_thread_id,
+        i.start_ns AS input_start_ns,
+        i.start_event_id AS input_start_event_id,
+        i.effective_end_event_id AS input_end_event_id
+    FROM cached AS c
+    JOIN store.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
+),
+-- Only traces with gaps need a closer look.
+gap AS (
+    SELECT
+        trace_id, start_ns,
+        max(end_ns) OVER (
+            PARTITION BY trace_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
+        ) AS covered_until_ns
+    FROM store.loss_interval
+),
+exposed AS MATERIALIZED (
+    SELECT
+        f.annotation_id, f.publication_id, f.callback_instance_id, f.thread_id,
+        f.input_thread_id, f.start_event_id, f.input_start_event_id,
+        g.start_ns >= f.input_start_ns AS begins_between
+    FROM (
+        SELECT *, unnest(list_distinct([trace_id, input_trace_id])) AS exposed_trace_id
+        FROM found
+        WHERE trace_id IN (SELECT trace_id FROM store.loss_interval)
+            OR input_trace_id IN (SELECT trace_id FROM store.loss_interval)
+    ) AS f
+    ASOF JOIN gap AS g ON f.exposed_trace_id = g.trace_id AND f.start_ns > g.start_ns
+    WHERE g.covered_until_ns >= f.input_start_ns
+),
+crossing AS (
+    SELECT e.annotation_id, e.publication_id, e.callback_instance_id
+    FROM exposed AS e
+    ASOF JOIN store.thread_break AS k
+        ON e.thread_id = k.thread_id AND e.input_start_event_id < k.resumed_event_id
+    WHERE k.resumed_event_id <= e.start_event_id
+    UNION
+    -- The input's thread may be heard of again only after the publication.
+    SELECT e.annotation_id, e.publication_id, e.callback_instance_id
+    FROM exposed AS e
+    ASOF JOIN store.thread_break AS k
+        ON e.input_thread_id = k.thread_id AND e.input_start_event_id < k.resumed_event_id
+    WHERE k.resumed_event_id <= e.start_event_id OR e.begins_between
+)
+SELECT
+    f.run_id,
+    f.annotation_id,
+    f.publication_id,
+    f.publishing_id,
+    f.subscription_id,
+    f.callback_instance_id,
+    f.input_end_event_id,
+    f.candidate_count::BIGINT AS candidate_count,
+    x.publication_id IS NOT NULL AS is_loss_affected
+FROM found AS f
+LEFT JOIN (SELECT DISTINCT annotation_id, publication_id, callback_instance_id FROM exposed) AS x
+    ON f.annotation_id = x.annotation_id
+    AND f.publication_id = x.publication_id
+    AND f.callback_instance_id = x.callback_instance_id
+ANTI JOIN crossing AS k
+    ON f.annotation_id = k.annotation_id
+    AND f.publication_id = k.publication_id
+    AND f.callback_instance_id = k.callback_instance_id

@@ -1,0 +1,20 @@
+-- name: derive.annotated_run
+-- description: Runs of the callbacks of subscriptions that are inputs of annotations.
+-- grain: one row per run of such a callback
+-- needs: store.annotation_input, store.callback_instance, store.callback, store.take
+SELECT
+    i.run_id,
+    coalesce(c.subscription_id, t.subscription_id) AS subscription_id,
+    i.callback_instance_id,
+    i.trace_id,
+    i.thread_id,
+    i.start_ns,
+    i.start_event_id,
+    i.effective_end_event_id
+FROM store.callback_instance AS i
+JOIN store.callback AS c ON i.callback_id = c.callback_id
+LEFT JOIN store.take AS t
+    ON c.subscription_id IS NULL AND i.take_id = t.take_id AND i.run_id = t.run_id
+WHERE coalesce(c.subscription_id, t.subscription_id) IN (
+    SELECT subscription_id FROM store.annotation_input
+)
