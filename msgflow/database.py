@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from msgflow.export.flow import Flow
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
+    from msgflow.links import AppliedLinks
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
@@ -100,6 +101,7 @@ class Database:
         replace: bool = False,
         hosts: Mapping[str, str] | None = None,
         keep_staging: str | Path | None = None,
+        links: str | Path | None = None,
         reader: str = "auto",
         strict: bool = False,
         ignore: Sequence[str] = (),
@@ -113,6 +115,7 @@ class Database:
             replace: take the place of a run with the same name or packets.
             hosts: name of a host -> path of one of its traces.
             keep_staging: directory for the staging tables as Parquet.
+            links: file with indirect links to declare.
             reader: 'auto', 'msgflow' or 'bt2'.
             strict: refuse a trace at its first damage, instead of keeping what is good.
             ignore: names of events to leave out.
@@ -121,6 +124,7 @@ class Database:
         Raises:
             TraceError: no trace, or none that can be read.
             DatabaseError: the file is locked, foreign, or of another schema revision.
+            UsageError: `links` is not such a file, or does not fit the traces.
         """
         from msgflow.ingest import ingest
 
@@ -132,12 +136,34 @@ class Database:
             replace=replace,
             hosts=dict(hosts) if hosts else None,
             keep_staging=Path(keep_staging) if keep_staging is not None else None,
+            links=Path(links) if links is not None else None,
             reader=reader,
             strict=strict,
             ignore=ignore,
             memory_limit=self._memory_limit,
             progress=progress,
         )
+
+    def apply_links(
+        self, file: str | Path, *, run: str | int | None = None
+    ) -> tuple[AppliedLinks, ...]:
+        """Declare the indirect links of a file and derive all links anew, in one transaction.
+
+        Links that an earlier file declared for these runs are forgotten.
+
+        Args:
+            file: YAML; docs/semantics.md has its form.
+            run: 'all', a name or an id; the latest run when None.
+
+        Raises:
+            UsageError: not such a file, no such run, or a link that does not fit the run.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.links import apply_links, read_links
+
+        links = read_links(Path(file))
+        self.close()
+        return apply_links(self.path, links, run=run, memory_limit=self._memory_limit)
 
     def query(
         self,

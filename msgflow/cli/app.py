@@ -6,7 +6,19 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli import check, db, events, export, flow, info, ingest, query, simulate, sql
+from msgflow.cli import (
+    check,
+    db,
+    events,
+    export,
+    flow,
+    info,
+    ingest,
+    links,
+    query,
+    simulate,
+    sql,
+)
 from msgflow.cli.root import RootGroup
 from msgflow.version import __version__
 
@@ -26,6 +38,7 @@ app.command("events")(events.command)
 app.command("sql")(sql.command)
 app.command("info")(info.command)
 app.command("check")(check.command)
+app.add_typer(links.app, name="links")
 app.add_typer(export.app, name="export")
 app.add_typer(db.app, name="db")
 app.command("simulate")(simulate.command)

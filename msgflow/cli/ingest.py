@@ -48,6 +48,10 @@ def command(
         Path | None,
         typer.Option("--keep-staging", metavar="DIR", help="Keep the events as read, as Parquet"),
     ] = None,
+    links: Annotated[
+        Path | None,
+        typer.Option("--links", metavar="FILE", help="Indirect links to declare, as YAML"),
+    ] = None,
     reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
         Reader.AUTO
     ),
@@ -90,6 +94,7 @@ def command(
                 replace=replace,
                 hosts=hosts,
                 keep_staging=keep_staging,
+                links=links,
                 reader=reader.value,
                 strict=strict,
                 ignore=ignore or [],

@@ -24,6 +24,7 @@ from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.memory import Memory
 from msgflow.ingest.workspace import workspace
+from msgflow.links import declare_links, read_links
 from msgflow.query.interrupt import interruptible, noted_interrupts
 from msgflow.query.window import is_run_name
 from msgflow.trace import archive
@@ -32,6 +33,7 @@ from msgflow.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from msgflow.links import LinksFile
     from msgflow.query.interrupt import Interrupts
     from msgflow.trace import Progress, TraceInfo
 
@@ -95,6 +97,7 @@ def ingest(
     replace: bool = False,
     hosts: Mapping[str, str] | None = None,
     keep_staging: Path | None = None,
+    links: Path | None = None,
     reader: str = "auto",
     strict: bool = False,
     ignore: Sequence[str] = (),
@@ -114,6 +117,7 @@ def ingest(
         replace: delete the runs that hold some of these packets already, or have this name.
         hosts: name of a host -> path; the traces below the path belong to that host.
         keep_staging: directory to which the staged events are written as Parquet.
+        links: file with indirect links to declare.
         reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
         strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
@@ -125,10 +129,11 @@ def ingest(
         TraceError: a path holds no trace, or none that can be read and used.
         DatabaseError: the database is locked, foreign, or of another schema revision.
         UsageError: the packets are in the database already, the name of the run is taken or means
-            something else, or a path is empty.
+            something else, a path is empty, or `links` does not fit the traces.
         KeyboardInterrupt: Ctrl-C came before the run was stored.
     """
     _require_usable(paths, name)
+    declared = None if links is None else read_links(links)
     if database.is_symlink():
         database = Path(os.path.realpath(database))
     keep_freed_memory()
@@ -165,7 +170,9 @@ def ingest(
                 names = (name, _fallback_name(paths))
                 run = interruptible(
                     con,
-                    lambda: _write(con, memory, names, loaded, keep_staging, watch, interrupts),
+                    lambda: _write(
+                        con, memory, names, loaded, declared, keep_staging, watch, interrupts
+                    ),
                 )
                 watch.enter("closing the database")
         return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
@@ -176,6 +183,7 @@ def _write(
     memory: Memory,
     names: tuple[str | None, str],
     loaded: Loaded,
+    declared: LinksFile | None,
     keep_staging: Path | None,
     watch: _Watch,
     interrupts: Interrupts,
@@ -185,13 +193,14 @@ def _write(
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)
-    return memory.run(lambda: _write_run(con, names, loaded, watch, interrupts))
+    return memory.run(lambda: _write_run(con, names, loaded, declared, watch, interrupts))
 
 
 def _write_run(
     con: duckdb.DuckDBPyConnection,
     names: tuple[str | None, str],
     loaded: Loaded,
+    declared: LinksFile | None,
     watch: _Watch,
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
@@ -200,6 +209,8 @@ def _write_run(
         watch.enter("storing the run")
         run_id, run_name = _store(con, *names, loaded)
         watch.enter("linking messages")
+        if declared is not None:
+            declare_links(con, run_id, declared)
         derive(con, run_id)
         watch.enter("checking the database")
         _check(con, run_id)

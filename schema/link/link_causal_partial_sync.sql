@@ -3,9 +3,9 @@
 --     message is a direct link, of the other inputs the latest counts if it came after the caches
 --     were last emptied, and did not fire itself.
 -- grain: one row per annotation, publication of a firing, and other input with a message
--- needs: derive.annotated_input, derive.annotation_firing
+-- needs: derive.annotated_input, derive.partial_sync_firing
 WITH firing AS MATERIALIZED (
-    SELECT annotation_id, callback_instance_id, emptied_event_id FROM derive.annotation_firing
+    SELECT annotation_id, callback_instance_id, emptied_event_id FROM derive.partial_sync_firing
 )
 SELECT
     l.run_id, l.callback_instance_id, l.publication_id, l.annotation_id, l.candidate_count,

@@ -6,7 +6,8 @@
 --     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host,
 --     staging.trace_overlap, staging.source, staging.publisher_known, staging.subscription_known,
 --     staging.client, staging.service, staging.client_event, staging.service_event,
---     staging.client_gid, staging.request_pair
+--     staging.client_gid, staging.request_pair,
+--     staging.annotation, staging.annotation_object
 WITH unmatched_end AS (
     SELECT trace_index
     FROM staging.callback_left_over
@@ -185,4 +186,17 @@ SELECT
     'requests taken by a service that several of the same client and number could have been: they '
     || 'are left without a sender'
 FROM ambiguous_request
+HAVING count(*) > 0
+UNION ALL
+SELECT
+    NULL,
+    'unknown_annotation_handle',
+    'warning',
+    count(*),
+    'inputs or outputs of declared indirect links that are no known subscription or publisher, in '
+    || string_agg(DISTINCT l.label, ', ' ORDER BY l.label)
+FROM staging.annotation AS a
+JOIN staging.annotation_object AS o ON a.event_id = o.event_id
+JOIN process_label AS l ON a.process_id = l.process_id
+WHERE o.object_id IS NULL
 HAVING count(*) > 0

@@ -1,9 +1,10 @@
 -- name: derive.link_diagnostic
 -- description: What the links say about the input: takes without a publication, links that are a
---     guess, and messages that seem to arrive before they were published.
+--     guess, messages that seem to arrive before they were published, and publications for which
+--     inputs of their annotation had no message.
 -- grain: one row per finding
 -- needs: store.take, store.subscription, store.publication, store.link_transport,
---     derive.process_clock, derive.corrected_ns
+--     derive.process_clock, derive.corrected_ns, derive.annotation_firing
 WITH unmatched AS (
     SELECT t.run_id, t.trace_id, s.topic_name, t.source_timestamp_ns IS NULL AS has_no_stamp
     FROM store.take AS t
@@ -64,4 +65,17 @@ SELECT
     )
 FROM latency
 WHERE latency_ns < 0
+GROUP BY run_id
+UNION ALL
+SELECT
+    run_id,
+    NULL,
+    'incomplete_firing',
+    'info',
+    count(*),
+    'publications that an annotation explains, but for which some of its inputs had no message '
+    || '(none yet, none since the caches were emptied, or a gap lies in between): see '
+    || 'annotation_firing'
+FROM derive.annotation_firing
+WHERE linked_count < input_count
 GROUP BY run_id

@@ -1,4 +1,4 @@
--- name: derive.annotation_firing
+-- name: derive.partial_sync_firing
 -- description: Firings of partially synchronous annotations: runs of a callback of an input that
 --     publish on an output. All publications of a run are one firing; it empties the caches. What
 --     was published last by another firing, before it published first, is when they were emptied

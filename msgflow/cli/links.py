@@ -1,0 +1,82 @@
+"""`msgflow links`: indirect links that the application did not declare itself."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    DatabaseOption,
+    FormatOption,
+    OutputOption,
+    RunOption,
+)
+
+app = typer.Typer(help="Declare how nodes use the messages that they keep.")
+
+
+@app.callback()
+def group() -> None:
+    """Declare how nodes use the messages that they keep."""
+
+
+@app.command("apply")
+def apply(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Links to declare, as YAML")],
+    run: RunOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Declare the links of a file and derive all links of the run anew; reads no trace."""
+    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        applied = opened.apply_links(file, run=run)
+    for one in applied:
+        print_runs([one.run])
+        known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
+        print_status(
+            f"{count(one.annotation_count, 'link')} declared{known}:"
+            f" {count(one.link_count, 'indirect link')} between messages"
+        )
+
+
+@app.command("suggest")
+def suggest(
+    run: RunOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Print candidates found in the data as a file to review; nothing is applied."""
+    from msgflow.cli.output import print_runs, print_text
+    from msgflow.database import Database
+    from msgflow.links import suggest_links
+
+    with Database(database) as opened:
+        result = opened.query("link-suggestions", run=run)
+    print_runs(result.runs)
+    words = ["msgflow", "links", "apply", str(output or "FILE")]
+    words += ["--run", run] if run is not None else []
+    words += ["--db", str(database)] if database != DEFAULT_DATABASE else []
+    text = suggest_links(result.to_arrow().to_pylist(), shlex.join(words))
+    print_text(lambda width, color: text, output)
+
+
+@app.command("list")
+def list_links(
+    run: RunOption = None,
+    form: FormatOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """List the declared links with what came of them: the query indirect-links."""
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        result = opened.query("indirect-links", run=run)
+    print_result(result, form, output)

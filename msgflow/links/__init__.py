@@ -1,0 +1,17 @@
+"""Indirect links declared in a file: read, matched to the nodes of a run, stored, suggested."""
+
+from __future__ import annotations
+
+from msgflow.links.apply import AppliedLinks, apply_links, declare_links
+from msgflow.links.file import DeclaredLink, LinksFile, read_links
+from msgflow.links.suggest import suggest_links
+
+__all__ = [
+    "AppliedLinks",
+    "DeclaredLink",
+    "LinksFile",
+    "apply_links",
+    "declare_links",
+    "read_links",
+    "suggest_links",
+]

@@ -1,0 +1,174 @@
+"""Stores declared links as annotations of a run, in place of those of an earlier file."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.db.connection import connect
+from msgflow.db.derive import derive
+from msgflow.errors import UsageError
+from msgflow.links.match import match_links
+from msgflow.query.interrupt import interruptible
+from msgflow.query.run import read_runs
+from msgflow.query.window import choose_runs
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from msgflow.links.file import LinksFile
+    from msgflow.links.match import MatchedLink
+    from msgflow.query.window import Run
+
+_LISTED = """
+SELECT a.kind, a.process_id,
+    (
+        SELECT list(i.subscription_id ORDER BY i.subscription_id)
+        FROM store.annotation_input AS i
+        WHERE i.annotation_id = a.annotation_id
+    ),
+    (
+        SELECT list(o.publisher_id ORDER BY o.publisher_id)
+        FROM store.annotation_output AS o
+        WHERE o.annotation_id = a.annotation_id
+    )
+FROM store.annotation AS a
+WHERE a.run_id = ? AND a.source = 'trace'
+"""
+
+
+@dataclass(frozen=True)
+class AppliedLinks:
+    """What a file declared for a run.
+
+    Attributes:
+        run: the run.
+        annotation_count: links declared, one per node that an entry matches.
+        known_count: those among them that the trace declares itself, which are not stored again.
+        link_count: indirect links of the run now, of files and of the trace.
+    """
+
+    run: Run
+    annotation_count: int
+    known_count: int
+    link_count: int
+
+
+def apply_links(
+    path: Path, file: LinksFile, *, run: str | int | None, memory_limit: str | None = None
+) -> tuple[AppliedLinks, ...]:
+    """Declare the links of a file for runs of a database and derive their links anew.
+
+    Links that an earlier file declared for these runs are forgotten. Everything happens in one
+    transaction.
+
+    Args:
+        path: the database.
+        file: the links.
+        run: 'all', a name or an id; the latest run when None.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Raises:
+        UsageError: no such run, or a link that does not fit it.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+    with contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con:
+        runs = choose_runs(read_runs(con), run)
+        if not runs:
+            raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")
+        return interruptible(con, lambda: _apply(con, file, runs))
+
+
+def _apply(
+    con: duckdb.DuckDBPyConnection, file: LinksFile, runs: tuple[Run, ...]
+) -> tuple[AppliedLinks, ...]:
+    con.begin()
+    try:
+        counts = {run.run_id: declare_links(con, run.run_id, file) for run in runs}
+        for run in runs:
+            derive(con, run.run_id)
+        applied = tuple(
+            AppliedLinks(run, *counts[run.run_id], _link_count(con, run.run_id)) for run in runs
+        )
+        con.commit()
+    except BaseException:
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
+        raise
+    return applied
+
+
+def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) -> tuple[int, int]:
+    """Store the links of a file as the annotations of a run, inside the open transaction.
+
+    The links between messages have to be derived after that.
+
+    Returns:
+        How many annotations there are, and how many of them the trace declares itself.
+
+    Raises:
+        UsageError: a link that does not fit the run.
+    """
+    matched = match_links(con, run_id, file)
+    # Before any is deleted: a key cannot be used twice in one transaction.
+    first = int(
+        con.execute("SELECT coalesce(max(annotation_id), 0) + 1 FROM store.annotation").fetchall()[
+            0
+        ][0]
+    )
+    for table in ("annotation_input", "annotation_output", "annotation"):
+        con.execute(
+            f"DELETE FROM store.{table} WHERE run_id = $run_id AND annotation_id IN "
+            "(SELECT annotation_id FROM store.annotation "
+            "WHERE run_id = $run_id AND source = 'file')",
+            {"run_id": run_id},
+        )
+    unique = {_key(link): link for link in matched}
+    traced = {
+        (kind, process_id, tuple(inputs or ()), tuple(outputs or ()))
+        for kind, process_id, inputs, outputs in con.execute(_LISTED, [run_id]).fetchall()
+    }
+    added = [link for key, link in unique.items() if key not in traced]
+    for annotation_id, link in enumerate(added, start=first):
+        _insert(con, run_id, annotation_id, link)
+    return len(unique), len(unique) - len(added)
+
+
+def _insert(
+    con: duckdb.DuckDBPyConnection, run_id: int, annotation_id: int, link: MatchedLink
+) -> None:
+    con.execute(
+        "INSERT INTO store.annotation (annotation_id, run_id, kind, source, process_id) "
+        "VALUES (?, ?, ?, 'file', ?)",
+        [annotation_id, run_id, link.kind, link.process_id],
+    )
+    for table, column, endpoints in (
+        ("annotation_input", "subscription_id", link.inputs),
+        ("annotation_output", "publisher_id", link.outputs),
+    ):
+        con.execute(
+            f"INSERT INTO store.{table} (run_id, annotation_id, {column}) "
+            "SELECT ?, ?, unnest(?::BIGINT[])",
+            [run_id, annotation_id, [endpoint.id for endpoint in endpoints]],
+        )
+
+
+def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]:
+    return (
+        link.kind,
+        link.process_id,
+        tuple(endpoint.id for endpoint in link.inputs),
+        tuple(endpoint.id for endpoint in link.outputs),
+    )
+
+
+def _link_count(con: duckdb.DuckDBPyConnection, run_id: int) -> int:
+    return int(
+        con.execute(
+            "SELECT count(*) FROM store.link_causal WHERE run_id = ? AND annotation_id IS NOT NULL",
+            [run_id],
+        ).fetchall()[0][0]
+    )

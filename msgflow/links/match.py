@@ -1,0 +1,269 @@
+"""Finds what the names and patterns of declared links mean in a run."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    import duckdb
+
+    from msgflow.links.file import DeclaredLink, LinksFile, Text
+
+_NODES = """
+SELECT n.node_id, n.full_name, n.process_id, p.name, p.pid, h.hostname
+FROM main.node AS n
+JOIN main.process AS p ON n.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+WHERE n.run_id = ? AND n.full_name IS NOT NULL
+ORDER BY n.node_id
+"""
+_TOPICS = """
+SELECT node_id, {kind}_id, topic_name, is_internal
+FROM main.{kind}
+WHERE run_id = ? AND node_id IS NOT NULL AND topic_name IS NOT NULL
+ORDER BY {kind}_id
+"""
+_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A subscription or publisher of a node."""
+
+    id: int
+    topic: str
+    is_internal: bool
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node of a run, with what it receives and publishes."""
+
+    name: str
+    process_id: int
+    process: str
+    pid: int
+    host: str
+    subscriptions: tuple[Endpoint, ...]
+    publishers: tuple[Endpoint, ...]
+
+
+@dataclass(frozen=True)
+class MatchedLink:
+    """A declared link of one node, with the objects that it means.
+
+    Attributes:
+        kind: 'periodic_async' or 'partial_sync'.
+        process_id: process of the node.
+        inputs: subscriptions, in order of their identity.
+        outputs: publishers, likewise.
+        line: where it was declared.
+    """
+
+    kind: str
+    process_id: int
+    inputs: tuple[Endpoint, ...]
+    outputs: tuple[Endpoint, ...]
+    line: int
+
+
+def match_links(
+    con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
+) -> tuple[MatchedLink, ...]:
+    """Return what the links of a file mean in a run.
+
+    Raises:
+        UsageError: a node or topic that the run does not have, a name that means several nodes, an
+            input that is an output too, or links that form a cycle.
+    """
+    nodes = _read_nodes(con, run_id)
+    matched = tuple(found for link in file.links for found in _match(file, link, nodes))
+    _refuse_cycles(file, matched)
+    return matched
+
+
+def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Node, ...]:
+    subscriptions = _read_endpoints(con, run_id, "subscription")
+    publishers = _read_endpoints(con, run_id, "publisher")
+    return tuple(
+        Node(
+            name,
+            process_id,
+            process or "?",
+            pid,
+            host,
+            tuple(subscriptions.get(node_id, ())),
+            tuple(publishers.get(node_id, ())),
+        )
+        for node_id, name, process_id, process, pid, host in con.execute(
+            _NODES, [run_id]
+        ).fetchall()
+    )
+
+
+def _read_endpoints(
+    con: duckdb.DuckDBPyConnection, run_id: int, kind: str
+) -> Mapping[int, list[Endpoint]]:
+    endpoints: dict[int, list[Endpoint]] = {}
+    rows = con.execute(_TOPICS.format(kind=kind), [run_id]).fetchall()
+    for node_id, number, topic, is_internal in rows:
+        endpoints.setdefault(node_id, []).append(Endpoint(number, topic, bool(is_internal)))
+    return endpoints
+
+
+def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterator[MatchedLink]:
+    chosen = _choose(file, link, nodes)
+    found = False
+    for node in chosen:
+        inputs = _endpoints(link.inputs, node.subscriptions)
+        outputs = _endpoints(link.outputs, node.publishers)
+        missing = inputs[1] or outputs[1]
+        if missing is not None:
+            # A pattern may mean nodes of several kinds: those without these topics are not meant.
+            if _is_pattern(link.node.value):
+                continue
+            _fail_on_topic(file, missing, node, is_input=inputs[1] is not None)
+        both = {e.topic for e in inputs[0]} & {e.topic for e in outputs[0]}
+        if both:
+            file.fail(
+                link.line,
+                f"a topic is input and output of the same link — {sorted(both)[0]}",
+                "leave it out on one side; narrow a pattern that matches it on both",
+            )
+        found = True
+        yield MatchedLink(link.kind, node.process_id, inputs[0], outputs[0], link.line)
+    if not found:
+        file.fail(
+            link.line,
+            f"no node that matches {link.node.value} has all of these inputs and outputs",
+            f"the nodes are {_some(node.name for node in chosen)}",
+        )
+
+
+def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Sequence[Node]:
+    named = [node for node in nodes if _matches(node.name, link.node.value)]
+    if not named:
+        names = [node.name for node in nodes]
+        file.fail(
+            link.node.line, f"no such node — {link.node.value}", _known("nodes", link.node, names)
+        )
+    placed = named
+    if link.host is not None:
+        placed = [node for node in placed if _matches(node.host, link.host.value)]
+        if not placed:
+            hosts = sorted({node.host for node in named})
+            file.fail(
+                link.host.line,
+                f"no such node on this host — {link.host.value}",
+                f"{link.node.value} is on {_some(hosts)}",
+            )
+    if link.process is not None:
+        wanted = link.process.value
+        before, placed = (
+            placed,
+            [node for node in placed if str(node.pid) == wanted or _matches(node.process, wanted)],
+        )
+        if not placed:
+            file.fail(
+                link.process.line,
+                f"no such node in this process — {wanted}",
+                f"{link.node.value} is in {_some(_place(node) for node in before)}",
+            )
+    for node in placed:
+        same = [other for other in placed if other.name == node.name]
+        in_one_process = len({other.process_id for other in same}) == 1
+        if len(same) > 1 and not (in_one_process and link.process is not None):
+            file.fail(
+                link.node.line,
+                f"{len(same)} nodes have this name — {node.name}",
+                f"say which with process: or host: — {_some(_place(other) for other in same)}",
+            )
+    return placed
+
+
+def _endpoints(
+    wanted: Sequence[Text], there: Sequence[Endpoint]
+) -> tuple[tuple[Endpoint, ...], Text | None]:
+    """Return the endpoints meant, and the first text that means none."""
+    meant: dict[int, Endpoint] = {}
+    for text in wanted:
+        found = [
+            endpoint
+            for endpoint in there
+            if endpoint.topic == text.value
+            or (not endpoint.is_internal and _matches(endpoint.topic, text.value))
+        ]
+        if not found:
+            return (), text
+        meant.update((endpoint.id, endpoint) for endpoint in found)
+    return tuple(meant[number] for number in sorted(meant)), None
+
+
+def _fail_on_topic(file: LinksFile, missing: Text, node: Node, *, is_input: bool) -> None:
+    there = node.subscriptions if is_input else node.publishers
+    what = "subscribe to" if is_input else "publish on"
+    topics = [endpoint.topic for endpoint in there if not endpoint.is_internal]
+    file.fail(
+        missing.line,
+        f"{node.name} does not {what} such a topic — {missing.value}",
+        _known("topics", missing, topics) if topics else f"{node.name} does not {what} any topic",
+    )
+
+
+def _refuse_cycles(file: LinksFile, links: Sequence[MatchedLink]) -> None:
+    """Raise where messages would lead to themselves through declared links alone."""
+    before: dict[str, set[str]] = {}
+    for link in links:
+        for output in link.outputs:
+            before.setdefault(output.topic, set()).update(e.topic for e in link.inputs)
+    try:
+        TopologicalSorter({topic: sorted(before[topic]) for topic in sorted(before)}).prepare()
+    except CycleError as error:
+        cycle = error.args[1]
+        steps = set(pairwise(cycle))
+        lines = sorted(
+            {
+                link.line
+                for link in links
+                for i in link.inputs
+                for o in link.outputs
+                if (i.topic, o.topic) in steps
+            }
+        )
+        file.fail(
+            lines[-1],
+            f"the links form a cycle — {' → '.join(cycle)}",
+            f"leave one of them out: lines {', '.join(map(str, lines))}",
+        )
+
+
+def _matches(name: str, wanted: str) -> bool:
+    return name == wanted or (_is_pattern(wanted) and fnmatchcase(name, wanted))
+
+
+def _is_pattern(text: str) -> bool:
+    return any(character in text for character in "*?[")
+
+
+def _place(node: Node) -> str:
+    return f"process {node.process} {node.pid} on host {node.host}"
+
+
+def _known(what: str, wanted: Text, names: Iterable[str]) -> str:
+    known = sorted(set(names))
+    close = difflib.get_close_matches(wanted.value, known, n=1)
+    meant = f"did you mean {close[0]}; " if close else ""
+    return f"{meant}the {what} are {_some(known)}" if known else f"there are no {what}"
+
+
+def _some(names: Iterable[str]) -> str:
+    known = list(dict.fromkeys(names))
+    more = len(known) - _SHOWN
+    return ", ".join(known[:_SHOWN]) + (f" and {more} more" if more > 0 else "")

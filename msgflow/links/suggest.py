@@ -1,0 +1,58 @@
+"""Writes what the query `link-suggestions` finds as a file to review."""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_HEAD = (
+    "Candidates for indirect links, found in what was traced. Only the author of a node knows what"
+    " it does with messages that it keeps: review every entry, delete what is wrong, then"
+)
+_PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
+_WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
+_WIDTH = 96
+
+
+def suggest_links(rows: Sequence[Mapping[str, Any]], command: str) -> str:
+    """Return a file with the candidates, and the evidence of each as a comment.
+
+    Args:
+        rows: of the query `link-suggestions`.
+        command: what applies the file.
+    """
+    lines = [*_comment(_HEAD), f"#   {command}"]
+    if not rows:
+        return "\n".join([*lines, "# There are none.", "links: []"])
+    lines.append("links:")
+    for row in rows:
+        lines += _entry(row)
+    return "\n".join(lines)
+
+
+def _entry(row: Mapping[str, Any]) -> list[str]:
+    lines = [
+        *(f"  {line}" for line in _comment(f"{row['node']}: {row['evidence']}")),
+        f"  - kind: {row['kind']}",
+        f"    node: {_quoted(row['node'])}",
+    ]
+    if row["is_name_repeated"]:
+        lines += [f"    process: {row['pid']}", f"    host: {_quoted(row['host'])}"]
+    for side in ("inputs", "outputs"):
+        lines.append(f"    {side}: [{', '.join(map(_quoted, row[side]))}]")
+    return lines
+
+
+def _comment(text: str) -> list[str]:
+    return [f"# {line}" for line in textwrap.wrap(text, _WIDTH, break_on_hyphens=False)]
+
+
+def _quoted(text: str) -> str:
+    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
+        return text
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,200 @@
+-- name: link-suggestions
+-- title: Indirect links that the data suggests
+-- description: Where messages seem to be kept for later: a timer publishes while messages that its
+--     node receives lead nowhere (periodic_async), or callbacks of a node's subscriptions publish
+--     only once each of several inputs has had a message (partial_sync). Nobody but the author of
+--     the node knows whether it is so: review them before you apply any.
+-- grain: one row per candidate
+-- param: min_share DOUBLE = 0.95    Share of the publications that had a message of an input since
+--     the one before, from which on it counts as an input of a partial_sync candidate
+-- column: run_id BIGINT             Run
+-- column: kind VARCHAR              'periodic_async' or 'partial_sync'
+-- column: node VARCHAR              Node
+-- column: inputs VARCHAR[]          Topics of the inputs
+-- column: outputs VARCHAR[]         Topics of the outputs
+-- column: evidence VARCHAR          What was seen
+-- column: process VARCHAR           Process name of the node
+-- column: pid INTEGER               Process id of the node
+-- column: host VARCHAR              Host of the node
+-- column: is_name_repeated BOOLEAN  Several nodes of the run have this name
+-- needs: main.node, main.process, main.host, main.timer, main.callback, main.callback_instance,
+--     main.subscription, main.publication, main.publisher, main.link_causal
+WITH named_node AS (
+    SELECT
+        n.run_id, n.node_id, n.full_name, p.name AS process, p.pid, h.hostname AS host,
+        count(*) OVER (PARTITION BY n.run_id, n.full_name) > 1 AS is_name_repeated
+    FROM main.node AS n
+    JOIN main.process AS p ON n.process_id = p.process_id
+    JOIN main.host AS h ON p.host_id = h.host_id
+    WHERE list_contains($runs, n.run_id) AND n.full_name IS NOT NULL
+),
+input_run AS (
+    SELECT
+        s.node_id, s.subscription_id, s.topic_name, i.callback_instance_id, i.start_ns,
+        coalesce(i.end_ns, i.start_ns) AS end_ns
+    FROM main.subscription AS s
+    JOIN named_node AS n ON s.node_id = n.node_id
+    JOIN main.callback AS c ON s.subscription_id = c.subscription_id
+    JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
+    WHERE NOT s.is_internal AND s.topic_name IS NOT NULL
+),
+caused AS (
+    SELECT
+        l.callback_instance_id, l.publication_id, l.kind, b.publisher_id, b.start_ns,
+        p.topic_name, p.node_id
+    FROM main.link_causal AS l
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE list_contains($runs, l.run_id) AND NOT p.is_internal AND p.topic_name IS NOT NULL
+),
+input AS (
+    SELECT
+        r.node_id, r.subscription_id, r.topic_name,
+        count(DISTINCT r.callback_instance_id) AS run_count,
+        count(DISTINCT c.callback_instance_id) AS leading_count
+    FROM input_run AS r
+    LEFT JOIN caused AS c ON r.callback_instance_id = c.callback_instance_id
+    GROUP BY r.node_id, r.subscription_id, r.topic_name
+),
+-- A timer publishes, and messages lead nowhere.
+dead_end AS (
+    SELECT
+        node_id,
+        list(DISTINCT topic_name ORDER BY topic_name) AS inputs,
+        string_agg(
+            printf('%d messages on %s', run_count, topic_name), ' and ' ORDER BY topic_name
+        ) AS evidence
+    FROM input
+    WHERE leading_count = 0
+    GROUP BY node_id
+),
+timer_publication AS (
+    SELECT t.timer_id, t.node_id, t.period_ns, c.topic_name, count(*) AS publication_count
+    FROM main.timer AS t
+    JOIN main.callback AS k ON t.timer_id = k.timer_id
+    JOIN main.callback_instance AS i ON k.callback_id = i.callback_id
+    JOIN caused AS c ON i.callback_instance_id = c.callback_instance_id AND c.kind = 'direct'
+    WHERE t.node_id = c.node_id
+    GROUP BY t.timer_id, t.node_id, t.period_ns, c.topic_name
+),
+periodic AS (
+    SELECT
+        t.node_id,
+        'periodic_async' AS kind,
+        any_value(d.inputs) AS inputs,
+        list(DISTINCT t.topic_name ORDER BY t.topic_name) AS outputs,
+        printf(
+            'its timer of %.10g ms published %s, while %s led nowhere',
+            any_value(t.period_ns) / 1e6,
+            string_agg(
+                printf('%d messages on %s', t.publication_count, t.topic_name), ' and '
+                ORDER BY t.topic_name
+            ),
+            any_value(d.evidence)
+        ) AS evidence
+    FROM timer_publication AS t
+    JOIN dead_end AS d ON t.node_id = d.node_id
+    GROUP BY t.timer_id, t.node_id
+),
+-- Callbacks of subscriptions publish once per set of messages.
+fired AS (
+    SELECT
+        c.publisher_id, c.topic_name AS output_topic, r.node_id, r.subscription_id,
+        r.callback_instance_id, r.start_ns, min(c.start_ns) AS published_ns
+    FROM caused AS c
+    JOIN input_run AS r ON c.callback_instance_id = r.callback_instance_id
+    WHERE c.kind = 'direct' AND c.node_id = r.node_id
+    GROUP BY ALL
+),
+firing AS (
+    SELECT
+        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, start_ns,
+        lag(published_ns) OVER (PARTITION BY publisher_id ORDER BY start_ns, callback_instance_id)
+            AS emptied_ns
+    FROM fired
+),
+firing_input AS (
+    SELECT
+        f.publisher_id, f.output_topic, f.node_id, f.callback_instance_id, f.start_ns,
+        f.emptied_ns, i.subscription_id,
+        f.subscription_id = i.subscription_id AS is_own
+    FROM firing AS f
+    JOIN input AS i ON f.node_id = i.node_id
+),
+-- An input counts where its messages lead nowhere else, or to this output.
+met AS (
+    SELECT
+        f.publisher_id, f.output_topic, f.node_id, f.subscription_id,
+        count(*) AS firing_count,
+        count(CASE WHEN f.is_own THEN 1 END) AS own_count,
+        count(
+            CASE
+                WHEN f.is_own THEN 1
+                WHEN own.callback_instance_id IS NULL
+                    AND coalesce(r.end_ns > f.emptied_ns, r.end_ns IS NOT NULL) THEN 1
+            END
+        ) AS met_count
+    FROM firing_input AS f
+    ASOF LEFT JOIN input_run AS r
+        ON f.subscription_id = r.subscription_id AND f.start_ns >= r.end_ns
+    LEFT JOIN fired AS own
+        ON f.publisher_id = own.publisher_id
+        AND r.callback_instance_id = own.callback_instance_id
+    GROUP BY f.publisher_id, f.output_topic, f.node_id, f.subscription_id
+),
+synchronous AS (
+    SELECT
+        m.node_id, m.publisher_id, m.output_topic,
+        any_value(m.firing_count) AS firing_count,
+        list(DISTINCT i.topic_name ORDER BY i.topic_name) AS inputs,
+        string_agg(
+            printf(
+                '%d of %d messages on %s published', m.own_count, i.run_count, i.topic_name
+            ),
+            ', ' ORDER BY i.topic_name, i.subscription_id
+        ) AS evidence,
+        min(m.met_count) AS met_count
+    FROM met AS m
+    JOIN input AS i ON m.subscription_id = i.subscription_id
+    WHERE m.met_count >= m.firing_count * $min_share
+        AND (i.leading_count = 0 OR m.own_count > 0)
+    GROUP BY m.node_id, m.publisher_id, m.output_topic
+    HAVING count(DISTINCT i.topic_name) > 1 AND any_value(m.firing_count) >= 3
+        AND sum(i.run_count) > any_value(m.firing_count)
+),
+partial AS (
+    SELECT
+        node_id,
+        'partial_sync' AS kind,
+        inputs,
+        list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
+        printf(
+            '%d of %d publications on %s came after a message of each input since the one before;'
+            || ' %s',
+            min(met_count),
+            min(firing_count),
+            string_agg(DISTINCT output_topic, ' and ' ORDER BY output_topic),
+            min(evidence)
+        ) AS evidence
+    FROM synchronous
+    GROUP BY node_id, inputs
+),
+candidate AS (
+    SELECT node_id, kind, inputs, outputs, evidence FROM periodic
+    UNION ALL
+    SELECT node_id, kind, inputs, outputs, evidence FROM partial
+)
+SELECT
+    n.run_id,
+    c.kind,
+    n.full_name AS node,
+    c.inputs,
+    c.outputs,
+    c.evidence,
+    n.process,
+    n.pid,
+    n.host,
+    n.is_name_repeated
+FROM candidate AS c
+JOIN named_node AS n ON c.node_id = n.node_id
+ORDER BY n.run_id, node, n.host, n.pid, c.kind, c.outputs, c.inputs, c.evidence, c.node_id

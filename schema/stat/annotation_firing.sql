@@ -1,0 +1,45 @@
+-- name: derive.annotation_firing
+-- description: Publications by the outputs of annotations, with how many inputs they have a message
+--     of: through an indirect link, or the message that the publishing run was called with. Where
+--     all inputs have to come together (partial_sync), only what the run of an input publishes.
+-- grain: one row per annotation and publication that it applies to
+-- needs: store.annotation, store.annotation_input, store.annotation_output, store.publication,
+--     store.link_causal, store.callback_instance, store.callback
+WITH input AS (
+    SELECT annotation_id, count(*) AS input_count
+    FROM store.annotation_input
+    GROUP BY annotation_id
+),
+linked AS (
+    SELECT annotation_id, publication_id, count(*) AS link_count
+    FROM store.link_causal
+    WHERE annotation_id IS NOT NULL
+    GROUP BY annotation_id, publication_id
+),
+direct AS (
+    SELECT
+        l.publication_id, l.callback_instance_id,
+        coalesce(c.subscription_id, l.subscription_id) AS subscription_id
+    FROM store.link_causal AS l
+    JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+    WHERE l.kind = 'direct'
+        AND l.publisher_id IN (SELECT publisher_id FROM store.annotation_output)
+)
+SELECT
+    a.run_id,
+    a.annotation_id,
+    b.publication_id,
+    d.callback_instance_id,
+    coalesce(n.input_count, 0) AS input_count,
+    coalesce(l.link_count, 0) + (i.annotation_id IS NOT NULL)::BIGINT AS linked_count
+FROM store.annotation AS a
+JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
+JOIN store.publication AS b ON o.publisher_id = b.publisher_id
+LEFT JOIN input AS n ON a.annotation_id = n.annotation_id
+LEFT JOIN direct AS d ON b.publication_id = d.publication_id
+LEFT JOIN store.annotation_input AS i
+    ON a.annotation_id = i.annotation_id AND d.subscription_id = i.subscription_id
+LEFT JOIN linked AS l
+    ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
+WHERE a.kind = 'periodic_async' OR i.annotation_id IS NOT NULL
