@@ -336,3 +336,14 @@ class RosSystem(StagedEvents):
     def execute(self, thread: Thread, handle: int) -> int:
         """rclcpp_executor_execute."""
         return self.add("ros2:rclcpp_executor_execute", thread, handle=handle)
+
+    def annotate(self, thread: Thread, kind: str, inputs: list[int], outputs: list[int]) -> int:
+        """message_link_periodic_async or message_link_partial_sync."""
+        return self.add(
+            f"ros2:message_link_{kind}",
+            thread,
+            _subs_length=len(inputs),
+            subs=inputs,
+            _pubs_length=len(outputs),
+            pubs=outputs,
+        )
