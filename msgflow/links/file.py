@@ -156,6 +156,8 @@ class _Reader:
                 self._file.fail(_line(key), f"{what} has no {name}", f"it has {names}")
             if name in fields:
                 self._file.fail(_line(key), f"{name} is given twice")
+            if _is_null(value) and name != "links":
+                self._file.fail(_line(key), f"{name} has no value", _EXAMPLE)
             fields[name] = value
         for name in required:
             if name not in fields:

@@ -93,7 +93,16 @@ def checker(shared_traces: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "name", ["sync_1_1", "sync_1_1_humble", "sync_1_1_jazzy", "pingpong", "services"]
+    "name",
+    [
+        "sync_1_1",
+        "sync_1_1_humble",
+        "sync_1_1_jazzy",
+        "pingpong",
+        "services",
+        "periodic_async_jazzy24",
+        "partial_sync",
+    ],
 )
 def test_scores(
     recordings: Callable[[str], Ingested],

@@ -1,0 +1,200 @@
+"""Indirect links declared after the fact: what they do to a database, and when they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ingested import contents
+
+from msgflow import Database
+from msgflow.errors import UsageError
+
+BOTH = """
+links:
+  - kind: periodic_async
+    node: /fusion
+    inputs: [/a, /b]
+    outputs: [/c, /d]
+"""
+KINDS = "SELECT kind, count(*) FROM link_causal GROUP BY kind ORDER BY kind"
+DECLARED = (
+    "SELECT a.kind, a.source, list(DISTINCT s.topic_name ORDER BY s.topic_name), "
+    "list(DISTINCT p.topic_name ORDER BY p.topic_name) FROM annotation AS a "
+    "JOIN annotation_input AS i USING (annotation_id) JOIN subscription AS s USING "
+    "(subscription_id) JOIN annotation_output AS o USING (annotation_id) "
+    "JOIN publisher AS p USING (publisher_id) GROUP BY a.annotation_id, a.kind, a.source "
+    "ORDER BY a.annotation_id"
+)
+
+
+def write(path: Path, text: str) -> Path:
+    file = path.parent / "links.yaml"
+    file.write_text(text)
+    return file
+
+
+def rows(path: Path, sql: str) -> list[tuple[Any, ...]]:
+    with Database(path) as database:
+        return database.connection.execute(sql).fetchall()
+
+
+def test_links_are_derived_anew(database: Path) -> None:
+    assert rows(database, KINDS) == [("direct", 4)]
+    with Database(database) as opened:
+        (applied,) = opened.apply_links(write(database, BOTH))
+        assert (applied.annotation_count, applied.known_count, applied.link_count) == (1, 0, 8)
+        assert all(not check.row_count for check in opened.check())
+    assert rows(database, KINDS) == [("direct", 4), ("periodic_async", 8)]
+    assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
+
+
+def test_another_file_replaces_the_former(database: Path) -> None:
+    with Database(database) as opened:
+        opened.apply_links(write(database, BOTH))
+        before = contents(database)
+        opened.apply_links(write(database, BOTH))
+        after = contents(database)
+        assert before["link_causal"] != []
+        assert len(before["link_causal"]) == len(after["link_causal"])
+        opened.apply_links(write(database, BOTH.replace("[/a, /b]", "/b")))
+        assert rows(database, DECLARED) == [("periodic_async", "file", ["/b"], ["/c", "/d"])]
+        opened.apply_links(write(database, "links: []"))
+    assert rows(database, "SELECT count(*) FROM annotation_input") == [(0,)]
+    assert rows(database, KINDS) == [("direct", 4)]
+
+
+def test_patterns(database: Path) -> None:
+    """Of nodes and topics; ROS's own topics are none of them, and nodes without are left out."""
+    text = BOTH.replace("/fusion", "'/*u*'").replace("[/a, /b]", "'*'").replace("[/c, /d]", "/[cd]")
+    with Database(database) as opened:
+        opened.apply_links(write(database, text))
+    assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
+
+
+def test_equal_entries_are_one(database: Path) -> None:
+    entry = BOTH.partition("links:\n")[2]
+    other = entry.replace("[/a, /b]", "[/b, /a, '/[ab]']")
+    with Database(database) as opened:
+        (applied,) = opened.apply_links(write(database, f"links:\n{entry}{other}"))
+    assert applied.annotation_count == 1
+    assert len(rows(database, DECLARED)) == 1
+
+
+def test_a_name_that_occurs_twice_with_its_process(database: Path) -> None:
+    text = BOTH.replace("/fusion", "/ns/twin").replace("[/a, /b]", "/x").replace("[/c, /d]", "/y")
+    for place in ("process: right", "process: 400", "{process: '400', host: alpha}"):
+        extra = place.strip("{}").replace(", ", "\n    ")
+        with Database(database) as opened:
+            opened.apply_links(write(database, f"{text}    {extra}\n"))
+        assert rows(
+            database, "SELECT p.name FROM annotation JOIN process AS p USING (process_id)"
+        ) == [("right",)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message", "hint"),
+    [
+        ("/fusion", "/fusio", 4, "no such node — /fusio", "did you mean /fusion"),
+        ("/fusion", "'/zz*'", 4, "no such node — /zz*", "/fusion, /ns/twin, /relay"),
+        ("/fusion", "/ns/twin", 4, "2 nodes have this name — /ns/twin", "process right 400"),
+        ("/b]", "/bb]", 5, "/fusion does not subscribe to such a topic — /bb", "/a, /b"),
+        ("/d]", "'/z*']", 6, "/fusion does not publish on such a topic — /z*", "/c, /d"),
+        ("/fusion", "'/*'", 3, "2 nodes", None),
+        ("periodic_async", "periodic", 3, "no such kind of link — periodic", "partial_sync"),
+        ("/fusion", "/fusion\n    host: beta", 5, "no such node on this host — beta", "alpha"),
+        ("/fusion", "/fusion\n    process: 7", 5, "in this process — 7", "fusion 100"),
+    ],
+)
+def test_what_does_not_exist_changes_nothing(
+    database: Path, old: str, new: str, line: int, message: str, hint: str | None
+) -> None:
+    before = contents(database)
+    with Database(database) as opened, pytest.raises(UsageError) as caught:
+        opened.apply_links(write(database, BOTH.replace(old, new, 1)))
+    assert message in caught.value.message
+    if hint is not None:
+        assert f"links.yaml, line {line}: " in caught.value.message
+        assert caught.value.hint is not None
+        assert hint in caught.value.hint
+    assert contents(database) == before
+
+
+ENTRY = "  - {{kind: partial_sync, node: {}, inputs: [{}], outputs: [{}]}}\n"
+
+
+@pytest.mark.parametrize(
+    ("entries", "line", "message"),
+    [
+        ([("/relay", "/c", "/c")], 2, "a topic is input and output of the same link — /c"),
+        (
+            [("/fusion", "/a", "/c"), ("/relay", "/c", "/a")],
+            3,
+            "the links form a cycle — /a → /c → /a",
+        ),
+        ([("'/[fr]*'", "'*'", "/nowhere")], 2, "no node that matches /[fr]* has all"),
+    ],
+)
+def test_links_that_lead_back_change_nothing(
+    database: Path, entries: list[tuple[str, str, str]], line: int, message: str
+) -> None:
+    before = contents(database)
+    text = "links:\n" + "".join(ENTRY.format(*entry) for entry in entries)
+    with Database(database) as opened, pytest.raises(UsageError) as caught:
+        opened.apply_links(write(database, text))
+    assert f"links.yaml, line {line}: {message}" in caught.value.message
+    assert contents(database) == before
+
+
+def test_what_the_trace_declares_itself_is_not_declared_again(
+    shared_traces: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "links.duckdb"
+    file = tmp_path / "links.yaml"
+    file.write_text(
+        "links: [{kind: partial_sync, node: /partial_sync_n_to_m, inputs: ['*'], outputs: '*'}]"
+    )
+    with Database(path) as database:
+        database.ingest(shared_traces / "partial_sync")
+        (applied,) = database.apply_links(file)
+    assert (applied.annotation_count, applied.known_count) == (1, 1)
+    assert rows(path, "SELECT source, count(*) FROM annotation GROUP BY source") == [("trace", 1)]
+
+
+def test_declared_or_traced_the_links_are_the_same(shared_traces: Path, tmp_path: Path) -> None:
+    """Also where they are declared by what the suggestions say."""
+    from msgflow.links import suggest_links
+
+    links = (
+        "SELECT kind, callback_instance_id, publication_id, candidate_count "
+        "FROM link_causal ORDER BY ALL"
+    )
+    for name in ("partial_sync", "periodic_async_jazzy24"):
+        traced, plain, declared = (
+            tmp_path / f"{name}-{kind}.duckdb" for kind in ("traced", "plain", "declared")
+        )
+        with Database(traced) as database:
+            database.ingest(shared_traces / name)
+        file = tmp_path / f"{name}.yaml"
+        with Database(plain) as database:
+            database.ingest(shared_traces / name, ignore=["ros2:message_link_*"])
+            suggestions = database.query("link-suggestions").to_arrow().to_pylist()
+            file.write_text(suggest_links(suggestions, "msgflow links apply FILE"))
+            database.close()
+            assert rows(plain, links) != rows(traced, links)
+            database.apply_links(file)
+        with Database(declared) as database:
+            database.ingest(shared_traces / name, ignore=["ros2:message_link_*"], links=file)
+        assert rows(plain, links) == rows(traced, links)
+        assert rows(declared, links) == rows(traced, links)
+
+
+def test_an_ingest_whose_links_do_not_fit_leaves_nothing(
+    shared_traces: Path, tmp_path: Path
+) -> None:
+    file = write(tmp_path / "x", BOTH)
+    with Database(tmp_path / "links.duckdb") as database, pytest.raises(UsageError) as caught:
+        database.ingest(shared_traces / "sync_1_1", links=file)
+    assert "no such node — /fusion" in caught.value.message
+    assert not database.path.exists()
