@@ -56,10 +56,39 @@ nested AS (
         AND d.start_event_id >= e.effective_end_event_id
     WHERE e.start_event_id > d.cut_event_id
 ),
+-- Publications of one run share their cut.
+cut AS MATERIALIZED (
+    SELECT DISTINCT run_id, subscription_id, thread_id, cut_event_id FROM demand
+),
+-- Where all runs of an input are on the publishing thread, none is under way at the cut unless
+-- others are nested in it.
+alone AS (
+    SELECT run_id, subscription_id, min(thread_id) AS thread_id
+    FROM run
+    GROUP BY run_id, subscription_id
+    HAVING min(thread_id) = max(thread_id)
+        AND NOT bool_or(
+            callback_instance_id IN (
+                SELECT parent_id FROM store.callback_instance WHERE parent_id IS NOT NULL
+            )
+        )
+),
+shared_cut AS MATERIALIZED (
+    SELECT c.run_id, c.subscription_id, c.thread_id, c.cut_event_id
+    FROM cut AS c
+    ANTI JOIN alone AS a
+        ON c.run_id = a.run_id
+        AND c.subscription_id = a.subscription_id
+        AND c.thread_id = a.thread_id
+),
 step AS (
-    SELECT run_id, subscription_id, start_event_id AS event_id, 1 AS change FROM run
+    SELECT run_id, subscription_id, start_event_id AS event_id, 1 AS change
+    FROM run
+    WHERE subscription_id IN (SELECT subscription_id FROM shared_cut)
     UNION ALL
-    SELECT run_id, subscription_id, effective_end_event_id, -1 FROM run
+    SELECT run_id, subscription_id, effective_end_event_id, -1
+    FROM run
+    WHERE subscription_id IN (SELECT subscription_id FROM shared_cut)
 ),
 under_way AS (
     SELECT
@@ -70,21 +99,40 @@ under_way AS (
     FROM step
     GROUP BY run_id, subscription_id, event_id
 ),
+under_way_at_cut AS (
+    SELECT c.subscription_id, c.thread_id, c.cut_event_id, u.run_count
+    FROM shared_cut AS c
+    ASOF JOIN under_way AS u
+        ON c.run_id = u.run_id
+        AND c.subscription_id = u.subscription_id
+        AND c.cut_event_id >= u.event_id
+    WHERE u.run_count > 0
+),
+at_cut AS (
+    SELECT
+        c.subscription_id, c.thread_id, c.cut_event_id, e.callback_instance_id,
+        coalesce(u.run_count, 0) AS run_count
+    FROM cut AS c
+    ASOF LEFT JOIN ended AS e
+        ON c.run_id = e.run_id
+        AND c.subscription_id = e.subscription_id
+        AND c.cut_event_id >= e.effective_end_event_id
+    LEFT JOIN under_way_at_cut AS u
+        ON c.subscription_id = u.subscription_id
+        AND c.thread_id = u.thread_id
+        AND c.cut_event_id = u.cut_event_id
+),
 cached AS (
     SELECT
         d.run_id, d.annotation_id, d.publication_id, d.publishing_id, d.subscription_id,
         d.trace_id, d.thread_id, d.start_ns, d.start_event_id,
-        coalesce(n.callback_instance_id, e.callback_instance_id) AS callback_instance_id,
-        1 + coalesce(u.run_count, 0) AS candidate_count
+        coalesce(n.callback_instance_id, c.callback_instance_id) AS callback_instance_id,
+        1 + c.run_count AS candidate_count
     FROM demand AS d
-    ASOF LEFT JOIN ended AS e
-        ON d.run_id = e.run_id
-        AND d.subscription_id = e.subscription_id
-        AND d.cut_event_id >= e.effective_end_event_id
-    ASOF LEFT JOIN under_way AS u
-        ON d.run_id = u.run_id
-        AND d.subscription_id = u.subscription_id
-        AND d.cut_event_id >= u.event_id
+    JOIN at_cut AS c
+        ON d.subscription_id = c.subscription_id
+        AND d.thread_id = c.thread_id
+        AND d.cut_event_id = c.cut_event_id
     LEFT JOIN nested AS n
         ON d.annotation_id = n.annotation_id
         AND d.publication_id = n.publication_id
