@@ -25,6 +25,7 @@ WITH link AS (
         candidate_count, is_loss_affected
     FROM derive.link_causal_partial_sync
 )
+-- By identities alone: with run_id as well, runs and publications might be joined by that first.
 SELECT
     l.run_id,
     l.callback_instance_id,
