@@ -167,9 +167,7 @@ def _line(node: Any) -> int:
     return int(node.start_mark.line) + 1
 
 
-def _clock(
-    sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, int]]
-) -> GivenClock:
+def _clock(sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, int]]) -> GivenClock:
     numbers: dict[str, int] = {}
     for key, (text, field_line) in fields.items():
         if key not in _FIELDS:
