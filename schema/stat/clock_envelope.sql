@@ -17,6 +17,9 @@ base AS MATERIALIZED (
         clock_id, other_clock_id,
         min(at_ns) AS base_ns,
         max(at_ns) - min(at_ns) AS length_ns,
+        least(max(CASE WHEN sense < 0 THEN at_ns END), max(CASE WHEN sense > 0 THEN at_ns END))
+        - greatest(min(CASE WHEN sense < 0 THEN at_ns END), min(CASE WHEN sense > 0 THEN at_ns END))
+            AS overlap_ns,
         coalesce(max(CASE WHEN sense < 0 THEN bound_ns END), min(-bound_ns)) AS base_bound_ns,
         count(CASE WHEN sense < 0 THEN 1 END) AS received_count,
         count(CASE WHEN sense > 0 THEN 1 END) AS sent_count
@@ -74,6 +77,6 @@ around AS (
 SELECT
     a.clock_id, a.other_clock_id, a.sense, a.moment, a.bound,
     coalesce(a.slope_before > a.slope_after, true) AS is_corner,
-    b.base_ns, b.base_bound_ns, b.received_count, b.sent_count
+    b.base_ns, b.base_bound_ns, b.overlap_ns, b.received_count, b.sent_count
 FROM around AS a
 JOIN base AS b ON a.clock_id = b.clock_id AND a.other_clock_id = b.other_clock_id
