@@ -198,7 +198,12 @@ def test_a_clock_that_was_set_is_said(connection: duckdb.DuckDBPyConnection) -> 
         assert drift_uncertainty_ppb is None
         assert jump / 4 < uncertainty_ns < jump
         assert [name for name, _ in finding(connection)] == ["clock_uneven"]
-        for true, jumped in ((SECOND, 0), (9 * SECOND, 0), (11 * SECOND, jump), (19 * SECOND, jump)):
+        for true, jumped in (
+            (SECOND, 0),
+            (9 * SECOND, 0),
+            (11 * SECOND, jump),
+            (19 * SECOND, jump),
+        ):
             shown = Clock(10**9).shows(true) + jumped
             corrected = shown + offset_ns + (shown - at_ns) * drift_ppb / 1e9
             assert abs(corrected - Clock().shows(true)) <= uncertainty_ns + 1_000

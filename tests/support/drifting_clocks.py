@@ -92,9 +92,7 @@ def fill_clocks(
     connection.unregister("message")
 
 
-def _insert(
-    connection: duckdb.DuckDBPyConnection, table: str, columns: str, values: str
-) -> None:
+def _insert(connection: duckdb.DuckDBPyConnection, table: str, columns: str, values: str) -> None:
     """Insert a row per message; what is left out and required is 1."""
     given = [name.strip() for name in columns.split(",")]
     required = connection.execute(
