@@ -8,11 +8,11 @@ import pytest
 
 
 @pytest.fixture(scope="module")
-def bench(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def bench(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database for one set of clocks after the other: roll back what you do."""
     path = tmp_path_factory.mktemp("clocks") / "bench.duckdb"
     path.write_bytes(empty_database.read_bytes())
-    yield path
+    return path
 
 
 @pytest.fixture
