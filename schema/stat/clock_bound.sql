@@ -4,7 +4,8 @@
 --     before it was sent: one to the clock `clock_id` says what has to be added to its times at
 --     least to get those of `other_clock_id`, one from it says what at most. The difference is
 --     `-sense * bound_ns`, so that of both directions the largest `bound_ns` tells most. Only
---     messages matched by equal stamps count, which needs no clocks.
+--     messages matched by their stamps count, where there is no other candidate: that
+--     needs no comparison of the two clocks.
 -- grain: one row per pair of clocks and message between them
 -- needs: store.link_transport, store.publication, store.take, store.process, store.host
 CREATE OR REPLACE MACRO derive.clock_bound(of_run) AS TABLE
@@ -22,7 +23,7 @@ message AS (
     JOIN process_clock AS f ON b.process_id = f.process_id
     JOIN process_clock AS o ON t.process_id = o.process_id
     WHERE l.run_id = of_run
-        AND l.method = 'exact'
+        AND l.method IN ('exact', 'nearest')
         AND l.candidate_count = 1
         AND f.clock_id <> o.clock_id
 )

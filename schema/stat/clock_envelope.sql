@@ -36,7 +36,9 @@ placed AS MATERIALIZED (
     JOIN base AS b ON m.clock_id = b.clock_id AND m.other_clock_id = b.other_clock_id
 ),
 rough AS (
-    SELECT clock_id, other_clock_id, sense, stretch, arg_max(moment, bound) AS moment, max(bound) AS bound
+    SELECT
+        clock_id, other_clock_id, sense, stretch, arg_max(moment, bound) AS moment,
+        max(bound) AS bound
     FROM placed
     GROUP BY clock_id, other_clock_id, sense, stretch
 ),
@@ -64,8 +66,10 @@ fastest AS MATERIALIZED (
 around AS (
     SELECT
         f.clock_id, f.other_clock_id, f.sense, f.moment, any_value(f.bound) AS bound,
-        min(CASE WHEN o.moment < f.moment THEN (f.bound - o.bound) / (f.moment - o.moment) END) AS slope_before,
-        max(CASE WHEN o.moment > f.moment THEN (o.bound - f.bound) / (o.moment - f.moment) END) AS slope_after
+        min(CASE WHEN o.moment < f.moment THEN (f.bound - o.bound) / (f.moment - o.moment) END)
+            AS slope_before,
+        max(CASE WHEN o.moment > f.moment THEN (o.bound - f.bound) / (o.moment - f.moment) END)
+            AS slope_after
     FROM fastest AS f
     LEFT JOIN fastest AS o
         ON f.clock_id = o.clock_id

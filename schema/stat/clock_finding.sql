@@ -1,9 +1,9 @@
 -- name: derive.clock_finding
 -- kind: macro
--- description: What messages cannot tell of the clocks: those that nothing connects with the others,
---     and why, and those that do not run evenly.
+-- description: What messages cannot tell of the clocks: those that nothing connects with the
+--     others, and why, and those that do not run evenly.
 -- grain: one row per pair of clocks or clock
--- needs: store.clock, store.host, derive.clock_pair, derive.clock_sync
+-- needs: store.host, derive.clock_pair, derive.clock_sync
 CREATE OR REPLACE MACRO derive.clock_finding(of_run) AS TABLE
 WITH clock_name AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS name

@@ -7,7 +7,8 @@
 --     there that keeps away from both most is the drift, and the steepest and the flattest line
 --     bound its error. With messages in a quarter of the stretches, these bounds of the drift are
 --     narrowed: the ways may differ by as much as they like, but that does not change by more than
---     half the round trip from begin to end (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar and Dagenais 2014).
+--     half the round trip from begin to end (Duda 1987; Poirier, Roy and Dagenais 2010;
+--     Jabbarifar and Dagenais 2014).
 --     Where no line is possible, the clocks do not run evenly: the line that misses least is
 --     given, and its error at any time is bounded by the fastest messages of each stretch.
 --     Without messages in both directions at the same time, all is NULL.
@@ -73,8 +74,10 @@ nearest AS (
 steepness AS (
     SELECT
         l.clock_id, l.other_clock_id,
-        max(CASE WHEN u.moment < l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END) AS lowest,
-        min(CASE WHEN u.moment > l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END) AS highest
+        max(CASE WHEN u.moment < l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END)
+            AS lowest,
+        min(CASE WHEN u.moment > l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END)
+            AS highest
     FROM corner AS l
     JOIN corner AS u ON l.clock_id = u.clock_id AND l.other_clock_id = u.other_clock_id
     WHERE l.sense < 0 AND u.sense > 0
@@ -100,7 +103,8 @@ line AS (
 miss AS (
     SELECT
         l.clock_id, l.other_clock_id,
-        max(-f.bound - f.sense * (l.middle + l.drift_ppb / 1e9 * (f.moment - l.moment))) AS greatest_miss
+        max(-f.bound - f.sense * (l.middle + l.drift_ppb / 1e9 * (f.moment - l.moment)))
+            AS greatest_miss
     FROM line AS l
     JOIN fastest AS f ON l.clock_id = f.clock_id AND l.other_clock_id = f.other_clock_id
     WHERE l.distance < 0

@@ -1,7 +1,8 @@
 -- name: derive.expected_arrival
 -- description: When each message could be received at the earliest, on the clock of those who
 --     subscribe to its topic: the end of its publication, which is shifted to another clock where
---     messages tell how far the two are apart, or else the correction of both (NULL: nothing tells).
+--     messages tell how far the two are apart, or else the correction of both does (NULL: nothing
+--     tells).
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
 -- needs: store.publication, store.publisher, store.subscription, store.process, store.host,
 --     store.clock, derive.clock_shift, derive.corrected_ns, derive.recorded_ns
