@@ -102,6 +102,7 @@ class Database:
         hosts: Mapping[str, str] | None = None,
         keep_staging: str | Path | None = None,
         links: str | Path | None = None,
+        clock_sync: str | Path = "none",
         reader: str = "auto",
         strict: bool = False,
         ignore: Sequence[str] = (),
@@ -116,6 +117,8 @@ class Database:
             hosts: name of a host -> path of one of its traces.
             keep_staging: directory for the staging tables as Parquet.
             links: file with indirect links to declare.
+            clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a
+                file with the offset of each, see docs/semantics.md.
             reader: 'auto', 'msgflow' or 'bt2'.
             strict: refuse a trace at its first damage, instead of keeping what is good.
             ignore: names of events to leave out.
@@ -137,6 +140,7 @@ class Database:
             hosts=dict(hosts) if hosts else None,
             keep_staging=Path(keep_staging) if keep_staging is not None else None,
             links=Path(links) if links is not None else None,
+            clock_sync=clock_sync,
             reader=reader,
             strict=strict,
             ignore=ignore,
@@ -164,6 +168,28 @@ class Database:
         links = read_links(Path(file))
         self.close()
         return apply_links(self.path, links, run=run, memory_limit=self._memory_limit)
+
+    def apply_clocks(
+        self, clock_sync: str | Path, *, run: str | int | None = None
+    ) -> tuple[Run, ...]:
+        """Bring the clocks of several hosts together, or leave them as they were recorded.
+
+        Args:
+            clock_sync: 'none', 'messages', or a file with the offset of each clock.
+            run: 'all', a name or an id; the latest run when None.
+
+        Returns:
+            The runs whose clocks were set.
+
+        Raises:
+            UsageError: no such file or run, or a file that does not fit the run.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.clocks import apply_clocks, read_clock_sync
+
+        sync = read_clock_sync(clock_sync)
+        self.close()
+        return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
 
     def query(
         self,

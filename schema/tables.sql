@@ -64,14 +64,16 @@ CREATE TABLE store.loss_interval (
 
 -- One row per clock: hosts of one clock need no synchronisation.
 CREATE TABLE store.clock (
-    clock_id       BIGINT PRIMARY KEY,           -- Identity of the clock
-    run_id         BIGINT NOT NULL,              -- Run that the row belongs to -> run.run_id
-    uuid           VARCHAR,                      -- UUID of the clock (LTTng: boot identity)
-    offset_ns      BIGINT NOT NULL,              -- Added to a time of this clock to correct it [ns]
-    drift_ppb      BIGINT NOT NULL,              -- Added per elapsed time since reference_ns [1e-9]
-    reference_ns   BIGINT NOT NULL,              -- Moment at which the correction is offset_ns alone [epoch ns]
-    uncertainty_ns BIGINT,                       -- Bound of the error of the correction [ns]
-    method         VARCHAR NOT NULL              -- 'none', 'messages', 'packets' or 'file'
+    clock_id              BIGINT PRIMARY KEY,    -- Identity of the clock
+    run_id                BIGINT NOT NULL,       -- Run that the row belongs to -> run.run_id
+    uuid                  VARCHAR,               -- UUID of the clock (LTTng: boot identity)
+    offset_ns             BIGINT NOT NULL,       -- Added to a time of this clock to correct it [ns]
+    drift_ppb             BIGINT NOT NULL,       -- Added per elapsed time since reference_ns [1e-9]
+    reference_ns          BIGINT NOT NULL,       -- Moment at which the correction is offset_ns alone [epoch ns]
+    uncertainty_ns        BIGINT,                -- Bound of the error of the correction [ns]
+    method                VARCHAR NOT NULL,      -- 'none', 'messages', 'packets' or 'file'
+    drift_uncertainty_ppb BIGINT,                -- What its bound grows by per time elapsed since reference_ns or before it; NULL: none, or not known [1e-9]
+    reference_clock_id    BIGINT                 -- Clock whose times its times become; NULL: not brought together with others -> clock.clock_id
 );
 
 -- One row per machine or container.

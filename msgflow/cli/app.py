@@ -8,6 +8,7 @@ import typer
 
 from msgflow.cli import (
     check,
+    clocks,
     db,
     events,
     export,
@@ -39,6 +40,7 @@ app.command("sql")(sql.command)
 app.command("info")(info.command)
 app.command("check")(check.command)
 app.add_typer(links.app, name="links")
+app.add_typer(clocks.app, name="clocks")
 app.add_typer(export.app, name="export")
 app.add_typer(db.app, name="db")
 app.command("simulate")(simulate.command)

@@ -52,6 +52,15 @@ def command(
         Path | None,
         typer.Option("--links", metavar="FILE", help="Indirect links to declare, as YAML"),
     ] = None,
+    clock_sync: Annotated[
+        str,
+        typer.Option(
+            "--clock-sync",
+            metavar="none|messages|FILE",
+            help="Bring the clocks of several hosts together: by their messages, or by offsets in a"
+            " file",
+        ),
+    ] = "none",
     reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
         Reader.AUTO
     ),
@@ -95,6 +104,7 @@ def command(
                 hosts=hosts,
                 keep_staging=keep_staging,
                 links=links,
+                clock_sync=clock_sync,
                 reader=reader.value,
                 strict=strict,
                 ignore=ignore or [],

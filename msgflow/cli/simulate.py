@@ -134,6 +134,24 @@ def command(
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
+    clock_offset: Annotated[
+        float,
+        typer.Option(
+            "--clock-offset",
+            metavar="SECONDS",
+            help="How far each host's clock is ahead of that of the host before it",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
+    clock_drift: Annotated[
+        float,
+        typer.Option(
+            "--clock-drift",
+            metavar="PPM",
+            help="How much faster each host's clock runs than that of the host before it",
+            rich_help_panel=_RECORDING,
+        ),
+    ] = 0,
 ) -> None:
     """Write the trace of a simulated ROS 2 system, and the links that really happened."""
     from msgflow.cli.output import count, print_status
@@ -155,6 +173,8 @@ def command(
         directory,
         factor=factor,
         seed=seed,
+        clock_offset_ns=_nanoseconds(clock_offset),
+        clock_drift_ppm=clock_drift,
         layout=layout,
         recording=None if recording == Recording() else recording,
     )

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import duckdb
 
 # Tables of `store` that hold the rows of the view of that name in `derive`, each after those that
 # it is derived from.
 DERIVED = ("stamp_clock", "nearest_message", "link_transport", "link_causal")
 
-# Likewise, of what is missing: they need the links, and the topics learned from them.
+# Likewise, of what is missing: they need the links, the topics learned from them, and the clocks.
 DERIVED_FROM_LINKS = ("orphan_take", "undelivered")
 
 # Tables of `store` whose rows can learn their topic from a link.
@@ -37,19 +39,27 @@ GROUP BY run_id
 """
 
 
-def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+def derive(
+    con: duckdb.DuckDBPyConnection,
+    run_id: int,
+    *,
+    synchronise: Callable[[], None] | None = None,
+) -> None:
     """Derive the links of a run anew, inside the open transaction.
 
     Args:
         con: a writable connection to a database with current views.
         run_id: the run; nothing happens to others.
+        synchronise: called once messages are linked, to bring clocks together; they stay as they
+            are when None.
     """
     _forget_topics(con, run_id)
     _learn_topics(con, run_id)
     for name in DERIVED:
         _store(con, name, run_id)
-    for name in DERIVED_FROM_LINKS:
-        _store(con, name, run_id)
+    if synchronise is not None:
+        synchronise()
+    derive_from_clocks(con, run_id)
     con.execute(
         "DELETE FROM store.diagnostic WHERE run_id = ? AND name = 'path_cut'",
         [run_id],
@@ -59,6 +69,12 @@ def derive(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [objects.derivation_hash(), run_id],
     )
+
+
+def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Derive anew what depends on links and clocks, inside the open transaction."""
+    for name in DERIVED_FROM_LINKS:
+        _store(con, name, run_id)
 
 
 def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:

@@ -212,6 +212,17 @@ clock = _table(
     _time("reference_ns", "Moment at which the correction is offset_ns alone", required=True),
     _column("uncertainty_ns", BigInteger, "Bound of the error of the correction [ns]"),
     _text("method", "'none', 'messages', 'packets' or 'file'", required=True),
+    _column(
+        "drift_uncertainty_ppb",
+        BigInteger,
+        "What its bound grows by per time elapsed since reference_ns or before it; NULL: none, "
+        "or not known [1e-9]",
+    ),
+    _reference(
+        "reference_clock_id",
+        "Clock whose times its times become; NULL: not brought together with others",
+        to="clock.clock_id",
+    ),
 )
 
 host = _table(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow import trace as trace_package
+from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migrate, objects
 from msgflow.db.check import run_checks
 from msgflow.db.connection import connect
@@ -33,6 +34,7 @@ from msgflow.version import __version__
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from msgflow.clocks import ClockSync
     from msgflow.links import LinksFile
     from msgflow.query.interrupt import Interrupts
     from msgflow.trace import Progress, TraceInfo
@@ -98,6 +100,7 @@ def ingest(
     hosts: Mapping[str, str] | None = None,
     keep_staging: Path | None = None,
     links: Path | None = None,
+    clock_sync: str | Path = "none",
     reader: str = "auto",
     strict: bool = False,
     ignore: Sequence[str] = (),
@@ -118,6 +121,8 @@ def ingest(
         hosts: name of a host -> path; the traces below the path belong to that host.
         keep_staging: directory to which the staged events are written as Parquet.
         links: file with indirect links to declare.
+        clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a file
+            with the offset of each.
         reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
         strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
@@ -129,11 +134,13 @@ def ingest(
         TraceError: a path holds no trace, or none that can be read and used.
         DatabaseError: the database is locked, foreign, or of another schema revision.
         UsageError: the packets are in the database already, the name of the run is taken or means
-            something else, a path is empty, or `links` does not fit the traces.
+            something else, a path is empty, or `links` or the file of `clock_sync` does not fit
+            the traces.
         KeyboardInterrupt: Ctrl-C came before the run was stored.
     """
     _require_usable(paths, name)
     declared = None if links is None else read_links(links)
+    clocks = read_clock_sync(clock_sync)
     if database.is_symlink():
         database = Path(os.path.realpath(database))
     keep_freed_memory()
@@ -171,7 +178,14 @@ def ingest(
                 run = interruptible(
                     con,
                     lambda: _write(
-                        con, memory, names, loaded, declared, keep_staging, watch, interrupts
+                        con,
+                        memory,
+                        names,
+                        loaded,
+                        (declared, clocks),
+                        keep_staging,
+                        watch,
+                        interrupts,
                     ),
                 )
                 watch.enter("closing the database")
@@ -183,7 +197,7 @@ def _write(
     memory: Memory,
     names: tuple[str | None, str],
     loaded: Loaded,
-    declared: LinksFile | None,
+    given: tuple[LinksFile | None, ClockSync],
     keep_staging: Path | None,
     watch: _Watch,
     interrupts: Interrupts,
@@ -193,14 +207,14 @@ def _write(
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)
-    return memory.run(lambda: _write_run(con, names, loaded, declared, watch, interrupts))
+    return memory.run(lambda: _write_run(con, names, loaded, given, watch, interrupts))
 
 
 def _write_run(
     con: duckdb.DuckDBPyConnection,
     names: tuple[str | None, str],
     loaded: Loaded,
-    declared: LinksFile | None,
+    given: tuple[LinksFile | None, ClockSync],
     watch: _Watch,
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
@@ -209,9 +223,10 @@ def _write_run(
         watch.enter("storing the run")
         run_id, run_name = _store(con, *names, loaded)
         watch.enter("linking messages")
+        declared, clocks = given
         if declared is not None:
             declare_links(con, run_id, declared)
-        derive(con, run_id)
+        derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks))
         watch.enter("checking the database")
         _check(con, run_id)
         diagnostics = _diagnostics(con, run_id)

@@ -12,24 +12,24 @@ if TYPE_CHECKING:
     from msgflow.query.window import Run
 
 _CLOCKS = """
-SELECT run_id, count(*)
+SELECT run_id, count(DISTINCT coalesce(reference_clock_id, -clock_id))
 FROM main.clock
-WHERE list_contains($runs, run_id) AND method = 'none'
+WHERE list_contains($runs, run_id)
 GROUP BY run_id
-HAVING count(*) > 1
+HAVING count(DISTINCT coalesce(reference_clock_id, -clock_id)) > 1
 """
 
 
 def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
     """Return one sentence for each run with several clocks that are as recorded.
 
-    One such clock is what the others are corrected to.
+    Clocks that are corrected to the same one count as one.
     """
     numbers = dict(connection.execute(_CLOCKS, {"runs": [run.run_id for run in runs]}).fetchall())
     return [
         f"{'the run' if len(runs) == 1 else f'run {run.name} ({run.run_id})'} has"
         f" {numbers[run.run_id]} clocks that are not synchronised: times between their hosts are"
-        " not comparable"
+        " not comparable; msgflow clocks apply messages"
         for run in runs
         if run.run_id in numbers
     ]

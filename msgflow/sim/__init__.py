@@ -79,10 +79,11 @@ executor_state — one row per executor event, lasting until the next one of the
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
     'wait' for wait_for_work, 'execute' for execute)
 
-meta.json: scenario, description, layout, seed, factor, clock_offset_ns, hosts (hostname → traces,
-begin_of_tracing_ns, cpu_count, events by name), processes, rows of each table, length_ns (from the
-begin to the end of tracing), failed_takes (of executors), full_queues (arrivals at a queue that was
-full), undelivered (reason → count).
+meta.json: scenario, description, layout, seed, factor, clock_offset_ns, clock_drift_ppm, hosts
+(hostname → traces, begin_of_tracing_ns, clock_drift_ppb (how much too fast its clock runs),
+cpu_count, events by name), processes, rows of each table, length_ns (from the begin to the end of
+tracing), failed_takes (of executors), full_queues (arrivals at a queue that was full), undelivered
+(reason → count).
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from msgflow.sim.creation import PARAMETER_EVENTS
 from msgflow.sim.ctf import TraceIdentity
 from msgflow.sim.discovery import Discovery
 from msgflow.sim.entity import SECOND
+from msgflow.sim.host_clock import HostClock
 from msgflow.sim.layout import layouts
 from msgflow.sim.machine import Machine, RunningProcess
 from msgflow.sim.meta import write_meta
@@ -26,7 +27,7 @@ from msgflow.sim.truth import Truth
 from msgflow.sim.world import World
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from msgflow.sim.recording import Recording
     from msgflow.sim.system import Host, Scenario
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 _EPOCH_NS = 1_741_944_413_589_793_238
 _SHORTEST_UPTIME_NS = 3600 * SECOND
 _STOP_DELAY_NS = 2_000_000
+_FASTEST_DRIFT_PPM = 1_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,7 @@ def simulate(
     factor: float = 1.0,
     seed: int = 0,
     clock_offset_ns: int = 0,
+    clock_drift_ppm: float = 0.0,
     layout: str | None = None,
     recording: Recording | None = None,
 ) -> Simulation:
@@ -78,6 +81,8 @@ def simulate(
         seed: of everything that is random.
         clock_offset_ns: each host's clock is this much ahead of that of the host before it, in
             addition to what the scenario says.
+        clock_drift_ppm: each host's clock runs this much faster than that of the host before it,
+            likewise.
         layout: name of a layout, see `layouts()`; that of the scenario if None.
         recording: how it is recorded; as the scenario says if None.
 
@@ -91,15 +96,17 @@ def simulate(
     # The course of events depends on name and seed only: a longer run begins like a shorter one.
     # Yet traces that differ in anything never pass for the same.
     course = f"{chosen.name}/{seed}"
-    identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}"
+    identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}/{clock_drift_ppm!r}"
     truth = Truth(target / "truth")
     for event in layouts()[chosen.layout].events:
         for field in event.fields or (None,):
             truth.declared.add(event.name, None if field is None else field.name)
     world = World(course, truth)
     machines = {
-        host.hostname: _machine(chosen, host, index * clock_offset_ns, target, identity, truth)
-        for index, host in enumerate(chosen.hosts)
+        host.hostname: _machine(chosen, host, clock, target, identity, truth)
+        for host, clock in zip(
+            chosen.hosts, _clocks(chosen.hosts, clock_offset_ns, clock_drift_ppm), strict=True
+        )
     }
     middleware = Middleware(world, overwrites=chosen.overwrites, expected=_subscriptions(chosen))
     network = ServiceNetwork(world)
@@ -119,7 +126,12 @@ def simulate(
     write_meta(
         meta,
         chosen,
-        {"seed": seed, "factor": factor, "clock_offset_ns": clock_offset_ns},
+        {
+            "seed": seed,
+            "factor": factor,
+            "clock_offset_ns": clock_offset_ns,
+            "clock_drift_ppm": clock_drift_ppm,
+        },
         machines,
         truth,
         {
@@ -204,24 +216,38 @@ def _empty_directory(directory: Path) -> Path:
     return directory
 
 
+def _clocks(hosts: Sequence[Host], offset_ns: int, drift_ppm: float) -> list[HostClock]:
+    """The clock of each host; containers of one machine have the same."""
+    clocks: dict[str, HostClock] = {}
+    for index, host in enumerate(hosts):
+        drift = host.clock_drift_ppm + index * drift_ppm
+        if not abs(drift) < _FASTEST_DRIFT_PPM:
+            raise UsageError(f"no clock runs {drift} ppm too fast", "give less than 1000 ppm")
+        clocks.setdefault(
+            host.boot or f"host {host.hostname}",
+            HostClock(_EPOCH_NS + host.clock_offset_ns + index * offset_ns, round(drift * 1000)),
+        )
+    return [clocks[host.boot or f"host {host.hostname}"] for host in hosts]
+
+
 def _machine(
     scenario: Scenario,
     host: Host,
-    clock_offset: int,
+    clock: HostClock,
     target: Path,
     identity_key: str,
     truth: Truth,
 ) -> Machine:
     digest = sha256(f"{identity_key}/{host.hostname}".encode()).digest()
-    epoch = _EPOCH_NS + host.clock_offset_ns + clock_offset
+    boot = sha256(f"{identity_key}/{host.boot}".encode()).digest() if host.boot else digest
     identity = TraceIdentity(
         session=scenario.name,
         hostname=host.hostname,
         uuid=UUID(bytes=digest[:16], version=4),
-        boot_uuid=UUID(bytes=digest[16:], version=4),
-        epoch_ns=epoch,
+        boot_uuid=UUID(bytes=boot[16:], version=4),
+        epoch_ns=clock.epoch_ns,
         # Up to about thirteen days, so that hosts count from quite different values.
-        uptime_ns=_SHORTEST_UPTIME_NS + int.from_bytes(digest[:7], "little") % 2**50,
+        uptime_ns=_SHORTEST_UPTIME_NS + int.from_bytes(boot[:7], "little") % 2**50,
     )
     recorder = Recorder(
         target / host.hostname,
@@ -230,5 +256,6 @@ def _machine(
         host.cpu_count,
         scenario.recording,
         truth,
+        clock,
     )
-    return Machine(host.hostname, epoch, recorder, scenario.recording, host.stamp_resolution_ns)
+    return Machine(host.hostname, clock, recorder, scenario.recording, host.stamp_resolution_ns)

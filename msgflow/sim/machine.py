@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from msgflow.sim import system
     from msgflow.sim.executor_thread import ExecutorThread
+    from msgflow.sim.host_clock import HostClock
     from msgflow.sim.recorder import Recorder
     from msgflow.sim.recording import Recording
     from msgflow.sim.world import World
@@ -26,8 +27,7 @@ class Machine:
 
     Attributes:
         hostname: its name.
-        epoch: what its clock shows at time 0 (ns since the epoch); added to a time, it gives the
-            trace's time stamp.
+        epoch: its clock; added to a time, it gives the trace's time stamp.
         recorder: writes its traces.
         layout: of its traces.
         tracepoints: the events that can be emitted.
@@ -37,7 +37,7 @@ class Machine:
     def __init__(
         self,
         hostname: str,
-        epoch: int,
+        epoch: HostClock,
         recorder: Recorder,
         recording: Recording,
         stamp_resolution: int = 1,
@@ -50,12 +50,13 @@ class Machine:
         self.tracepoints = recorder.tracepoints
         self.emitters = recorder.emitters
         self.free_at = [0] * recorder.cpu_count
-        self._stamp_epoch = epoch + recording.realtime_offset_ns
+        self._realtime_offset_ns = recording.realtime_offset_ns
         self._slew_ppb = round(recording.slew_ppm * 1000)
 
     def stamp_ns(self, time: int) -> int:
         """What the clock that makes source stamps shows at `time` (ns since the epoch)."""
-        now = time + self._stamp_epoch + time * self._slew_ppb // 1_000_000_000
+        now = time + self.epoch + self._realtime_offset_ns
+        now += time * self._slew_ppb // 1_000_000_000
         return now - now % self._stamp_resolution
 
 

@@ -34,7 +34,8 @@ def write_meta(
                     str(directory.relative_to(path.parent.parent))
                     for directory in machine.recorder.directories
                 ],
-                "begin_of_tracing_ns": machine.epoch,
+                "begin_of_tracing_ns": 0 + machine.epoch,
+                "clock_drift_ppb": machine.epoch.drift_ppb,
                 "cpu_count": machine.recorder.cpu_count,
                 "events": dict(machine.tracepoints.counts()),
             }

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
+    from msgflow.sim.host_clock import HostClock
     from msgflow.sim.layout import Layout
     from msgflow.sim.truth import Truth
 
@@ -84,6 +85,7 @@ class Recorder:
         cpu_count: int,
         recording: Recording,
         truth: Truth,
+        clock: HostClock,
     ) -> None:
         self.layout = layout
         self.cpu_count = cpu_count
@@ -92,13 +94,14 @@ class Recorder:
         self._identity = identity
         self._recording = recording
         self._truth = truth
+        self._clock = clock
         self._random = Random(str(identity.uuid))
         self._snapshot: TraceWriter | None = None
         self._writers: dict[int, TraceWriter] = {}
         if recording.is_perfect:
             only = self._writer(0, "")
             self.emitters: tuple[Callable[..., None], ...] = tuple(
-                stream.emit_all for stream in only.streams
+                self._on_clock(stream.emit_all) for stream in only.streams
             )
             return
         if recording.is_dual_session:
@@ -107,7 +110,7 @@ class Recorder:
             )
         if recording.buffers is Buffers.PER_USER:
             self._writer(0, "")
-        self.emitters = tuple(self._emitter(cpu) for cpu in range(cpu_count))
+        self.emitters = tuple(self._on_clock(self._emitter(cpu)) for cpu in range(cpu_count))
 
     @property
     def directories(self) -> tuple[Path, ...]:
@@ -120,10 +123,11 @@ class Recorder:
 
     def close(self, end: int) -> None:
         """Complete the files; tracing stops at time `end`."""
+        start, end = self._clock.elapsed(self._recording.start_ns), self._clock.elapsed(end)
         if self._snapshot is not None:
-            self._snapshot.close(min(end, self._recording.start_ns))
+            self._snapshot.close(min(end, start))
         for writer in self._writers.values():
-            writer.close(max(end, self._recording.start_ns + 1))
+            writer.close(max(end, start + 1))
 
     # What a stream asks when it is recorded with faults.
 
@@ -145,8 +149,21 @@ class Recorder:
             identity.hostname, pid, tid, tracepoint.name, time + identity.epoch_ns, cause
         )
 
+    def _on_clock(self, emit: Callable[..., None]) -> Callable[..., None]:
+        """Return what emits events at the times that the clock of the host shows."""
+        if not self._clock.drift_ppb:
+            return emit
+        elapsed = self._clock.elapsed
+
+        def emit_on_clock(
+            tracepoint: Tracepoint, time: int, context: bytes, *values: object
+        ) -> None:
+            emit(tracepoint, elapsed(time), context, *values)
+
+        return emit_on_clock
+
     def _emitter(self, cpu: int) -> Callable[..., None]:
-        start = self._recording.start_ns
+        start = self._clock.elapsed(self._recording.start_ns)
         is_per_process = self._recording.buffers is Buffers.PER_PROCESS
 
         def emit(tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
@@ -169,16 +186,17 @@ class Recorder:
         """The trace of a process, or that of the user if `pid` is 0."""
         writer = self._writers.get(pid)
         if writer is None:
+            shown = self._clock.elapsed
             session = "runtime" if self._recording.is_dual_session else ""
             buffering = ("pid", pid, name) if pid else ("uid", USER_ID, "")
             writer = self._writers[pid] = self._trace(
                 session,
                 buffering,
                 breaks=(
-                    *(Break(begin, end) for begin, end in self._recording.pauses),
-                    *(Break(time, time) for time in self._recording.rotations),
+                    *(Break(shown(begin), shown(end)) for begin, end in self._recording.pauses),
+                    *(Break(shown(time), shown(time)) for time in self._recording.rotations),
                 ),
-                begin=self._recording.start_ns,
+                begin=shown(self._recording.start_ns),
             )
         return writer
 

@@ -124,12 +124,15 @@ class Process:
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """A machine with a boot and a clock of its own, `clock_offset_ns` ahead of the true time.
+    """A machine with a boot of its own, and a clock.
 
     Attributes:
         hostname: its name.
         cpu_count: how many threads run at the same time.
-        clock_offset_ns: how far ahead its clock is.
+        clock_offset_ns: how far ahead its clock is at the begin.
+        clock_drift_ppm: by how many parts per million it runs too fast.
+        boot: name of the machine, where this is one of several containers on it: they share its
+            clock, so that offset and drift are those of the first of them.
         stamp_resolution_ns: what source stamps are a multiple of: a coarse clock gives messages
             that follow each other closely the same stamp.
     """
@@ -137,6 +140,8 @@ class Host:
     hostname: str
     cpu_count: int = 4
     clock_offset_ns: int = 0
+    clock_drift_ppm: float = 0.0
+    boot: str = ""
     stamp_resolution_ns: int = 1
 
 

@@ -11,6 +11,8 @@ SELECT
     0::BIGINT AS drift_ppb,
     coalesce(min(begin_ns), 0) AS reference_ns,
     NULL::BIGINT AS uncertainty_ns,
-    'none' AS method
+    'none' AS method,
+    NULL::BIGINT AS drift_uncertainty_ppb,
+    NULL::BIGINT AS reference_clock_id
 FROM staging.source
 GROUP BY clock_key

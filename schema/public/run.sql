@@ -9,14 +9,24 @@
 -- column: start_ns BIGINT [epoch ns]  First event of any trace
 -- column: end_ns BIGINT [epoch ns]  Last event of any trace
 -- column: event_count BIGINT  Events read
--- needs: store.run
+-- needs: store.run, store.trace, main.trace
+WITH extent AS (
+    SELECT
+        t.run_id,
+        min(t.start_ns) - min(r.start_ns) AS start_shift_ns,
+        max(t.end_ns) - max(r.end_ns) AS end_shift_ns
+    FROM main.trace AS t
+    JOIN store.trace AS r ON t.trace_id = r.trace_id
+    GROUP BY t.run_id
+)
 SELECT
     self.run_id,
     self.name,
     self.created_at,
     self.msgflow_version,
     self.derivation_hash,
-    self.start_ns,
-    self.end_ns,
+    self.start_ns + coalesce(e.start_shift_ns, 0) AS start_ns,
+    self.end_ns + coalesce(e.end_shift_ns, 0) AS end_ns,
     self.event_count
 FROM store.run AS self
+LEFT JOIN extent AS e ON self.run_id = e.run_id

@@ -1,10 +1,11 @@
 -- name: derive.expected_arrival
 -- description: When each message could be received at the earliest, on the clock of those who
 --     subscribe to its topic: the end of its publication, which is shifted to another clock where
---     messages tell how far the two are apart (NULL: nothing tells).
+--     messages tell how far the two are apart, or else the correction of both does (NULL: nothing
+--     tells).
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
 -- needs: store.publication, store.publisher, store.subscription, store.process, store.host,
---     derive.clock_shift
+--     store.clock, derive.clock_shift, derive.corrected_ns, derive.recorded_ns
 WITH process_clock AS (
     SELECT p.run_id, p.process_id, h.clock_id
     FROM store.process AS p
@@ -33,10 +34,21 @@ WHERE from_clock_id = clock_id
 UNION ALL
 SELECT
     s.run_id, s.publication_id, s.publisher_id, s.topic_name, s.source_timestamp_ns,
-    s.clock_id, s.end_ns + c.shift_ns
+    s.clock_id,
+    coalesce(
+        s.end_ns + c.shift_ns,
+        CASE
+            WHEN f.reference_clock_id = o.reference_clock_id THEN derive.recorded_ns(
+                derive.corrected_ns(s.end_ns, f.offset_ns, f.drift_ppb, f.reference_ns),
+                o.offset_ns, o.drift_ppb, o.reference_ns
+            )
+        END
+    )
 FROM (SELECT * FROM sent WHERE from_clock_id <> clock_id) AS s
 ASOF LEFT JOIN derive.clock_shift AS c
     ON s.run_id = c.run_id
     AND s.from_clock_id = c.from_clock_id
     AND s.clock_id = c.to_clock_id
     AND s.end_ns >= c.from_ns
+JOIN store.clock AS f ON s.from_clock_id = f.clock_id
+JOIN store.clock AS o ON s.clock_id = o.clock_id

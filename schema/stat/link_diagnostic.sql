@@ -60,7 +60,7 @@ SELECT
     count(*),
     printf(
         'messages that seem to be received up to %.3f ms before they were published: the clocks '
-        || 'of the hosts are apart',
+        || 'of the hosts are apart; msgflow clocks apply messages',
         -min(latency_ns) / 1e6
     )
 FROM latency

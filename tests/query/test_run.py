@@ -169,23 +169,32 @@ def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -
 
 
 @pytest.mark.parametrize(
-    ("methods", "run", "notes"),
+    ("references", "run", "notes"),
     [
-        (("none",), "first", []),
-        (("none", "messages", "file"), "first", []),
-        (("none", "none", "messages"), "first", ["the run has 2 clocks"]),
-        (("none", "none", "none"), "all", ["run first (1) has 3 clocks"]),
-        (("none", "none"), "second", []),
+        ((None,), "first", []),
+        ((1, 1, 1), "first", []),
+        ((1, None, 1), "first", ["the run has 2 clocks"]),
+        ((1, 1, 3, 3), "first", ["the run has 2 clocks"]),
+        ((None, None, None), "all", ["run first (1) has 3 clocks"]),
+        ((None, None), "second", []),
     ],
 )
 def test_clocks_that_differ_are_named(
-    connection: duckdb.DuckDBPyConnection, methods: tuple[str, ...], run: str, notes: list[str]
+    connection: duckdb.DuckDBPyConnection,
+    references: tuple[int | None, ...],
+    run: str,
+    notes: list[str],
 ) -> None:
-    connection.execute("CREATE TABLE clock (run_id BIGINT, method VARCHAR)")
-    connection.executemany("INSERT INTO clock VALUES (1, ?)", [[method] for method in methods])
-    connection.execute("INSERT INTO clock VALUES (2, 'none')")
+    connection.execute(
+        "CREATE TABLE clock (clock_id BIGINT, run_id BIGINT, reference_clock_id BIGINT)"
+    )
+    connection.executemany("INSERT INTO clock VALUES (?, 1, ?)", enumerate(references, start=1))
+    connection.execute("INSERT INTO clock VALUES (9, 2, NULL)")
     query = QUERY.replace("-- param", "-- note: clocks\n-- param")
-    rest = " that are not synchronised: times between their hosts are not comparable"
+    rest = (
+        " that are not synchronised: times between their hosts are not comparable;"
+        " msgflow clocks apply messages"
+    )
     result = run_query(connection, header(query), {}, run=run, internal=True)
     assert result.notes == [f"{note}{rest}" for note in notes]
     assert run_query(connection, header(QUERY), {}, run=run, internal=True).notes == []

@@ -1,0 +1,68 @@
+"""`msgflow clocks`: the clocks of several hosts."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    DatabaseOption,
+    FormatOption,
+    OutputOption,
+    RunOption,
+)
+
+app = typer.Typer(help="Bring the clocks of several hosts together.")
+
+
+@app.callback()
+def group() -> None:
+    """Bring the clocks of several hosts together."""
+
+
+@app.command("apply")
+def apply(
+    how: Annotated[
+        str,
+        typer.Argument(
+            metavar="none|messages|FILE",
+            help="As recorded, by the messages between hosts, or by the offsets in a YAML or TOML"
+            " file",
+        ),
+    ],
+    run: RunOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Correct the clocks of a run in place of any correction before; reads no trace."""
+    from msgflow.cli.output import print_note, print_runs, print_status
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        runs = opened.apply_clocks(how, run=run)
+        print_runs(runs)
+        for one in runs:
+            clocks = opened.query("clocks", run=one.run_id).to_arrow().to_pylist()
+            corrected = [clock for clock in clocks if clock["method"] != "none"]
+            print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks show")
+            findings = opened.query("info-diagnostics", run=one.run_id).to_arrow().to_pylist()
+            for finding in findings:
+                if finding["name"].startswith("clock_"):
+                    print_note(f"{finding['name']}: {finding['detail']}")
+
+
+@app.command("show")
+def show(
+    run: RunOption = None,
+    form: FormatOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """List the clocks and how their times are corrected: the query clocks."""
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        result = opened.query("clocks", run=run)
+    print_result(result, form, output)

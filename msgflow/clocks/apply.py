@@ -1,0 +1,193 @@
+"""Stores how the clocks of a run are corrected, in place of what was stored before."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.db.connection import connect
+from msgflow.db.derive import derive_from_clocks
+from msgflow.errors import UsageError
+from msgflow.query.interrupt import interruptible
+from msgflow.query.run import read_runs
+from msgflow.query.window import choose_runs
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from msgflow.clocks.file import ClockSync, GivenClock
+    from msgflow.query.window import Run
+
+_FORGET = """
+UPDATE store.clock SET
+    offset_ns = 0, drift_ppb = 0, reference_ns = begun.begin_ns, uncertainty_ns = NULL,
+    drift_uncertainty_ppb = NULL, reference_clock_id = NULL, method = 'none'
+FROM (
+    SELECT c.clock_id, coalesce(min(t.start_ns), 0) AS begin_ns
+    FROM store.clock AS c
+    LEFT JOIN store.host AS h ON c.clock_id = h.clock_id
+    LEFT JOIN store.trace AS t ON h.host_id = t.host_id
+    WHERE c.run_id = $run_id
+    GROUP BY c.clock_id
+) AS begun
+WHERE clock.clock_id = begun.clock_id
+"""
+
+# A clock that nothing connects with another one stays as it is.
+_FROM_MESSAGES = """
+UPDATE store.clock SET
+    offset_ns = sync.offset_ns, drift_ppb = sync.drift_ppb, reference_ns = sync.reference_ns,
+    uncertainty_ns = sync.uncertainty_ns, drift_uncertainty_ppb = sync.drift_uncertainty_ppb,
+    reference_clock_id = sync.reference_clock_id,
+    method = CASE WHEN sync.clock_id = sync.reference_clock_id THEN 'none' ELSE 'messages' END
+FROM (
+    SELECT *, count(*) OVER (PARTITION BY reference_clock_id) AS number
+    FROM derive.clock_sync($run_id)
+) AS sync
+WHERE clock.clock_id = sync.clock_id AND sync.number > 1
+"""
+
+_FINDINGS = """
+INSERT INTO store.diagnostic (run_id, name, severity, count, detail)
+SELECT $run_id, name, 'warning', count, detail
+FROM derive.clock_finding($run_id)
+"""
+
+_CLOCKS = """
+SELECT c.clock_id, c.uuid, list(h.hostname ORDER BY h.host_id)
+FROM store.clock AS c
+JOIN store.host AS h ON c.clock_id = h.clock_id
+WHERE c.run_id = ?
+GROUP BY c.clock_id, c.uuid
+ORDER BY c.clock_id
+"""
+
+_GIVEN = """
+UPDATE store.clock SET
+    offset_ns = ?, drift_ppb = ?, reference_ns = coalesce(?, reference_ns), uncertainty_ns = ?,
+    drift_uncertainty_ppb = NULL, reference_clock_id = ?, method = 'file'
+WHERE clock_id = ?
+"""
+
+
+def apply_clocks(
+    path: Path, sync: ClockSync, *, run: str | int | None, memory_limit: str | None = None
+) -> tuple[Run, ...]:
+    """Bring the clocks of runs of a database together, in one transaction; reads no trace.
+
+    Args:
+        path: the database.
+        sync: how.
+        run: 'all', a name or an id; the latest run when None.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Raises:
+        UsageError: no such run, or a file that does not fit it.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+    with contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con:
+        runs = choose_runs(read_runs(con), run)
+        if not runs:
+            raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")
+        return interruptible(con, lambda: _apply(con, sync, runs))
+
+
+def _apply(
+    con: duckdb.DuckDBPyConnection, sync: ClockSync, runs: tuple[Run, ...]
+) -> tuple[Run, ...]:
+    con.begin()
+    try:
+        for run in runs:
+            set_clocks(con, run.run_id, sync)
+            derive_from_clocks(con, run.run_id)
+        con.commit()
+    except BaseException:
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
+        raise
+    return runs
+
+
+def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:
+    """Store how the clocks of a run are corrected, inside the open transaction.
+
+    Messages can tell only once they are linked. What the clocks tell of missing messages has to be
+    derived after that.
+
+    Raises:
+        UsageError: a file that does not fit the run.
+    """
+    con.execute(_FORGET, {"run_id": run_id})
+    con.execute(
+        "DELETE FROM store.diagnostic WHERE run_id = ? "
+        "AND name IN ('clock_not_synchronised', 'clock_uneven')",
+        [run_id],
+    )
+    if sync.method == "messages":
+        con.execute(_FROM_MESSAGES, {"run_id": run_id})
+        con.execute(_FINDINGS, {"run_id": run_id})
+    elif sync.method == "file":
+        _set_given(con, run_id, sync)
+
+
+def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:
+    clocks = con.execute(_CLOCKS, [run_id]).fetchall()
+    chosen: dict[int, GivenClock] = {}
+    for given in sync.clocks:
+        found = [clock for clock in clocks if given.name == clock[1]] or [
+            clock for clock in clocks if given.name in clock[2]
+        ]
+        if not found:
+            sync.fail(
+                given.line,
+                f"the run has no host or clock of that name — {given.name}",
+                f"it has {_known(clocks)}",
+            )
+        if len(found) > 1:
+            uuids = ", ".join(str(uuid) for _, uuid, _ in found)
+            sync.fail(
+                given.line,
+                f"several hosts have that name — {given.name}",
+                f"name the clock by its uuid: {uuids}; or name hosts with ingest --host NAME=PATH",
+            )
+        clock_id = found[0][0]
+        before = chosen.get(clock_id, given)
+        if replace(before, name="", line=0) != replace(given, name="", line=0):
+            sync.fail(
+                given.line,
+                f"{given.name} and {before.name} (line {before.line}) have one clock, and are"
+                " given different times",
+                "leave out one of the two",
+            )
+        chosen[clock_id] = given
+    # Offsets lead to the times of the only clock that the file does not name, if there is one.
+    others = [clock_id for clock_id, _, _ in clocks if clock_id not in chosen]
+    reference_id = others[0] if len(others) == 1 else min(chosen)
+    for clock_id, given in chosen.items():
+        con.execute(
+            _GIVEN,
+            [
+                given.offset_ns,
+                given.drift_ppb,
+                given.reference_ns,
+                given.uncertainty_ns,
+                reference_id,
+                clock_id,
+            ],
+        )
+    if len(others) == 1:
+        con.execute(
+            "UPDATE store.clock SET reference_clock_id = clock_id, uncertainty_ns = 0, "
+            "drift_uncertainty_ppb = 0 WHERE clock_id = ?",
+            others,
+        )
+
+
+def _known(clocks: list[tuple[int, str | None, list[str]]]) -> str:
+    return ", ".join(
+        f"{' and '.join(hostnames)}" + ("" if uuid is None else f" ({uuid})")
+        for _, uuid, hostnames in clocks
+    )

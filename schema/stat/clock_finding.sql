@@ -1,0 +1,57 @@
+-- name: derive.clock_finding
+-- kind: macro
+-- description: What messages cannot tell of the clocks: those that nothing connects with the
+--     others, and why, and those that do not run evenly.
+-- grain: one row per pair of clocks or clock
+-- needs: store.host, derive.clock_pair, derive.clock_sync
+CREATE OR REPLACE MACRO derive.clock_finding(of_run) AS TABLE
+WITH clock_name AS (
+    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS name
+    FROM store.host
+    WHERE run_id = of_run
+    GROUP BY clock_id
+),
+pair AS MATERIALIZED (
+    SELECT
+        p.clock_id, p.other_clock_id, c.name, o.name AS other_name, p.received_count,
+        p.sent_count, p.offset_ns, p.uncertainty_ns, p.is_even
+    FROM derive.clock_pair(of_run) AS p
+    JOIN clock_name AS c ON p.clock_id = c.clock_id
+    JOIN clock_name AS o ON p.other_clock_id = o.clock_id
+),
+sync AS MATERIALIZED (
+    SELECT clock_id, reference_clock_id FROM derive.clock_sync(of_run)
+)
+SELECT
+    'clock_not_synchronised' AS name,
+    p.received_count + p.sent_count AS count,
+    printf(
+        'the clocks of %s and %s stay apart: %d messages one way, %d the other',
+        p.other_name, p.name, p.received_count, p.sent_count
+    )
+    || CASE
+        WHEN least(p.received_count, p.sent_count) > 0 THEN ', too few at the same time'
+        ELSE ', and only both together tell an offset'
+    END AS detail
+FROM pair AS p
+JOIN sync AS c ON p.clock_id = c.clock_id
+JOIN sync AS o ON p.other_clock_id = o.clock_id
+WHERE c.reference_clock_id <> o.reference_clock_id
+UNION ALL
+SELECT
+    'clock_not_synchronised',
+    0,
+    printf('the clock of %s stays apart: it exchanges no message with the others', n.name)
+FROM clock_name AS n
+WHERE n.clock_id NOT IN (SELECT clock_id FROM pair UNION ALL SELECT other_clock_id FROM pair)
+    AND (SELECT count(*) FROM clock_name) > 1
+UNION ALL
+SELECT
+    'clock_uneven',
+    1,
+    printf(
+        'no straight line fits the clocks of %s and %s: corrected times are off by up to %.3f ms',
+        p.other_name, p.name, p.uncertainty_ns / 1e6
+    )
+FROM pair AS p
+WHERE NOT p.is_even

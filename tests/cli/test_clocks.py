@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ingested import contents
+from typer.testing import Result
+
+from msgflow import open_db
+from msgflow.sim import Host, Simulation, simulate
+from msgflow.sim.builtin import scenarios
+
+Msgflow = Callable[..., Result]
+
+BETWEEN_HOSTS = """
+SELECT fh.hostname AS sender, min(l.latency_ns) AS shortest_ns
+FROM link_transport AS l
+JOIN publication AS b USING (publication_id)
+JOIN take AS t USING (take_id)
+JOIN process AS f ON b.process_id = f.process_id
+JOIN process AS o ON t.process_id = o.process_id
+JOIN host AS fh ON f.host_id = fh.host_id
+WHERE f.host_id <> o.host_id
+GROUP BY fh.hostname
+ORDER BY fh.hostname
+"""
+
+
+@pytest.fixture(scope="module")
+def drifting(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
+    """Two hosts; the clock of the second is 7 ms ahead and runs 20 ppm too fast."""
+    return simulate(
+        "two_hosts",
+        tmp_path_factory.mktemp("drifting") / "traces",
+        factor=0.3,
+        clock_offset_ns=7_000_000,
+        clock_drift_ppm=20,
+    )
+
+
+def clocks(database: Path) -> list[dict[str, Any]]:
+    with open_db(database) as opened:
+        return opened.query("clocks").to_arrow().to_pylist()
+
+
+def shortest(database: Path) -> list[int]:
+    with open_db(database) as opened:
+        return opened.sql(BETWEEN_HOSTS).to_arrow()["shortest_ns"].to_pylist()
+
+
+def test_offset_and_drift_are_recovered(
+    msgflow: Msgflow, drifting: Simulation, tmp_path: Path
+) -> None:
+    database = tmp_path / "synchronised.duckdb"
+    result = msgflow(
+        "ingest", drifting.directory, "--db", database, "--clock-sync", "messages", "--quiet"
+    )
+    assert result.exit_code == 0, result.stderr
+    alpha, beta = clocks(database)
+    assert (alpha["offset_ns"], alpha["uncertainty_ns"], alpha["method"]) == (0, 0, "none")
+    assert (beta["reference"], beta["method"]) == ("alpha", "messages")
+    hosts = json.loads(drifting.meta.read_text())["hosts"]
+    assert hosts["beta"]["clock_drift_ppb"] == 20_000
+    # On alpha's clock, which is the true time; beta's shows (1 + drift) times that, and 7 ms.
+    begin = hosts["alpha"]["begin_of_tracing_ns"]
+    elapsed = (beta["reference_ns"] - begin - 7_000_000) / (1 + 20e-6)
+    offset = -7_000_000 - elapsed * 20e-6
+    there, back = shortest(database)
+    assert abs(beta["offset_ns"] - offset) <= beta["uncertainty_ns"]
+    assert beta["uncertainty_ns"] <= (there + back) / 2
+    assert abs(beta["drift_ppb"] + 20_000) <= beta["drift_uncertainty_ppb"]
+    assert beta["drift_uncertainty_ppb"] <= 1.02 * (there + back) / 2 / 3
+    assert there > 0
+    assert back > 0
+
+
+def test_a_database_is_corrected_and_restored(
+    msgflow: Msgflow, drifting: Simulation, tmp_path: Path
+) -> None:
+    database, direct = tmp_path / "later.duckdb", tmp_path / "direct.duckdb"
+    arguments = ("ingest", drifting.directory, "--name", "run", "--quiet", "--db")
+    assert msgflow(*arguments, database).exit_code == 0
+    assert msgflow(*arguments, direct, "--clock-sync", "messages").exit_code == 0
+    recorded = contents(database)
+    assert min(shortest(database)) < -6_000_000
+
+    result = msgflow("clocks", "apply", "messages", "--db", database)
+    assert result.exit_code == 0, result.stderr
+    assert "1 of 2 clocks corrected" in result.stderr
+    assert contents(database)["clock"] == contents(direct)["clock"]
+    assert contents(database)["undelivered"] == contents(direct)["undelivered"]
+    assert min(shortest(database)) > 0
+    shown = msgflow("clocks", "show", "--db", database, "--format", "json")
+    assert [clock["hosts"] for clock in json.loads(shown.stdout)] == ["alpha", "beta"]
+
+    assert msgflow("clocks", "apply", "none", "--db", database).exit_code == 0
+    assert contents(database) == recorded
+
+
+def test_a_file_with_offsets(msgflow: Msgflow, drifting: Simulation, tmp_path: Path) -> None:
+    database, file = tmp_path / "given.duckdb", tmp_path / "clocks.yaml"
+    file.write_text("beta: {offset_ns: -7000000, drift_ppb: -20000, uncertainty_ns: 5}\n")
+    arguments = ("ingest", drifting.directory, "--quiet", "--db", database, "--clock-sync", file)
+    assert msgflow(*arguments).exit_code == 0
+    beta = clocks(database)[1]
+    assert (beta["offset_ns"], beta["drift_ppb"], beta["uncertainty_ns"]) == (
+        -7_000_000,
+        -20_000,
+        5,
+    )
+    assert min(shortest(database)) > 0
+    before = contents(database)
+
+    file.write_text("beta: 1\ngamma: 2\n")
+    result = msgflow("clocks", "apply", file, "--db", database)
+    assert result.exit_code == 2
+    assert "line 2: the run has no host or clock of that name — gamma" in result.stderr
+    assert "alpha (" in result.stderr
+    assert contents(database) == before
+    refused = tmp_path / "refused.duckdb"
+    result = msgflow("ingest", drifting.directory, "--db", refused, "--clock-sync", file)
+    assert result.exit_code == 2
+    assert not refused.exists()
+
+
+@pytest.mark.parametrize("arguments", [("later",), ("messages", "--run", "nothing")])
+def test_what_is_not_there_is_named(
+    msgflow: Msgflow, small_database: Path, arguments: tuple[str, ...]
+) -> None:
+    result = msgflow("clocks", "apply", *arguments, "--db", small_database)
+    assert result.exit_code == 2
+    assert arguments[-1] in result.stderr
+
+
+def test_containers_share_a_clock_and_have_equal_pids(msgflow: Msgflow, tmp_path: Path) -> None:
+    """Two containers on one machine: two hosts of one clock, whose processes have the same id."""
+    system = scenarios()["two_hosts"]
+    names = {"alpha": "box-1", "beta": "box-2"}
+    system = replace(
+        system,
+        hosts=tuple(Host(name, boot="machine") for name in names.values()),
+        processes=tuple(
+            replace(process, hostname=names[process.hostname]) for process in system.processes
+        ),
+    )
+    done = simulate(system, tmp_path / "traces", factor=0.05)
+    database = tmp_path / "containers.duckdb"
+    arguments = ("ingest", done.directory, "--db", database, "--clock-sync", "messages", "--quiet")
+    assert msgflow(*arguments).exit_code == 0
+    (clock,) = clocks(database)
+    assert (clock["hosts"], clock["method"]) == ("box-1, box-2", "none")
+    with open_db(database) as opened:
+        processes = opened.sql(
+            "SELECT count(*), count(DISTINCT pid), count(DISTINCT (host_id, pid)) FROM process"
+        ).to_arrow()
+        links = opened.sql("SELECT count(*) FROM link_transport WHERE latency_ns > 0").to_arrow()
+    all_, pids, places = (column[0].as_py() for column in processes.columns)
+    assert all_ == places > pids
+    assert links.columns[0][0].as_py() > 0
+
+    # The same traces, where both containers bear one name and the user tells them apart.
+    for path in done.directory.rglob("metadata"):
+        path.write_bytes(path.read_bytes().replace(b'"box-2"', b'"box-1"'))
+    named = tmp_path / "named.duckdb"
+    result = msgflow(
+        "ingest", done.directory, "--db", named, "--quiet",
+        "--host", f"one={done.directory / 'box-1'}", "--host", f"two={done.directory / 'box-2'}",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    with open_db(named) as opened:
+        hosts = opened.sql("SELECT hostname FROM host ORDER BY host_id").to_arrow()
+        assert hosts["hostname"].to_pylist() == ["one", "two"]
+        again = opened.sql("SELECT count(*) FROM link_transport WHERE latency_ns > 0").to_arrow()
+    assert again == links

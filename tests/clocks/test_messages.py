@@ -1,0 +1,209 @@
+"""Offsets and drifts of clocks from the messages between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from random import Random
+
+import duckdb
+import pytest
+from drifting_clocks import Clock, Delay, Way, fill_clocks
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from msgflow.clocks import read_clock_sync, set_clocks
+
+SECOND = 1_000_000_000
+MICROSECOND = 1_000
+
+
+def delay(base_ns: float, jitter_ns: float) -> Delay:
+    return lambda random: base_ns + random.expovariate(1) * jitter_ns
+
+
+def times(seed: int, count: int, begin: int = 0, end: int = 20 * SECOND) -> list[int]:
+    random = Random(seed)
+    return sorted(random.randrange(begin, end) for _ in range(count))
+
+
+@contextmanager
+def synchronised(
+    connection: duckdb.DuckDBPyConnection, clocks: list[Clock], ways: list[Way], seed: int = 0
+) -> Iterator[dict[int, tuple[object, ...]]]:
+    """Yield clock number -> reference, reference time, offset, drift, and both uncertainties."""
+    connection.begin()
+    try:
+        fill_clocks(connection, clocks, ways, seed)
+        set_clocks(connection, 1, read_clock_sync("messages"))
+        rows = connection.execute(
+            "SELECT clock_id - 1, reference_clock_id - 1, reference_ns, offset_ns, drift_ppb, "
+            "uncertainty_ns, drift_uncertainty_ppb FROM main.clock"
+        ).fetchall()
+        yield {row[0]: row[1:] for row in rows}
+    finally:
+        connection.rollback()
+
+
+def require_truth(clocks: list[Clock], corrections: dict[int, tuple[object, ...]]) -> None:
+    """Every corrected clock is right, to within what is stated."""
+    for number, row in corrections.items():
+        reference, at_ns, offset_ns, drift_ppb, uncertainty_ns, drift_uncertainty_ppb = row
+        offset, drift = clocks[number].correction(at_ns, clocks[reference])  # type: ignore[arg-type,index]
+        # Times in the traces are rounded to a nanosecond at both ends.
+        assert abs(offset_ns - offset) <= uncertainty_ns + 2  # type: ignore[operator]
+        assert abs(drift_ppb - drift) <= drift_uncertainty_ppb + 1  # type: ignore[operator]
+
+
+@settings(
+    max_examples=25,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    offset_ns=st.integers(-(10**17), 10**17),
+    drift_ppb=st.integers(-900_000, 900_000),
+    bases=st.tuples(st.integers(10, 5_000), st.integers(10, 5_000)),
+    jitter=st.integers(0, 3_000),
+    counts=st.tuples(st.integers(3, 400), st.integers(3, 400)),
+    seed=st.integers(0, 2**31),
+)
+def test_truth_lies_inside_what_is_stated(
+    connection: duckdb.DuckDBPyConnection,
+    offset_ns: int,
+    drift_ppb: int,
+    bases: tuple[int, int],
+    jitter: int,
+    counts: tuple[int, int],
+    seed: int,
+) -> None:
+    clocks = [Clock(), Clock(offset_ns, drift_ppb)]
+    there, back = (delay(base * MICROSECOND, jitter * MICROSECOND) for base in bases)
+    ways = [
+        Way(0, 1, [0, *times(seed, counts[0]), 20 * SECOND], there),
+        Way(1, 0, [0, *times(seed + 1, counts[1]), 20 * SECOND], back),
+    ]
+    with synchronised(connection, clocks, ways, seed) as corrections:
+        assert corrections[1][0] == 0
+        require_truth(clocks, corrections)
+        forth, back_ns = connection.execute(
+            "SELECT min(CASE WHEN t.process_id = 2 THEN l.latency_ns END), "
+            "min(CASE WHEN t.process_id = 1 THEN l.latency_ns END) "
+            "FROM main.link_transport AS l JOIN main.take AS t ON l.take_id = t.take_id"
+        ).fetchall()[0]
+        # Half the shortest round trip, once the drift is taken out, and shared by both ways.
+        assert corrections[1][4] <= (forth + back_ns) / 2 + 0.02 * jitter * MICROSECOND + 2
+        assert forth >= -2
+        assert back_ns >= -2
+
+
+def test_seven_milliseconds_and_twenty_ppm(connection: duckdb.DuckDBPyConnection) -> None:
+    clocks = [Clock(), Clock(7_000_000, 20_000)]
+    ways = [
+        Way(0, 1, times(1, 2000), delay(150_000, 40_000)),
+        Way(1, 0, times(2, 2000), delay(250_000, 40_000)),
+    ]
+    with synchronised(connection, clocks, ways) as corrections:
+        require_truth(clocks, corrections)
+        _, at_ns, offset_ns, drift_ppb, uncertainty_ns, drift_uncertainty_ppb = corrections[1]
+        shortest_round_trip = 400_000
+        assert uncertainty_ns <= 1.01 * shortest_round_trip / 2
+        assert drift_uncertainty_ppb <= 1.01 * shortest_round_trip / 2 / 20
+        # The ways differ by 100 us, of which half cannot be told from an offset.
+        offset, drift = clocks[1].correction(at_ns, clocks[0])
+        assert abs(offset_ns - offset) == pytest.approx(50_000, abs=1_000)
+        assert abs(drift_ppb - drift) < 500
+
+
+def test_clocks_are_joined_through_others_by_the_surest_way(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    clocks = [Clock(), Clock(10**12, 30_000), Clock(-(10**15), -80_000), Clock(5, 100_000)]
+    sure, unsure = delay(100_000, 5_000), delay(20_000_000, 5_000)
+    ways = [
+        way
+        for seed, (a, b, kind) in enumerate(
+            [(0, 1, sure), (1, 2, sure), (0, 2, unsure), (2, 3, sure)]
+        )
+        for way in (
+            Way(a, b, times(2 * seed, 300), kind),
+            Way(b, a, times(2 * seed + 1, 300), kind),
+        )
+    ]
+    with synchronised(connection, clocks, ways) as corrections:
+        assert {row[0] for row in corrections.values()} == {0}
+        require_truth(clocks, corrections)
+        uncertainties = [corrections[number][4] for number in range(4)]
+        assert uncertainties[0] == 0
+        # Two steps of 100 us rather than one of 20 ms; and what the drift adds in between.
+        assert 180_000 < uncertainties[2] < 400_000
+        assert 280_000 < uncertainties[3] < 700_000
+
+
+def finding(connection: duckdb.DuckDBPyConnection) -> list[tuple[str, str]]:
+    return connection.execute(
+        "SELECT name, detail FROM main.diagnostic WHERE name LIKE 'clock%' ORDER BY ALL"
+    ).fetchall()
+
+
+def test_one_way_is_said_and_nothing_invented(connection: duckdb.DuckDBPyConnection) -> None:
+    ways = [Way(0, 1, times(1, 50), delay(1e5, 1e4))]
+    with synchronised(connection, [Clock(), Clock(7), Clock(9)], ways) as corrections:
+        assert [row[0] for row in corrections.values()] == [None, None, None]
+        assert [row[2:4] for row in corrections.values()] == [(0, 0)] * 3
+        assert finding(connection) == [
+            (
+                "clock_not_synchronised",
+                "the clock of host-3 stays apart: it exchanges no message with the others",
+            ),
+            (
+                "clock_not_synchronised",
+                "the clocks of host-1 and host-2 stay apart: 50 messages one way, 0 the other, and"
+                " only both together tell an offset",
+            ),
+        ]
+
+
+def test_messages_at_different_times_are_too_few(connection: duckdb.DuckDBPyConnection) -> None:
+    ways = [
+        Way(0, 1, times(1, 50, 0, SECOND), delay(1e5, 1e4)),
+        Way(1, 0, times(1, 50, 2 * SECOND, 3 * SECOND), delay(1e5, 1e4)),
+    ]
+    with synchronised(connection, [Clock(), Clock(7)], ways) as corrections:
+        assert corrections[1][0] is None
+        assert [detail for _, detail in finding(connection)] == [
+            "the clocks of host-1 and host-2 stay apart: 50 messages one way, 50 the other, too few"
+            " at the same time"
+        ]
+
+
+def test_one_message_each_way_is_too_few(connection: duckdb.DuckDBPyConnection) -> None:
+    ways = [Way(0, 1, [0], delay(1e5, 0)), Way(1, 0, [10], delay(1e5, 0))]
+    with synchronised(connection, [Clock(), Clock(7)], ways) as corrections:
+        assert corrections[1][0] is None
+        assert len(finding(connection)) == 1
+
+
+def test_a_clock_that_was_set_is_said(connection: duckdb.DuckDBPyConnection) -> None:
+    """It jumps by 50 ms half way: no line fits, and the uncertainty covers it."""
+    jump, way = 50_000_000, delay(1e5, 1e4)
+    ways = [
+        Way(0, 1, times(1, 300, 0, 10 * SECOND), way),
+        Way(1, 0, times(2, 300, 0, 10 * SECOND), way),
+        Way(0, 1, times(3, 300, 10 * SECOND), lambda random: way(random) + jump),
+        Way(1, 0, times(4, 300, 10 * SECOND), lambda random: way(random) - jump),
+    ]
+    with synchronised(connection, [Clock(), Clock(10**9)], ways) as corrections:
+        _, at_ns, offset_ns, drift_ppb, uncertainty_ns, drift_uncertainty_ppb = corrections[1]
+        assert drift_uncertainty_ppb is None
+        assert jump / 4 < uncertainty_ns < jump
+        assert [name for name, _ in finding(connection)] == ["clock_uneven"]
+        for true, jumped in (
+            (SECOND, 0),
+            (9 * SECOND, 0),
+            (11 * SECOND, jump),
+            (19 * SECOND, jump),
+        ):
+            shown = Clock(10**9).shows(true) + jumped
+            corrected = shown + offset_ns + (shown - at_ns) * drift_ppb / 1e9
+            assert abs(corrected - Clock().shows(true)) <= uncertainty_ns + 1_000
