@@ -46,7 +46,7 @@ WITH part AS MATERIALIZED (
     ) AS e
     LEFT JOIN main.callback_instance AS i
         ON e.callback_instance_id = i.callback_instance_id
-        AND e.part IN ('callback', 'service', 'executor', 'cache')
+        AND e.part IN ('callback', 'cache', 'executor', 'request', 'service')
 ),
 measured AS (
     SELECT
