@@ -1,0 +1,91 @@
+-- name: data-age
+-- title: Data age by path
+-- description: How old the data behind the output of a path are. The age of an output (the end of
+--     the path) is that of the newest input (start of a flow) that it reflects. Data stay in use
+--     until the next output; the age right before that, the highest that they reach, is their peak
+--     age. The time window is that of the outputs.
+-- grain: one row per path
+-- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
+-- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
+--     output
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- column: run_id BIGINT            Run
+-- column: outputs BIGINT           Outputs in the time window
+-- column: loss_affected BIGINT     Outputs with a gap of a trace in the time since their input
+-- column: min_ns BIGINT [ns]       Lowest age of an output
+-- column: median_ns BIGINT [ns]    Median age of outputs
+-- column: mean_ns BIGINT [ns]      Mean age of outputs
+-- column: p95_ns BIGINT [ns]       95 % of the ages are at most this
+-- column: p99_ns BIGINT [ns]       99 % of the ages are at most this
+-- column: max_ns BIGINT [ns]       Highest age of an output
+-- column: peak_median_ns BIGINT [ns]  Median peak age
+-- column: peak_p95_ns BIGINT [ns]     95 % of the peak ages are at most this
+-- column: peak_max_ns BIGINT [ns]     Maximum data age: the highest peak age
+-- column: time_mean_ns BIGINT [ns]    Mean age over time, from the first output to the last
+-- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
+--     never shows a callback
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
+-- column: path VARCHAR             Nodes and topics
+-- note: clocks
+-- needs: main.flow_path, main.end_to_end
+WITH output AS (
+    SELECT
+        path_id,
+        sink_event,
+        sink_ns,
+        latency_ns AS age_ns,
+        is_loss_affected,
+        lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
+    FROM main.end_to_end(
+        $runs, $from, $to, $from_event, $to_event,
+        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
+        max_depth := $max_depth, max_paths := $max_paths
+    )
+    WHERE status = 'reached' AND is_newest
+),
+measured AS (
+    SELECT
+        path_id,
+        count(*) AS outputs,
+        count(*) FILTER (WHERE is_loss_affected) AS loss_affected,
+        any_value(sink_event) AS sink_event,
+        min(age_ns) AS min_ns,
+        quantile_disc(age_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(age_ns))::BIGINT AS mean_ns,
+        max(age_ns) AS max_ns,
+        quantile_disc(peak_ns, [0.5, 0.95]) AS peaks,
+        max(peak_ns) AS peak_max_ns,
+        round(
+            sum((peak_ns - age_ns) * ((peak_ns + age_ns) / 2.0::DOUBLE))
+            / nullif(sum(peak_ns - age_ns), 0)
+        )::BIGINT AS time_mean_ns
+    FROM output
+    WHERE sink_ns >= $start_ns AND sink_ns < $end_ns
+    GROUP BY path_id
+)
+SELECT
+    p.run_id,
+    coalesce(m.outputs, 0) AS outputs,
+    coalesce(m.loss_affected, 0) AS loss_affected,
+    m.min_ns,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.quantiles[3] AS p99_ns,
+    m.max_ns,
+    m.peaks[1] AS peak_median_ns,
+    m.peaks[2] AS peak_p95_ns,
+    m.peak_max_ns,
+    m.time_mean_ns,
+    m.sink_event,
+    p.is_cut,
+    p.path
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+) AS p
+LEFT JOIN measured AS m ON p.path_id = m.path_id
+WHERE p.is_path
+ORDER BY p.run_id, p.path, p.path_id

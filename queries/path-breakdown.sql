@@ -1,0 +1,103 @@
+-- name: path-breakdown
+-- title: What the latency of each path consists of
+-- description: End-to-end latency of every path hop by hop. The parts of a flow follow each other
+--     from its start to its end and add up to its latency exactly; so the shares of a path add up
+--     to 1. A part is negative where the next began before it ended (overlaps), as between hosts
+--     whose clocks are apart. Parts of a hop are the callback up to its publication; the wait in
+--     a cache for other messages or a timer; calls of services; publishing by layer; transport up
+--     to the take, with any wait for a busy executor; and from the take to the callback.
+-- grain: one row per path, hop, part, and callback that it belongs to
+-- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
+-- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
+--     the clock
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
+--     stops it
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
+--     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- column: run_id BIGINT            Run
+-- column: path_id BIGINT           Number of the path
+-- column: hop BIGINT               Which message of the path it is, or leads to
+-- column: part VARCHAR             'callback', 'cache', 'request', 'service', a layer of publishing
+--     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known), 'transport' or
+--     'executor'
+-- column: node VARCHAR             Node that runs the callback, or that publishes
+-- column: what VARCHAR             The callback, or the topic of the message
+-- column: flows BIGINT             Flows with this part
+-- column: overlaps BIGINT          Flows in which it is negative
+-- column: median_ns BIGINT [ns]    Median duration
+-- column: mean_ns BIGINT [ns]      Mean duration
+-- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
+-- column: max_ns BIGINT [ns]       Longest duration
+-- column: share DOUBLE             Part of the latency of all flows of the path
+-- column: total_ns BIGINT [ns]     Sum over all flows; adds up to that of their latencies
+-- column: path VARCHAR             Nodes and topics
+-- note: clocks
+-- needs: main.end_to_end_part, main.flow_path, main.callback_instance, main.callback_label,
+--     main.publisher, main.node, main.process
+WITH part AS MATERIALIZED (
+    SELECT
+        e.run_id, e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, i.callback_id
+    FROM main.end_to_end_part(
+        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
+        max_depth := $max_depth, max_paths := $max_paths
+    ) AS e
+    LEFT JOIN main.callback_instance AS i
+        ON e.callback_instance_id = i.callback_instance_id
+        AND e.part IN ('callback', 'cache', 'executor', 'request', 'service')
+),
+measured AS (
+    SELECT
+        path_id,
+        hop,
+        part,
+        callback_id,
+        min(position) AS position,
+        count(DISTINCT flow_id) AS flows,
+        count(*) FILTER (WHERE duration_ns < 0) AS overlaps,
+        quantile_disc(duration_ns, [0.5, 0.95]) AS quantiles,
+        round(avg(duration_ns))::BIGINT AS mean_ns,
+        max(duration_ns) AS max_ns,
+        sum(duration_ns)::BIGINT AS total_ns
+    FROM part
+    GROUP BY path_id, hop, part, callback_id
+),
+message AS (
+    SELECT
+        p.run_id, p.path_id, p.path,
+        unnest(range(1, len(p.topics) + 1)) AS hop,
+        unnest(p.topics) AS topic_name,
+        unnest(p.publishers) AS publisher_id
+    FROM main.flow_path(
+        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+    ) AS p
+    WHERE p.is_path
+)
+SELECT
+    p.run_id,
+    m.path_id,
+    m.hop,
+    m.part,
+    coalesce(
+        l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
+    ) AS node,
+    coalesce(l.label, h.topic_name) AS what,
+    m.flows,
+    m.overlaps,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.max_ns,
+    m.total_ns / nullif(sum(m.total_ns) OVER (PARTITION BY m.path_id), 0) AS share,
+    m.total_ns,
+    p.path
+FROM measured AS m
+JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
+LEFT JOIN message AS h ON m.path_id = h.path_id AND m.hop = h.hop
+LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
+LEFT JOIN main.process AS r ON b.process_id = r.process_id
+LEFT JOIN main.node AS n ON b.node_id = n.node_id
+LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
+ORDER BY p.run_id, p.path, m.path_id, m.hop, m.position, m.part, m.callback_id

@@ -1,0 +1,117 @@
+-- name: reaction-time
+-- title: Reaction time by path
+-- description: How long it takes at most until something that happens shows at the end of a path.
+--     What happens right after an input (the start of a flow) is seen by the next input at the
+--     earliest, and shows with the first output that reflects that input or a later one: the
+--     reaction time of an interval between two inputs is from the earlier input to that output,
+--     the longest for any event in the interval. A lost input delays the reaction to the output
+--     of the next. The time window is that of the later input.
+-- grain: one row per path
+-- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
+-- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
+--     output
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- column: run_id BIGINT            Run
+-- column: inputs BIGINT            Inputs in the time window
+-- column: intervals BIGINT         Intervals between inputs that the times are from
+-- column: unanswered BIGINT        Inputs that no output followed
+-- column: loss_affected BIGINT     Intervals whose input has a gap of a trace in its time
+-- column: min_ns BIGINT [ns]       Shortest reaction time
+-- column: median_ns BIGINT [ns]    Median reaction time
+-- column: mean_ns BIGINT [ns]      Mean reaction time
+-- column: p95_ns BIGINT [ns]       95 % of the reaction times are at most this
+-- column: p99_ns BIGINT [ns]       99 % of the reaction times are at most this
+-- column: max_ns BIGINT [ns]       Maximum reaction time
+-- column: event_mean_ns BIGINT [ns]  Mean over events at any moment of the intervals
+-- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
+--     never shows a callback
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
+-- column: path VARCHAR             Nodes and topics
+-- note: clocks
+-- needs: main.flow_path, main.end_to_end
+WITH input AS (
+    SELECT
+        path_id,
+        root_kind,
+        root_id,
+        any_value(root_ns) AS root_ns,
+        min(sink_ns) AS first_ns,
+        any_value(sink_event) AS sink_event,
+        bool_or(is_loss_affected) AS is_loss_affected
+    FROM main.end_to_end(
+        $runs, $from, $to, $from_event, $to_event,
+        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
+        max_depth := $max_depth, max_paths := $max_paths
+    )
+    GROUP BY path_id, root_kind, root_id
+),
+answered AS (
+    SELECT
+        path_id,
+        root_ns,
+        sink_event,
+        is_loss_affected,
+        lag(root_ns) OVER in_time AS previous_ns,
+        min(first_ns) OVER (
+            PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
+            ROWS UNBOUNDED PRECEDING
+        ) AS answer_ns
+    FROM input
+    WINDOW in_time AS (PARTITION BY path_id ORDER BY root_ns, root_kind, root_id)
+),
+windowed AS (
+    SELECT
+        path_id,
+        sink_event,
+        is_loss_affected,
+        answer_ns,
+        root_ns - previous_ns AS interval_ns,
+        answer_ns - previous_ns AS reaction_ns,
+        answer_ns - root_ns AS delay_ns
+    FROM answered
+    WHERE root_ns >= $start_ns AND root_ns < $end_ns
+),
+measured AS (
+    SELECT
+        path_id,
+        count(*) AS inputs,
+        count(reaction_ns) AS intervals,
+        count(*) FILTER (WHERE answer_ns IS NULL) AS unanswered,
+        count(*) FILTER (WHERE is_loss_affected AND reaction_ns IS NOT NULL) AS loss_affected,
+        any_value(sink_event) AS sink_event,
+        min(reaction_ns) AS min_ns,
+        quantile_disc(reaction_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(reaction_ns))::BIGINT AS mean_ns,
+        max(reaction_ns) AS max_ns,
+        round(
+            sum(interval_ns * ((reaction_ns + delay_ns) / 2.0::DOUBLE))
+            / nullif(sum(CASE WHEN reaction_ns IS NOT NULL THEN interval_ns END), 0)
+        )::BIGINT AS event_mean_ns
+    FROM windowed
+    GROUP BY path_id
+)
+SELECT
+    p.run_id,
+    coalesce(m.inputs, 0) AS inputs,
+    coalesce(m.intervals, 0) AS intervals,
+    coalesce(m.unanswered, 0) AS unanswered,
+    coalesce(m.loss_affected, 0) AS loss_affected,
+    m.min_ns,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.quantiles[3] AS p99_ns,
+    m.max_ns,
+    m.event_mean_ns,
+    m.sink_event,
+    p.is_cut,
+    p.path
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+) AS p
+LEFT JOIN measured AS m ON p.path_id = m.path_id
+WHERE p.is_path
+ORDER BY p.run_id, p.path, p.path_id

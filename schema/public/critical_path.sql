@@ -1,0 +1,257 @@
+-- name: main.critical_path
+-- kind: macro
+-- description: What one flow had to wait for, moment by moment: its parts (main.end_to_end_part),
+--     in which waits are replaced by what they waited for, as far as the trace shows. While a
+--     message or request waited for its callback, the runs that its executor was busy with or that
+--     exclude the callback; in a cache, the timer until it was due, or the message that completed
+--     the set, from the callback that published it. The pieces follow each other and add up to the
+--     latency of the flow exactly; a part that is negative is one piece.
+-- grain: one row per piece of the flow
+-- param: runs BIGINT[]  Runs to look at
+-- param: from_topic VARCHAR  Topic where flows start; every source when NULL
+-- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR  Event that starts the clock: 'callback_start' or 'publish'
+-- param: to_event VARCHAR  Event that stops it: 'take', 'callback_start' or 'callback_end'
+-- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
+-- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
+-- param: sink_take_id BIGINT = NULL  The longest flow that ends with this take; of all when NULL
+-- param: max_depth INTEGER = 32  Longest chain, in topics
+-- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: take_id BIGINT  Take at the end of the path
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: hop BIGINT  Which message of the path it is, or leads to
+-- column: position BIGINT  Order within the flow, from 1
+-- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
+-- column: activity VARCHAR  What happened: the part itself; in waits also 'busy' (the executor ran
+--     something else), 'blocked' (a callback ran that excludes the waiting one), 'timer' (not due
+--     yet), 'unpublished' (the message that was waited for had not been published), or a part of
+--     the way of that message
+-- column: from_ns BIGINT [epoch ns]  Begin
+-- column: to_ns BIGINT [epoch ns]  End
+-- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: is_certain BOOLEAN  Of 'busy' and 'blocked': what waited was ready by then; false: it may
+--     have arrived during this piece. Else NULL
+-- column: callback_instance_id BIGINT  Run of the callback that it is, or that it waits for
+-- column: publication_id BIGINT  Message that is published, under way or waited for
+-- needs: main.end_to_end_part, main.executor_wait, main.executor_interference,
+--     main.callback_instance, main.publication, main.take, derive.executor_busy,
+--     derive.executor_size, derive.callback_exclusion, derive.process_clock, derive.corrected_ns,
+--     store.link_transport, store.link_causal
+CREATE OR REPLACE MACRO main.critical_path(
+    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+    sink_take_id := NULL, max_depth := 32, max_paths := 1000
+) AS TABLE
+WITH part AS MATERIALIZED (
+    SELECT
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part, from_ns,
+        to_ns, duration_ns, callback_instance_id, publication_id
+    FROM main.end_to_end_part(
+        runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+        'longest', sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths
+    )
+),
+waiting AS MATERIALIZED (
+    SELECT position, part, from_ns, to_ns, callback_instance_id
+    FROM part
+    WHERE part IN ('transport', 'request', 'executor', 'cache')
+        AND callback_instance_id IS NOT NULL
+        AND to_ns > from_ns
+),
+wait AS MATERIALIZED (
+    SELECT
+        callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
+        coalesce(earliest_ns, latest_ns) AS earliest_ns, latest_ns, start_ns
+    FROM main.executor_wait
+    WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
+),
+meanwhile AS MATERIALIZED (
+    SELECT
+        w.callback_instance_id, w.executor_id, w.callback_id, w.latest_ns,
+        r.callback_instance_id AS meanwhile_id,
+        r.callback_id AS meanwhile_callback_id,
+        r.thread_id = w.thread_id AS is_own_thread,
+        r.process_id,
+        greatest(r.start_ns, w.earliest_ns) AS from_ns,
+        least(r.end_ns, w.start_ns) AS to_ns
+    FROM main.executor_interference AS i
+    JOIN wait AS w ON i.callback_instance_id = w.callback_instance_id
+    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
+    WHERE i.overlap_ns > 0
+),
+-- Of several threads all have to be busy; then the one that took over was, too.
+full_house AS (
+    SELECT
+        b.executor_id,
+        derive.corrected_ns(b.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+        derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
+    FROM derive.executor_busy AS b
+    JOIN derive.executor_size AS s ON b.executor_id = s.executor_id
+    JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
+        ON b.executor_id = p.executor_id
+    JOIN derive.process_clock AS c ON p.process_id = c.process_id
+    WHERE s.thread_count > 1
+),
+occupied AS (
+    SELECT
+        m.callback_instance_id, 1 AS priority, 'busy' AS activity, m.from_ns, m.to_ns, m.latest_ns,
+        m.meanwhile_id
+    FROM meanwhile AS m
+    JOIN derive.executor_size AS s ON m.executor_id = s.executor_id
+    WHERE s.thread_count = 1
+    UNION ALL
+    SELECT
+        m.callback_instance_id, 1, 'busy', greatest(m.from_ns, b.start_ns),
+        least(m.to_ns, b.end_ns), m.latest_ns, m.meanwhile_id
+    FROM meanwhile AS m
+    JOIN full_house AS b
+        ON m.executor_id = b.executor_id AND m.from_ns < b.end_ns AND m.to_ns > b.start_ns
+    WHERE m.is_own_thread
+    UNION ALL
+    SELECT
+        m.callback_instance_id, 2, 'blocked', m.from_ns, m.to_ns, m.latest_ns, m.meanwhile_id
+    FROM meanwhile AS m
+    JOIN derive.callback_exclusion AS w ON m.callback_id = w.callback_id
+    JOIN derive.callback_exclusion AS r
+        ON m.meanwhile_callback_id = r.callback_id
+        AND w.kind = r.kind
+        AND w.exclusion_id = r.exclusion_id
+),
+-- The message whose callback published for what lay in the cache, or the timer that did.
+completing AS (
+    SELECT
+        w.position, b.publication_id, b.start_ns AS published_ns, b.end_ns, t.taken_ns,
+        i.callback_instance_id, s.callback_instance_id AS publishing_id,
+        s.start_ns AS publishing_ns
+    FROM waiting AS w
+    JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
+    JOIN main.take AS t ON i.take_id = t.take_id
+    JOIN store.link_transport AS l ON t.take_id = l.take_id
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    LEFT JOIN store.link_causal AS d ON b.publication_id = d.publication_id AND d.kind = 'direct'
+    LEFT JOIN main.callback_instance AS s ON d.callback_instance_id = s.callback_instance_id
+    WHERE w.part = 'cache'
+),
+candidate AS (
+    SELECT
+        w.position, o.priority, o.activity, o.from_ns, o.to_ns, o.latest_ns,
+        o.meanwhile_id AS callback_instance_id, NULL::BIGINT AS publication_id
+    FROM waiting AS w
+    JOIN occupied AS o ON w.callback_instance_id = o.callback_instance_id
+    UNION ALL
+    SELECT w.position, 3, 'timer', w.from_ns, i.origin_ns, NULL, w.callback_instance_id, NULL
+    FROM waiting AS w
+    JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
+    WHERE w.part = 'cache' AND i.since = 'timer'
+    UNION ALL
+    SELECT c.position, 4, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
+        NULL, c.publishing_id, c.publication_id
+    FROM completing AS c
+    JOIN waiting AS w ON c.position = w.position
+    UNION ALL
+    SELECT position, 4, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
+    FROM completing
+    WHERE publishing_ns IS NOT NULL
+    UNION ALL
+    SELECT position, 4, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
+    FROM completing
+    UNION ALL
+    SELECT position, 4, 'transport', end_ns, taken_ns, NULL, callback_instance_id, publication_id
+    FROM completing
+    UNION ALL
+    SELECT c.position, 4, 'executor', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
+        c.publication_id
+    FROM completing AS c
+    JOIN waiting AS w ON c.position = w.position
+),
+clipped AS MATERIALIZED (
+    SELECT
+        c.position, c.priority, c.activity, c.latest_ns, c.callback_instance_id, c.publication_id,
+        greatest(c.from_ns, w.from_ns) AS from_ns,
+        least(c.to_ns, w.to_ns) AS to_ns
+    FROM candidate AS c
+    JOIN waiting AS w ON c.position = w.position
+    WHERE c.to_ns > w.from_ns AND c.from_ns < w.to_ns AND c.to_ns > c.from_ns
+),
+-- Pieces between any two moments at which something begins or ends, each with what counts then.
+boundary AS (
+    SELECT position, from_ns AS at_ns FROM part
+    UNION
+    SELECT position, from_ns FROM clipped
+    UNION
+    SELECT c.position, c.to_ns
+    FROM clipped AS c
+    JOIN part AS p ON c.position = p.position
+    WHERE c.to_ns < p.to_ns
+    UNION
+    SELECT position, latest_ns FROM clipped WHERE latest_ns > from_ns AND latest_ns < to_ns
+),
+piece AS (
+    SELECT
+        b.position,
+        b.at_ns AS from_ns,
+        coalesce(lead(b.at_ns) OVER (PARTITION BY b.position ORDER BY b.at_ns), p.to_ns) AS to_ns
+    FROM boundary AS b
+    JOIN part AS p ON b.position = p.position
+),
+chosen AS (
+    SELECT
+        p.position, p.from_ns, p.to_ns, c.priority, c.activity, c.latest_ns,
+        c.callback_instance_id, c.publication_id
+    FROM piece AS p
+    LEFT JOIN clipped AS c
+        ON p.position = c.position AND c.from_ns <= p.from_ns AND c.to_ns >= p.to_ns
+    QUALIFY row_number() OVER (
+        PARTITION BY p.position, p.from_ns
+        ORDER BY c.priority NULLS LAST, c.from_ns, c.callback_instance_id
+    ) = 1
+),
+named AS (
+    SELECT
+        p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.hop, p.part,
+        p.position, c.from_ns, c.to_ns,
+        coalesce(c.activity, p.part) AS activity,
+        CASE WHEN c.priority <= 2 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
+        CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id END
+            AS callback_instance_id,
+        CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
+            AS publication_id
+    FROM chosen AS c
+    JOIN part AS p ON c.position = p.position
+),
+-- Neighbours that are the same thing become one.
+numbered AS (
+    SELECT
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, position, from_ns,
+        to_ns, activity, is_certain, callback_instance_id, publication_id,
+        row_number() OVER (PARTITION BY position ORDER BY from_ns)
+        - row_number() OVER (
+            PARTITION BY position, activity, is_certain, callback_instance_id, publication_id
+            ORDER BY from_ns
+        ) AS island
+    FROM named
+)
+SELECT
+    run_id,
+    path_id,
+    root_kind,
+    root_id,
+    take_id,
+    latency_ns,
+    hop,
+    row_number() OVER (ORDER BY position, min(from_ns)) AS position,
+    part,
+    activity,
+    min(from_ns) AS from_ns,
+    arg_max(to_ns, from_ns) AS to_ns,
+    sum(to_ns - from_ns)::BIGINT AS duration_ns,
+    is_certain,
+    callback_instance_id,
+    publication_id
+FROM numbered
+GROUP BY
+    run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part, activity,
+    is_certain, callback_instance_id, publication_id, island

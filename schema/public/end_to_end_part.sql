@@ -1,0 +1,319 @@
+-- name: main.end_to_end_part
+-- kind: macro
+-- description: What the latency of each flow of each path (main.end_to_end) consists of. The parts
+--     of a flow follow each other without a gap from its start to its end, so their durations add
+--     up to its latency exactly. A part is negative where the next began before it ended: clocks
+--     of two hosts apart, a message taken before the publishing call returned, a callback that
+--     published for an input whose own callback was still running.
+-- grain: one row per flow that reached the sink and part
+-- param: runs BIGINT[]  Runs to look at
+-- param: from_topic VARCHAR  Topic where flows start; every source when NULL
+-- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR  Event that starts the clock: 'callback_start' or 'publish'
+-- param: to_event VARCHAR  Event that stops it: 'take', 'callback_start' or 'callback_end'
+-- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
+-- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
+-- param: flow_case VARCHAR  Pairs of root and arrival: 'first', 'last', 'newest', 'every_pair', or
+--     'longest', the one flow of all that took longest
+-- param: sink_take_id BIGINT = NULL  Only flows that end with this take
+-- param: max_depth INTEGER = 32  Longest chain, in topics
+-- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: flow_id BIGINT  Number of the flow in this result
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: take_id BIGINT  Take at the end of the path
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: hop BIGINT  Which message of the path it is, or leads to; behind the last for the callback
+--     at the end
+-- column: position BIGINT  Order within the flow, from 1
+-- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
+--     publishes or calls), 'cache' (from the end of the callback to the run that publishes for it),
+--     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
+--     (publishing, layer not known), 'transport' (to the take), 'executor' (from the take to the
+--     callback), 'request' (transport of a request), 'service' (from the start of the service
+--     callback to what it publishes or calls)
+-- column: from_ns BIGINT [epoch ns]  Begin
+-- column: to_ns BIGINT [epoch ns]  End
+-- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: callback_instance_id BIGINT  Run of the callback that it is, or that it waits for
+-- column: publication_id BIGINT  Message that is published or under way
+-- needs: main.end_to_end, main.flow_path, main.publication, main.take, main.callback_instance,
+--     main.request, derive.flow_transport, derive.flow_continuation, derive.flow_caller,
+--     derive.flow_root, store.link_causal, store.link_request
+CREATE OR REPLACE MACRO main.end_to_end_part(
+    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns, flow_case,
+    sink_take_id := NULL, max_depth := 32, max_paths := 1000
+) AS TABLE
+WITH RECURSIVE flow AS MATERIALIZED (
+    SELECT
+        row_number() OVER (
+            ORDER BY e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id
+        ) AS flow_id,
+        e.run_id, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event, e.sink_ns,
+        e.latency_ns
+    FROM main.end_to_end(
+        runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+        max_depth := max_depth, max_paths := max_paths
+    ) AS e
+    WHERE e.status = 'reached'
+        AND coalesce(e.take_id = sink_take_id, true)
+        AND CASE flow_case
+            WHEN 'first' THEN e.is_first
+            WHEN 'last' THEN e.is_last
+            WHEN 'newest' THEN e.is_newest
+            ELSE true
+        END
+    QUALIFY flow_case <> 'longest' OR row_number() OVER (
+        ORDER BY e.latency_ns DESC, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+    ) = 1
+),
+path AS MATERIALIZED (
+    SELECT path_id, depth, publishers, subscriptions
+    FROM main.flow_path(
+        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
+    )
+    WHERE is_path
+),
+transport AS MATERIALIZED (
+    SELECT publication_id, publisher_id, take_id
+    FROM derive.flow_transport
+    WHERE list_contains(runs, run_id)
+),
+-- What led to each publication: the run of the callback that the flow came in with, and the run
+-- (of a service that it called) that the publication is linked to.
+continuation AS MATERIALIZED (
+    SELECT
+        l.publication_id, l.take_id, l.subscription_id,
+        l.callback_instance_id AS run_id_in, l.callback_instance_id AS run_id_out, l.kind
+    FROM store.link_causal AS l
+    WHERE list_contains(runs, l.run_id)
+    UNION ALL
+    SELECT
+        l.publication_id, i.take_id, t.subscription_id, c.caller_id, l.callback_instance_id, l.kind
+    FROM derive.flow_caller AS c
+    JOIN store.callback_instance AS i ON c.caller_id = i.callback_instance_id
+    LEFT JOIN store.take AS t ON i.take_id = t.take_id
+    JOIN store.link_causal AS l ON c.callback_instance_id = l.callback_instance_id
+    WHERE list_contains(runs, l.run_id)
+),
+-- From the end of each flow back to its root, one way of each.
+trail (flow_id, hop, take_id, publication_id, takes, publications) AS (
+    SELECT f.flow_id, p.depth, f.take_id, t.publication_id, [f.take_id], [t.publication_id]
+    FROM flow AS f
+    JOIN path AS p ON f.path_id = p.path_id
+    JOIN transport AS t ON f.take_id = t.take_id
+    UNION ALL
+    SELECT flow_id, hop, take_id, publication_id, takes, publications
+    FROM (
+        SELECT
+            r.flow_id, r.hop - 1 AS hop, t.take_id, t.publication_id,
+            list_prepend(t.take_id, r.takes) AS takes,
+            list_prepend(t.publication_id, r.publications) AS publications
+        FROM trail AS r
+        JOIN flow AS f ON r.flow_id = f.flow_id
+        JOIN path AS p ON f.path_id = p.path_id
+        JOIN continuation AS c
+            ON r.publication_id = c.publication_id
+            AND p.subscriptions[r.hop - 1] = c.subscription_id
+        JOIN transport AS t
+            ON c.take_id = t.take_id AND p.publishers[r.hop - 1] = t.publisher_id
+        WHERE r.hop > 1
+    )
+    QUALIFY row_number() OVER (
+        PARTITION BY flow_id, take_id ORDER BY publications, takes
+    ) = 1
+),
+whole AS (
+    SELECT r.flow_id, r.takes, r.publications
+    FROM trail AS r
+    JOIN flow AS f ON r.flow_id = f.flow_id
+    JOIN derive.flow_root AS o ON r.publication_id = o.publication_id
+    WHERE r.hop = 1
+        AND CASE
+            WHEN f.root_kind = 'publication' THEN f.root_id = r.publication_id
+            ELSE o.root_kind = 'callback_instance' AND o.root_id = f.root_id
+        END
+    QUALIFY row_number() OVER (PARTITION BY r.flow_id ORDER BY r.publications DESC) = 1
+),
+hop AS MATERIALIZED (
+    SELECT
+        flow_id,
+        unnest(range(1, len(takes) + 1)) AS hop,
+        unnest(takes) AS take_id,
+        unnest(publications) AS publication_id,
+        unnest(list_prepend(NULL, takes[:-2])) AS previous_take_id
+    FROM whole
+),
+-- The callback (or take without one) of the node that each message came out of.
+entered AS MATERIALIZED (
+    SELECT
+        h.flow_id, h.hop, h.publication_id, h.previous_take_id,
+        CASE WHEN h.hop = 1 AND f.root_kind = 'callback_instance' THEN f.root_id
+            ELSE i.callback_instance_id END AS callback_instance_id
+    FROM hop AS h
+    JOIN flow AS f ON h.flow_id = f.flow_id
+    LEFT JOIN store.callback_instance AS i ON h.previous_take_id = i.take_id
+    WHERE h.hop > 1 OR f.root_kind = 'callback_instance'
+),
+cause AS MATERIALIZED (
+    SELECT
+        e.flow_id, e.hop, e.publication_id, e.callback_instance_id,
+        c.run_id_out AS publishing_id, c.kind
+    FROM entered AS e
+    JOIN continuation AS c
+        ON e.publication_id = c.publication_id AND e.callback_instance_id = c.run_id_in
+    QUALIFY row_number() OVER (
+        PARTITION BY e.flow_id, e.hop
+        ORDER BY c.run_id_out <> c.run_id_in, c.kind <> 'direct', c.run_id_out
+    ) = 1
+),
+-- Calls of services between the two, from the last one back to the first.
+leg (publishing_id, caller_id, level, request_id, service_id, sender_id) AS (
+    SELECT c.publishing_id, c.callback_instance_id, 1, i.request_id, c.publishing_id,
+        l.callback_instance_id
+    FROM (
+        SELECT DISTINCT publishing_id, callback_instance_id
+        FROM cause
+        WHERE publishing_id <> callback_instance_id
+    ) AS c
+    JOIN store.callback_instance AS i ON c.publishing_id = i.callback_instance_id
+    JOIN store.link_request AS l ON i.request_id = l.request_id
+    UNION
+    SELECT g.publishing_id, g.caller_id, g.level + 1, i.request_id, g.sender_id,
+        l.callback_instance_id
+    FROM leg AS g
+    JOIN store.callback_instance AS i ON g.sender_id = i.callback_instance_id
+    JOIN store.link_request AS l ON i.request_id = l.request_id
+    WHERE g.sender_id <> g.caller_id
+),
+call AS (
+    SELECT
+        c.flow_id, c.hop, g.level, q.sent_ns, q.taken_ns, i.start_ns, i.callback_instance_id
+    FROM cause AS c
+    JOIN leg AS g
+        ON c.publishing_id = g.publishing_id AND c.callback_instance_id = g.caller_id
+    JOIN main.request AS q ON g.request_id = q.request_id
+    JOIN main.callback_instance AS i ON g.service_id = i.callback_instance_id
+),
+message AS MATERIALIZED (
+    SELECT
+        h.flow_id, h.hop, h.publication_id, b.start_ns, b.end_ns, t.taken_ns,
+        i.start_ns AS called_ns, i.callback_instance_id,
+        list_sort(list_filter(
+            [
+                {'at_ns': b.intra_ns, 'rank': 1, 'part': 'intra'},
+                {'at_ns': b.rclcpp_ns, 'rank': 2, 'part': 'rclcpp'},
+                {'at_ns': b.rcl_ns, 'rank': 3, 'part': 'rcl'},
+                {'at_ns': b.rmw_ns, 'rank': 4, 'part': 'rmw'},
+                {'at_ns': b.dds_ns, 'rank': 5, 'part': 'dds'}
+            ],
+            lambda layer: layer.at_ns IS NOT NULL
+        )) AS layers
+    FROM hop AS h
+    JOIN main.publication AS b ON h.publication_id = b.publication_id
+    JOIN main.take AS t ON h.take_id = t.take_id
+    LEFT JOIN main.callback_instance AS i ON h.take_id = i.take_id
+),
+layer AS (
+    SELECT flow_id, hop, publication_id, unnest(layers) AS layer FROM message
+),
+-- The moments at which a part begins. Those of a hop are in the order of `section`, then `rank`.
+moment AS (
+    SELECT
+        e.flow_id, e.hop, 1 AS section, 0 AS rank, 'callback' AS part,
+        coalesce(i.start_ns, t.taken_ns) AS at_ns,
+        e.callback_instance_id, NULL::BIGINT AS publication_id
+    FROM entered AS e
+    LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id
+    LEFT JOIN main.take AS t ON e.previous_take_id = t.take_id
+    UNION ALL
+    SELECT flow_id, hop, 2, -3 * level, 'request', sent_ns, callback_instance_id, NULL
+    FROM call
+    WHERE sent_ns IS NOT NULL
+    UNION ALL
+    SELECT flow_id, hop, 2, 1 - 3 * level, 'executor', taken_ns, callback_instance_id, NULL
+    FROM call
+    WHERE taken_ns IS NOT NULL
+    UNION ALL
+    SELECT flow_id, hop, 2, 2 - 3 * level, 'service', start_ns, callback_instance_id, NULL
+    FROM call
+    UNION ALL
+    SELECT
+        c.flow_id, c.hop, 3, 0, 'cache', coalesce(i.end_ns, i.start_ns), d.callback_instance_id,
+        c.publication_id
+    FROM cause AS c
+    JOIN main.callback_instance AS i ON c.publishing_id = i.callback_instance_id
+    LEFT JOIN store.link_causal AS d ON c.publication_id = d.publication_id AND d.kind = 'direct'
+    WHERE c.kind IN ('periodic_async', 'partial_sync')
+    UNION ALL
+    SELECT c.flow_id, c.hop, 4, 0, 'callback', i.start_ns, i.callback_instance_id, NULL
+    FROM cause AS c
+    JOIN store.link_causal AS d ON c.publication_id = d.publication_id AND d.kind = 'direct'
+    JOIN main.callback_instance AS i ON d.callback_instance_id = i.callback_instance_id
+    WHERE c.kind IN ('periodic_async', 'partial_sync')
+    UNION ALL
+    SELECT flow_id, hop, 5, 0, 'publish', start_ns, NULL, publication_id
+    FROM message
+    WHERE start_ns IS DISTINCT FROM layers[1].at_ns
+    UNION ALL
+    SELECT flow_id, hop, 6, layer.rank, layer.part, layer.at_ns, NULL, publication_id
+    FROM layer
+    UNION ALL
+    SELECT flow_id, hop, 7, 0, 'transport', end_ns, callback_instance_id, publication_id
+    FROM message
+    UNION ALL
+    SELECT m.flow_id, m.hop, 8, 0, 'executor', m.taken_ns, m.callback_instance_id, m.publication_id
+    FROM message AS m
+    JOIN flow AS f ON m.flow_id = f.flow_id
+    JOIN path AS p ON f.path_id = p.path_id
+    WHERE m.called_ns IS NOT NULL AND (m.hop < p.depth OR f.sink_event <> 'take')
+    UNION ALL
+    SELECT f.flow_id, p.depth + 1, 1, 0, 'callback', m.called_ns, m.callback_instance_id, NULL
+    FROM flow AS f
+    JOIN path AS p ON f.path_id = p.path_id
+    JOIN message AS m ON f.flow_id = m.flow_id AND p.depth = m.hop
+    WHERE f.sink_event = 'callback_end'
+    UNION ALL
+    SELECT f.flow_id, p.depth + 2, 1, 0, NULL, f.sink_ns, NULL, NULL
+    FROM flow AS f
+    JOIN path AS p ON f.path_id = p.path_id
+    WHERE f.flow_id IN (SELECT flow_id FROM whole)
+),
+-- The layers follow each other in time, everything else in the order of causes.
+part AS (
+    SELECT
+        flow_id,
+        hop,
+        part,
+        at_ns,
+        callback_instance_id,
+        publication_id,
+        lead(at_ns) OVER in_order AS to_ns,
+        row_number() OVER in_order AS position
+    FROM moment
+    WINDOW in_order AS (
+        PARTITION BY flow_id
+        ORDER BY hop, section, CASE WHEN section = 6 THEN at_ns END, rank
+    )
+)
+SELECT
+    f.run_id,
+    f.path_id,
+    f.flow_id,
+    f.root_kind,
+    f.root_id,
+    f.take_id,
+    f.latency_ns,
+    p.hop,
+    p.position,
+    p.part,
+    p.at_ns AS from_ns,
+    p.to_ns,
+    p.to_ns - p.at_ns AS duration_ns,
+    p.callback_instance_id,
+    p.publication_id
+FROM part AS p
+JOIN flow AS f ON p.flow_id = f.flow_id
+WHERE p.part IS NOT NULL
