@@ -1,8 +1,9 @@
-"""What partial traces need.
+"""What partial traces, services and several clocks need.
 
 Publications know the callback event before them, and when their thread went on; marks of what gaps
 may hide, failed takes, and what is missing; messages told by time, ring buffers, takes by hand;
-where the records of threads break; callback groups.
+where the records of threads break; callback groups; which request a response answers; which clocks
+belong together, and how well drift is known.
 
 Frozen: it does not follow later changes of msgflow/db/tables.py.
 """
@@ -38,6 +39,17 @@ FROM (
 ) AS placed
 WHERE publication.publication_id = placed.publication_id
 """
+
+
+_CLOCK_COLUMNS = {
+    "drift_uncertainty_ppb": (
+        "What its bound grows by per time elapsed since reference_ns or before it; NULL: none, or "
+        "not known [1e-9]"
+    ),
+    "reference_clock_id": (
+        "Clock whose times its times become; NULL: not brought together with others"
+    ),
+}
 
 
 def upgrade() -> None:
@@ -90,6 +102,7 @@ def upgrade() -> None:
     _create_thread_break()
     _create_callback_groups()
     _create_links()
+    _add_services_and_clocks()
 
 
 def _create_thread_break() -> None:
@@ -241,8 +254,19 @@ def _create_links() -> None:
     )
 
 
+def _add_services_and_clocks() -> None:
+    op.execute("ALTER TABLE store.response ADD COLUMN request_id BIGINT")
+    _comment("COLUMN store.response.request_id", "Request that it answers")
+    for name, comment in _CLOCK_COLUMNS.items():
+        op.execute(f"ALTER TABLE store.clock ADD COLUMN {name} BIGINT")
+        _comment(f"COLUMN store.clock.{name}", comment)
+
+
 def downgrade() -> None:
     """Drop the columns and tables."""
+    for name in _CLOCK_COLUMNS:
+        op.drop_column("clock", name, schema="store")
+    op.drop_column("response", "request_id", schema="store")
     for table in ("nearest_message", "stamp_clock", "ring_buffer_event"):
         op.drop_table(table, schema="store")
     op.execute("DELETE FROM store.link_causal WHERE callback_instance_id IS NULL")

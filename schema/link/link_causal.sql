@@ -6,41 +6,48 @@
 -- needs: derive.link_causal_direct, derive.link_causal_take_adjacent,
 --     derive.link_causal_periodic_async, derive.link_causal_partial_sync,
 --     store.callback_instance, store.take, store.publication
-WITH link AS (
+WITH indirect AS (
     SELECT
-        run_id, callback_instance_id, NULL::BIGINT AS take_id, publication_id, 'direct' AS kind,
-        NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, false AS is_loss_affected
-    FROM derive.link_causal_direct
-    UNION ALL
-    SELECT run_id, NULL, take_id, publication_id, 'take_adjacent', NULL, 1, false
-    FROM derive.link_causal_take_adjacent
-    UNION ALL
-    SELECT
-        run_id, callback_instance_id, NULL, publication_id, 'periodic_async', annotation_id,
+        run_id, callback_instance_id, publication_id, 'periodic_async' AS kind, annotation_id,
         candidate_count, is_loss_affected
     FROM derive.link_causal_periodic_async
     UNION ALL
     SELECT
-        run_id, callback_instance_id, NULL, publication_id, 'partial_sync', annotation_id,
+        run_id, callback_instance_id, publication_id, 'partial_sync', annotation_id,
         candidate_count, is_loss_affected
     FROM derive.link_causal_partial_sync
+),
+link AS (
+    SELECT
+        run_id, callback_instance_id, take_id, publication_id, publisher_id, 'direct' AS kind,
+        NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, is_loss_affected
+    FROM derive.link_causal_direct
+    UNION ALL
+    SELECT
+        a.run_id, NULL, a.take_id, a.publication_id, b.publisher_id, 'take_adjacent', NULL, 1,
+        t.is_loss_affected OR b.is_loss_affected
+    FROM derive.link_causal_take_adjacent AS a
+    JOIN store.take AS t ON a.take_id = t.take_id
+    JOIN store.publication AS b ON a.publication_id = b.publication_id
+    UNION ALL
+    SELECT
+        x.run_id, x.callback_instance_id, i.take_id, x.publication_id, b.publisher_id, x.kind,
+        x.annotation_id, x.candidate_count,
+        x.is_loss_affected OR i.is_loss_affected OR b.is_loss_affected
+    FROM indirect AS x
+    JOIN store.callback_instance AS i ON x.callback_instance_id = i.callback_instance_id
+    JOIN store.publication AS b ON x.publication_id = b.publication_id
 )
--- By identities alone: with run_id as well, runs and publications might be joined by that first.
 SELECT
     l.run_id,
     l.callback_instance_id,
     l.publication_id,
-    t.take_id,
+    l.take_id,
     t.subscription_id,
-    b.publisher_id,
+    l.publisher_id,
     l.kind,
     l.annotation_id,
     l.candidate_count,
     l.is_loss_affected
-    OR coalesce(i.is_loss_affected, false)
-    OR coalesce(l.take_id IS NOT NULL AND t.is_loss_affected, false)
-    OR coalesce(b.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
-LEFT JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
-JOIN store.publication AS b ON l.publication_id = b.publication_id
-LEFT JOIN store.take AS t ON coalesce(l.take_id, i.take_id) = t.take_id
+LEFT JOIN store.take AS t ON l.take_id = t.take_id

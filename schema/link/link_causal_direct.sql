@@ -23,13 +23,18 @@ WITH RECURSIVE around AS (
     JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
     WHERE i.parent_id IS NOT NULL AND a.event_id >= i.effective_end_event_id
 )
-SELECT b.run_id, i.callback_instance_id, b.publication_id
+SELECT
+    b.run_id, i.callback_instance_id, b.publication_id, i.take_id, b.publisher_id,
+    i.is_loss_affected OR b.is_loss_affected AS is_loss_affected
 FROM store.publication AS b
 JOIN store.callback_instance AS i
     ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
 WHERE b.start_event_id < i.effective_end_event_id
 UNION ALL
-SELECT a.run_id, i.callback_instance_id, a.publication_id
+SELECT
+    a.run_id, i.callback_instance_id, a.publication_id, i.take_id, b.publisher_id,
+    i.is_loss_affected OR b.is_loss_affected
 FROM around AS a
 JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
+JOIN store.publication AS b ON a.publication_id = b.publication_id
 WHERE a.event_id < i.effective_end_event_id
