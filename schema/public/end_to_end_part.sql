@@ -40,8 +40,8 @@
 -- column: callback_instance_id BIGINT  Run of the callback that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
 -- needs: main.end_to_end, main.flow_path, main.publication, main.take, main.callback_instance,
---     main.request, derive.flow_transport, derive.flow_continuation, derive.flow_caller,
---     derive.flow_root, store.link_causal, store.link_request
+--     main.request, derive.flow_transport, derive.flow_caller, derive.flow_root,
+--     store.link_causal, store.link_request, store.take, store.callback_instance
 CREATE OR REPLACE MACRO main.end_to_end_part(
     runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns, flow_case,
     sink_take_id := NULL, max_depth := 32, max_paths := 1000
