@@ -48,6 +48,6 @@ SELECT
     l.kind,
     l.annotation_id,
     l.candidate_count,
-    l.is_loss_affected
+    coalesce(l.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
 LEFT JOIN store.take AS t ON l.take_id = t.take_id

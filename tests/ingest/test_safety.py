@@ -87,8 +87,8 @@ import sys, time
 import msgflow.ingest
 module = sys.modules[msgflow.ingest.ingest.__module__]
 derive = module.derive
-def stop(con, run_id):
-    derive(con, run_id)
+def stop(con, run_id, **options):
+    derive(con, run_id, **options)
     print("derived", flush=True)
     time.sleep(60)
 module.derive = stop

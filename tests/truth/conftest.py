@@ -23,8 +23,8 @@ _LENGTHS = {
     "mixed_intra_process": 0.5,
 }
 _SHORT = 0.15
-# Flows in them pass ring buffers or messages taken without a callback.
-_WITH_GAPS = ("intra_process", "mixed_intra_process", "python", "layers")
+# Flows in them pass ring buffers, messages taken without a callback, or calls of services.
+_WITH_GAPS = ("intra_process", "mixed_intra_process", "python", "layers", "services")
 
 
 @pytest.fixture(scope="session")
