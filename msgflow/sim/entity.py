@@ -138,6 +138,31 @@ class Subscription:
 
 
 @dataclass(frozen=True, slots=True)
+class MessageLink:
+    """What the messages of a node have to do with each other, declared in its trace (annotation).
+
+    Attributes:
+        kind: 'periodic_async': each input is kept until a newer one comes, and what is published
+            is made of what is kept; 'partial_sync': callbacks of inputs publish only once there is
+            a message of every input, and use each up.
+        inputs: topics of subscriptions of the node.
+        outputs: topics of its publishers.
+    """
+
+    kind: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if self.kind not in {"periodic_async", "partial_sync"}:
+            raise UsageError(
+                f"no such kind of link — {self.kind}", "choose periodic_async or partial_sync"
+            )
+        if not self.inputs or not self.outputs:
+            raise UsageError("a link has inputs and outputs — one of them is missing")
+
+
+@dataclass(frozen=True, slots=True)
 class Timer:
     """A timer of a node and what its callback does; see `Subscription`."""
 
