@@ -38,23 +38,68 @@
 --     were seen to end, of the takes whose publication is known; in run A
 -- column: b_share DOUBLE  Likewise in run B
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
--- needs: main.run, derive.compared_path, derive.compared_callback, derive.compared_topic
+-- needs: main.run, main.flow_path, main.end_to_end, main.callback_instance, main.callback_label,
+--     main.take, main.link_transport, main.subscription, main.process, main.node,
+--     derive.node_label
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
     skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false
 ) AS TABLE
 WITH thing AS (
-    SELECT run_id, subject, is_internal, at_ns, id, value_ns, is_unit, is_complete
-    FROM derive.compared_path([run_a, run_b], from_topic, to_topic, wanted_case)
+    -- A root counts once, however often it arrived; of those at the edge it is not known.
+    SELECT
+        e.run_id,
+        p.path AS subject,
+        false AS is_internal,
+        e.root_ns AS at_ns,
+        e.root_id AS id,
+        CASE
+            WHEN e.status <> 'reached' THEN NULL
+            WHEN wanted_case = 'first' AND NOT e.is_first THEN NULL
+            WHEN wanted_case = 'last' AND NOT e.is_last THEN NULL
+            WHEN wanted_case = 'newest' AND NOT e.is_newest THEN NULL
+            ELSE e.latency_ns
+        END AS value_ns,
+        e.is_first AND e.status <> 'edge' AS is_unit,
+        e.status = 'reached' AS is_complete
+    FROM main.end_to_end(
+        [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
+        (-9223372036854775808)::BIGINT, 9223372036854775807
+    ) AS e
+    JOIN main.flow_path([run_a, run_b], from_topic, to_topic) AS p ON e.path_id = p.path_id
     WHERE what = 'paths'
     UNION ALL
-    SELECT run_id, subject, is_internal, at_ns, id, value_ns, is_unit, is_complete
-    FROM derive.compared_callback([run_a, run_b])
-    WHERE what = 'callbacks'
+    SELECT
+        i.run_id,
+        l.node || ' · ' || l.label AS subject,
+        l.is_internal,
+        i.start_ns AS at_ns,
+        i.callback_instance_id AS id,
+        i.end_ns - i.start_ns AS value_ns,
+        true AS is_unit,
+        i.end_ns IS NOT NULL AS is_complete
+    FROM main.callback_instance AS i
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    WHERE what = 'callbacks' AND list_contains([run_a, run_b], i.run_id)
     UNION ALL
-    SELECT run_id, subject, is_internal, at_ns, id, value_ns, is_unit, is_complete
-    FROM derive.compared_topic([run_a, run_b])
+    SELECT
+        t.run_id,
+        coalesce(s.topic_name, '?') || ' → ' || derive.node_label(n.full_name, p.name, p.pid)
+            AS subject,
+        coalesce(s.is_internal, false) AS is_internal,
+        t.taken_ns AS at_ns,
+        t.take_id AS id,
+        l.latency_ns AS value_ns,
+        true AS is_unit,
+        l.take_id IS NOT NULL AS is_complete
+    FROM main.take AS t
+    LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
+    LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
+    LEFT JOIN main.process AS p ON s.process_id = p.process_id
+    LEFT JOIN main.node AS n ON s.node_id = n.node_id
     WHERE what = 'topics'
+        AND list_contains([run_a, run_b], t.run_id)
+        AND t.method <> 'callback_only'
 ),
 side (side, run_id) AS (
     VALUES ('a', run_a), ('b', run_b)
