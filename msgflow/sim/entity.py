@@ -23,12 +23,14 @@ class Work:
         spread_ns: width of the even spread above it.
         slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
         slow_ns: greatest additional duration of a slow run; it is at least half of that.
+        percent_before: how much is done before the first publication, the rest after the last.
     """
 
     typical_ns: int = 20 * MICROSECOND
     spread_ns: int = 30 * MICROSECOND
     slow_probability: float = 0.0
     slow_ns: int = 0
+    percent_before: int = 80
 
 
 @dataclass(frozen=True, slots=True)

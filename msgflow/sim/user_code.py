@@ -95,8 +95,8 @@ def _execute(
     duration = work.typical_ns + int(random() * work.spread_ns)
     if work.slow_probability and random() < work.slow_probability:
         duration += int((1 + random()) * work.slow_ns / 2)
-    time = start + 200 + duration * 4 // 5
-    rest = 200 + duration // 5
+    time = start + 200 + duration * work.percent_before // 100
+    rest = 200 + duration * (100 - work.percent_before) // 100
     if code.is_stepwise:
         return _step(thread, middleware, code, time, rest, instance, cause)
     for publisher in code.publishers:
