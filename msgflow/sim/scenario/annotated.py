@@ -24,15 +24,15 @@ def periodic_async() -> Scenario:
     return Scenario(
         name="periodic_async",
         description="Timers publish what they make of the latest message of up to three inputs.",
-        hosts=(Host("alpha"), Host("beta")),
+        hosts=(Host("alpha", cpu_count=8),),
         processes=(
             *_sources(),
             *_one_each(nodes),
             # Two links of one node that share an input and an output.
-            Process("sharing", "beta", 2001, (_sharing(),), start_ns=70 * MILLISECOND),
+            Process("sharing", "alpha", 2001, (_sharing(),), start_ns=70 * MILLISECOND),
             # Inputs that are received while the timer runs, also twice at once.
             Process(
-                "concurrent", "beta", 2101, (_concurrent(),), start_ns=75 * MILLISECOND,
+                "concurrent", "alpha", 2101, (_concurrent(),), start_ns=75 * MILLISECOND,
                 executors=(Executor("multi_threaded", 3),),
             ),
             _sink((*nodes, _sharing(), _concurrent())),
@@ -48,13 +48,13 @@ def partial_sync() -> Scenario:
     return Scenario(
         name="partial_sync",
         description="Callbacks publish once there is a new message of each of up to three inputs.",
-        hosts=(Host("alpha"), Host("beta")),
+        hosts=(Host("alpha", cpu_count=8),),
         processes=(
             *_sources(),
             *_one_each(nodes),
             # Its callbacks run on two threads, one at a time.
             Process(
-                "two_threads", "beta", 2001, (_both_kinds(),), start_ns=70 * MILLISECOND,
+                "two_threads", "alpha", 2001, (_both_kinds(),), start_ns=70 * MILLISECOND,
                 executors=(Executor("multi_threaded", 2),),
             ),
             _sink((*nodes, _both_kinds())),
@@ -83,7 +83,7 @@ def _sources() -> tuple[Process, ...]:
 
 def _one_each(nodes: tuple[Node, ...]) -> tuple[Process, ...]:
     return tuple(
-        Process(node.name, "beta", 1101 + 100 * number, (node,), start_ns=(3 + 5 * number) * 10**6)
+        Process(node.name, "alpha", 1401 + 100 * number, (node,), start_ns=(3 + 5 * number) * 10**6)
         for number, node in enumerate(nodes)
     )
 
@@ -166,4 +166,4 @@ def _both_kinds() -> Node:
 def _sink(nodes: tuple[Node, ...]) -> Process:
     topics = [publisher.topic for node in nodes for publisher in node.publishers]
     sink = Node("sink", subscriptions=tuple(Subscription(topic) for topic in topics))
-    return Process("sink", "alpha", 1501, (sink,), start_ns=30 * MILLISECOND)
+    return Process("sink", "alpha", 2201, (sink,), start_ns=30 * MILLISECOND)
