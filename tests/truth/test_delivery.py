@@ -78,7 +78,7 @@ def test_reasons_of_what_ros_publishes_once(simulated: Ingested) -> None:
         if ours not in (true or "before_subscription", "unknown")
     ]
     # Which came first on another host is known to the spread of what messages take.
-    assert all(pair == ("before_subscription", "lost_in_transport") for pair in wrong), wrong
+    assert {true for true, _ in wrong} <= {"before_subscription"}, wrong
     assert len(wrong) <= len(others) / 50
 
 
