@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links import AppliedLinks
+    from msgflow.query.compare import Comparison
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
@@ -309,6 +310,63 @@ class Database:
             )
 
         return interruptible(connection, read)
+
+    def compare(
+        self,
+        run_a: str | int,
+        run_b: str | int,
+        *,
+        what: str = "paths",
+        from_: str | None = None,
+        to: str | None = None,
+        case: str = "first",
+        skip_first: float = 0.0,
+        confidence: float = 0.95,
+        resamples: int = 1_000,
+        seed: int = 0,
+        internal: bool = False,
+    ) -> Comparison:
+        """Compare run B with run A: by path, callback or topic, with intervals and effect sizes.
+
+        Args:
+            run_a: name or id of the run that is compared with.
+            run_b: name or id of the other one.
+            what: 'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (transport
+                latency).
+            from_: topic where paths start; every source when None.
+            to: topic where paths end; wherever they end when None.
+            case: arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
+            skip_first: seconds to leave out at the begin of each run.
+            confidence: of the intervals, between 0 and 1.
+            resamples: that the intervals are from.
+            seed: of the resampling; the same seed gives the same intervals.
+            internal: compare what ROS does for itself too.
+
+        Raises:
+            UsageError: a run, topic or choice that does not exist, or runs with nothing in common.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.query.compare import compare
+
+        connection = self.connection
+        return interruptible(
+            connection,
+            lambda: compare(
+                connection,
+                run_a,
+                run_b,
+                what=what,
+                from_topic=from_,
+                to_topic=to,
+                case=case,
+                skip_first=skip_first,
+                confidence=confidence,
+                resamples=resamples,
+                seed=seed,
+                internal=internal,
+            ),
+        )
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
         """Run SQL, read-only, without access to other files, and return the last result.

@@ -13,19 +13,29 @@ LEFT JOIN truth_time AS a
 LEFT JOIN truth_time AS b
     ON f.to_kind = b.kind AND f.to_host = b.host AND f.to_pid = b.pid AND f.to_tid = b.tid
     AND f.to_ns = b.ts_ns
-LEFT JOIN truth_link AS l ON f.kind = l.kind AND a.id = l.from_id AND b.id = l.to_id
+LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM truth_link) AS l
+    ON f.kind = l.kind AND a.id = l.from_id AND b.id = l.to_id
 QUALIFY row_number() OVER (PARTITION BY f.number ORDER BY l.from_id NULLS LAST, l.to_id) = 1;
 
 CREATE OR REPLACE TEMP TABLE score AS
-WITH found AS (
+WITH twice AS (
+    -- Two annotations of a node may both link one message to one publication.
+    SELECT kind, count(*) - count(DISTINCT (from_id, to_id)) AS several
+    FROM truth_link
+    WHERE kind IN ('periodic_async', 'partial_sync') AND is_decided
+    GROUP BY kind
+),
+found AS (
     SELECT
         kind,
         count(*) AS found,
         count(from_id) AS right_count,
         count(*) FILTER (from_id IS NULL AND NOT is_guess) AS wrong,
         count(*) FILTER (from_id IS NULL AND is_guess) AS misguessed,
-        count(from_id) - count(DISTINCT (from_id, to_id)) FILTER (from_id IS NOT NULL) AS repeated
+        count(from_id) - count(DISTINCT (from_id, to_id)) FILTER (from_id IS NOT NULL)
+        - coalesce(any_value(t.several), 0) AS repeated
     FROM verdict
+    LEFT JOIN twice AS t USING (kind)
     GROUP BY kind
 ),
 labelled AS (

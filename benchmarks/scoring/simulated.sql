@@ -188,6 +188,14 @@ whole_callback AS (
         SELECT host, ts_ns FROM simulated_unrecorded WHERE cause <> 'late start'
     ) AS u ON c.host = u.host AND c.start_ns <= u.ts_ns
     WHERE r.is_whole AND coalesce(u.ts_ns > c.end_ns, true)
+),
+-- Who is annotated says so once, and an input that is missing leaves an older one in its cache.
+told AS (
+    SELECT t.host, d.event
+    FROM (SELECT DISTINCT host FROM simulated_trace) AS t
+    CROSS JOIN (SELECT DISTINCT event FROM simulated_declared) AS d
+    WHERE d.event LIKE 'ros2:message_link_%'
+        AND t.host NOT IN (SELECT host FROM simulated_unrecorded)
 )
 SELECT
     'publication' AS kind, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id,
@@ -209,7 +217,13 @@ FROM message
 UNION ALL
 SELECT
     c.kind, 'callback_instance', c.callback_instance_id::VARCHAR, 'publication',
-    c.publication_id::VARCHAR, w.id IS NOT NULL AND p.is_whole,
+    c.publication_id::VARCHAR,
+    w.id IS NOT NULL
+    AND p.is_whole
+    AND (
+        c.kind NOT IN ('periodic_async', 'partial_sync')
+        OR (c.host, 'ros2:message_link_' || c.kind) IN (SELECT (host, event) FROM told)
+    ),
     'derive.link_causal_' || c.kind
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id

@@ -9,6 +9,7 @@ import typer
 from msgflow.cli import (
     check,
     clocks,
+    compare,
     db,
     events,
     export,
@@ -35,6 +36,7 @@ app = typer.Typer(
 app.command("ingest")(ingest.command)
 app.add_typer(query.app, name="query")
 app.command("flow")(flow.command)
+app.command("compare")(compare.command)
 app.command("events")(events.command)
 app.command("sql")(sql.command)
 app.command("info")(info.command)

@@ -17,8 +17,8 @@ from msgflow.version import __version__
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 COMMANDS = (
-    "ingest", "query", "flow", "sql", "info", "check", "events", "links", "clocks", "export",
-    "db", "simulate",
+    "ingest", "query", "flow", "compare", "sql", "info", "check", "events", "links", "clocks",
+    "export", "db", "simulate",
 )  # fmt: skip
 
 

@@ -47,10 +47,13 @@ got, whenever they existed; with the takes they account for every such pair:
     'before_subscription', 'before_discovery', 'lost_in_transport', 'overwritten' (in a queue or a
     ring buffer), 'take_failed' (expired, and the take found nothing), 'expired' (and the take
     found a newer message), 'subscription_ended', 'pending_at_end'
-causal — one row per publication made inside a callback, or with a message taken without one:
-    callback_instance_id, publication_id, host, pid, tid, kind ('direct'; 'take_adjacent' without
-    a callback), callback_start_ns, take_id, take_rmw_ns (NULL for timers), topic_name,
-    publication_rcl_ns, publication_rmw_ns, is_internal
+causal — one row per publication made inside a callback, or with a message taken without one, and
+one per message of another input that it was made of (annotated nodes):
+    callback_instance_id, publication_id, host, pid, tid (of the callback), kind ('direct';
+    'take_adjacent' without a callback; 'periodic_async', 'partial_sync' of another input),
+    callback_start_ns, take_id, take_rmw_ns (NULL for timers), topic_name,
+    publication_rcl_ns, publication_rmw_ns, is_internal, is_reuse (an earlier publication by the
+    same link has used the message already: a program that empties its caches would not have)
 request — one row per request:
     request_id, service_name, client_gid, sequence_number, client_{host,pid,tid,node,handle},
     sent_ns, sender_callback_instance_id, service_{host,pid,tid,node,handle}, taken_ns,
@@ -60,8 +63,9 @@ response — one row per request that was answered:
     service_{host,pid,tid}, sent_ns, client_{host,pid,tid}, taken_ns
 lifecycle_transition — one row per change of state of a managed node:
     host, pid, tid, node, at_ns, start_state, goal_state
-end_to_end — one row per flow from a run of a timer's callback to a subscription whose callback
-publishes nothing (logging does not count), self loops left out:
+end_to_end — one row per flow from a run of a timer's callback (one that uses no messages) to a
+subscription whose callback publishes and keeps nothing (logging does not count), self loops left
+out:
     root_callback_instance_id, root_{host,pid,tid,start_ns}, path (topics in order),
     sink_{host,pid,tid,node,take_id,take_ns,end_ns} (take_ns: rmw_take or dequeue; end_ns:
     callback_end),
@@ -93,6 +97,7 @@ from msgflow.sim.engine import Simulation, simulate
 from msgflow.sim.entity import (
     Call,
     Client,
+    MessageLink,
     Poll,
     Publisher,
     Service,
@@ -114,6 +119,7 @@ __all__ = [
     "Executor",
     "Group",
     "Host",
+    "MessageLink",
     "Node",
     "Poll",
     "Process",

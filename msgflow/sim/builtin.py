@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from msgflow.sim.entity import MILLISECOND, Publisher, Subscription, Timer
 from msgflow.sim.robot import demo
 from msgflow.sim.scenario import (
+    annotated,
+    autoware,
     delivery,
     executors,
     intra_process,
@@ -45,6 +47,10 @@ def scenarios() -> Mapping[str, Scenario]:
         stamps.equal_stamps(),
         layers.python(),
         layers.layers(),
+        annotated.periodic_async(),
+        annotated.partial_sync(),
+        autoware.autoware(),
+        autoware.autoware_two_threads(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})
 

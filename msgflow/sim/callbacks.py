@@ -70,7 +70,9 @@ def run_subscription(
         )  # fmt: skip
     taken.write(thread, subscription, None)
     message = taken.message
-    cause = CallbackInstance(None, None, message.root, message.path, taken.take_id, taken.rmw_ns)
+    cause = CallbackInstance(
+        None, None, message.origins, taken.take_id, taken.rmw_ns, thread.tid, taken.time
+    )
     return execute(thread, middleware, code, start, cause)
 
 
@@ -122,19 +124,21 @@ def run_callback(
     start_ns = start + machine.epoch
     if taken is None:
         # Flows begin in timers; what the callback of a service publishes is no flow from a timer.
-        root = Root(instance_id, hostname, pid, tid, start, start_ns) if kind == "timer" else None
-        instance = CallbackInstance(instance_id, start_ns, root, (), None, None)
+        root = Root(instance_id, hostname, pid, tid, start, start_ns)
+        origins = ((root, ()),) if kind == "timer" else ()
+        instance = CallbackInstance(instance_id, start_ns, origins, None, None, tid, start)
     else:
-        message = taken.message
         instance = CallbackInstance(
-            instance_id, start_ns, message.root, message.path, taken.take_id, taken.rmw_ns
+            instance_id, start_ns, taken.message.origins, taken.take_id, taken.rmw_ns, tid, start
         )
     facts = (instance_id, hostname, pid, tid, node, kind, callback, start_ns)
     thread.emit(machine.tracepoints.callback_start, start, thread.context, callback, is_intra)
     outcome = execute(thread, middleware, code, start, instance)
     if not isinstance(outcome, int):
-        return _in_steps(outcome, thread, facts, taken, subscription, is_intra)
+        return _in_steps(outcome, thread, facts, taken, subscription, is_intra, code, instance)
     thread.emit(machine.tracepoints.callback_end, outcome, thread.context, callback)
+    if code.links is not None:
+        code.links.end(outcome, instance)
     _write(thread, facts, outcome, taken, subscription, is_intra, None)
     return outcome
 
@@ -146,6 +150,8 @@ def _in_steps(
     taken: Taken | None,
     subscription: SubscriptionObject | None,
     is_intra: int,
+    code: UserCode,
+    instance: CallbackInstance,
 ) -> Steps:
     """Go through a callback that others can act between, or that may be cut short."""
     instance_id, callback = facts[0], facts[6]
@@ -155,6 +161,8 @@ def _in_steps(
     try:
         end = yield from steps
         thread.emit(thread.machine.tracepoints.callback_end, end, thread.context, callback)
+        if code.links is not None:
+            code.links.end(end, instance)
     finally:
         thread.running.pop()
         _write(thread, facts, end, taken, subscription, is_intra, parent_id)

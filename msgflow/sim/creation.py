@@ -14,6 +14,7 @@ from msgflow.sim.callbacks import TimerObject
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import CallbackGroup, Executor
 from msgflow.sim.intra import IntraBuffer, RingBuffer, put
+from msgflow.sim.links import CallbackLinks, LinkObject
 from msgflow.sim.services import ClientObject, ServiceNetwork, ServiceObject
 from msgflow.sim.transport import (
     IntraProcess,
@@ -45,6 +46,7 @@ class NodeContext:
     handle: int
     groups: Mapping[str, tuple[CallbackGroup, Executor]]
     objects: NodeObjects
+    links: tuple[LinkObject, ...] = ()
     publishers: dict[str, PublisherObject] = field(default_factory=dict)
     rosout: PublisherObject | None = None
 
@@ -55,7 +57,8 @@ class NodeContext:
         for group in node.groups:
             number = node.executor if group.executor is None else group.executor
             groups[group.name] = (CallbackGroup(group.is_reentrant), executors[number])
-        return cls(node, handle, groups, NodeObjects(executors))
+        links = tuple(LinkObject(link) for link in node.links)
+        return cls(node, handle, groups, NodeObjects(executors), links)
 
 
 class Creator:
@@ -163,7 +166,8 @@ class Creator:
             next(self.thread.world.subscription_ids), self._process, executor, group, description,
             node.description.full_name, handle, rmw_handle, callback, memory.allocate(), code,
             self._process.is_rclcpp and description.kind != "serialized",
-            topic in INTERNAL_TOPICS, not code.publishers, self.time,
+            topic in INTERNAL_TOPICS,
+            not code.publishers and not (code.links and code.links.inputs), self.time,
         )  # fmt: skip
         if description.intra_process:
             created.intra = self._buffer(created, symbol)
@@ -268,6 +272,16 @@ class Creator:
         name = node.description.full_name
         executor.timers.append(TimerObject(name, handle, callback, period, code, group, due))
 
+    def links(self, node: NodeContext) -> None:
+        """What user code says about its messages, once its objects are there."""
+        for link in node.description.links:
+            self.work(5 * MICROSECOND)
+            self.emit(
+                f"message_link_{link.kind}",
+                tuple(node.objects.polled[topic].handle for topic in link.inputs),
+                tuple(node.publishers[topic].handle for topic in link.outputs),
+            )
+
     def lifecycle(self, node: NodeContext) -> None:
         """The state machine of a managed node."""
         node.objects.lifecycle = Lifecycle(node.description.full_name, self._memory.allocate())
@@ -290,6 +304,7 @@ class Creator:
             or self._process.is_stepwise
             or any(publisher.intra is not None for publisher in publishers),
             executor.has_callbacks,
+            _links(node, description),
         )
 
     def _buffer(self, subscription: SubscriptionObject, symbol: str) -> IntraBuffer:
@@ -345,3 +360,14 @@ class Creator:
             None,
         )  # fmt: skip
         truth.dds_event.add(publication_id, *place, "dds:write", self.time + thread.machine.epoch)
+
+
+def _links(
+    node: NodeContext, description: entity.Subscription | entity.Timer | entity.Service
+) -> CallbackLinks | None:
+    topic = description.topic if isinstance(description, entity.Subscription) else None
+    inputs = tuple(link for link in node.links if topic in link.description.inputs)
+    outputs = tuple(
+        link for link in node.links if {*description.publishes} & {*link.description.outputs}
+    )
+    return CallbackLinks(topic, inputs, outputs) if inputs or outputs else None

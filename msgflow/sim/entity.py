@@ -23,12 +23,14 @@ class Work:
         spread_ns: width of the even spread above it.
         slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
         slow_ns: greatest additional duration of a slow run; it is at least half of that.
+        percent_before: how much is done before the first publication, the rest after the last.
     """
 
     typical_ns: int = 20 * MICROSECOND
     spread_ns: int = 30 * MICROSECOND
     slow_probability: float = 0.0
     slow_ns: int = 0
+    percent_before: int = 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +137,31 @@ class Subscription:
     polled: bool = False
     created_ns: int | None = None
     destroyed_ns: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MessageLink:
+    """What the messages of a node have to do with each other, declared in its trace (annotation).
+
+    Attributes:
+        kind: 'periodic_async': each input is kept until a newer one comes, and what is published
+            is made of what is kept; 'partial_sync': callbacks of inputs publish only once there is
+            a message of every input, and use each up.
+        inputs: topics of subscriptions of the node.
+        outputs: topics of its publishers.
+    """
+
+    kind: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if self.kind not in {"periodic_async", "partial_sync"}:
+            raise UsageError(
+                f"no such kind of link — {self.kind}", "choose periodic_async or partial_sync"
+            )
+        if not self.inputs or not self.outputs:
+            raise UsageError("a link has inputs and outputs — one of them is missing")
 
 
 @dataclass(frozen=True, slots=True)

@@ -112,6 +112,8 @@ class ExecutorThread(Thread):
                 self._enter(executor, _PROCESS, time)
                 entity = executor.pick()
                 if entity is None:
+                    # It may have to wait for the executor next, but has used its CPU up to here.
+                    self.keep_cpu(time + 1)
                     executor.release(time)
                     time += 900 + int(self.world.random() * 3_000)
                     continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.sim.transport import Message, Middleware, PublisherObject, Root
+from msgflow.sim.transport import Message, Middleware, Origin, PublisherObject
 from msgflow.sim.write import write
 
 if TYPE_CHECKING:
@@ -17,14 +17,33 @@ class CallbackInstance:
     """A run of a callback that is going on; what it publishes is caused by it.
 
     Without `callback_instance_id`, what is done with a message that was taken without a callback.
+
+    Attributes:
+        origins: where the flows that lead to it began, or begin with it.
+        start: time of callback_start, or of the take.
+        causes: what else its next publication is made of.
     """
 
     callback_instance_id: int | None
     start_ns: int | None
-    root: Root | None
-    path: tuple[str, ...]
+    origins: tuple[Origin, ...]
     take_id: int | None
     take_rmw_ns: int | None
+    tid: int
+    start: int = 0
+    causes: tuple[Cause, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """A run of the callback of an input that an indirect link leads from.
+
+    `is_reuse`: an earlier publication by the same link has used its message already.
+    """
+
+    kind: str
+    instance: CallbackInstance
+    is_reuse: bool
 
 
 def publish(
@@ -93,5 +112,12 @@ def write_publication(
         instance.callback_instance_id, message.publication_id, hostname, pid, tid,
         "take_adjacent" if instance.callback_instance_id is None else "direct",
         instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
-        message.rcl_ns, message.rmw_ns, is_internal,
+        message.rcl_ns, message.rmw_ns, is_internal, False,
     )  # fmt: skip
+    for cause in instance.causes:
+        used = cause.instance
+        truth.causal.add(
+            used.callback_instance_id, message.publication_id, hostname, pid, used.tid,
+            cause.kind, used.start_ns, used.take_id, used.take_rmw_ns, topic,
+            message.rcl_ns, message.rmw_ns, is_internal, cause.is_reuse,
+        )  # fmt: skip

@@ -183,6 +183,9 @@ class Startup:
         for timer in description.timers:
             creator.timer(node, timer)
             yield True
+        if description.links:
+            creator.links(node)
+            yield True
 
     def _publish(self, publisher: PublisherObject) -> None:
         self._creator.work(8 * MICROSECOND)

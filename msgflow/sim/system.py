@@ -12,6 +12,7 @@ from msgflow.sim.entity import (
     SECOND,
     Call,
     Client,
+    MessageLink,
     Publisher,
     Service,
     Subscription,
@@ -61,6 +62,7 @@ class Node:
         name: name without namespace.
         namespace: its namespace.
         publishers: its publishers; likewise subscriptions, timers, services, clients.
+        links: what its messages have to do with each other beyond single callbacks.
         groups: its callback groups besides the default one.
         executor: number of the executor that spins it.
         has_parameters: parameter services and events, which helper nodes do without.
@@ -74,6 +76,7 @@ class Node:
     timers: tuple[Timer, ...] = ()
     services: tuple[Service, ...] = ()
     clients: tuple[Client, ...] = ()
+    links: tuple[MessageLink, ...] = ()
     groups: tuple[Group, ...] = ()
     executor: int = 0
     has_parameters: bool = True
@@ -181,6 +184,7 @@ class Scenario:
                 raise UsageError(f"unknown host {process.hostname} — process {process.name}")
             for node in process.nodes:
                 _check_topics(node)
+                _check_links(node)
             _check_executors(process)
         _check_ids(self)
 
@@ -209,6 +213,30 @@ def _check_executors(process: Process) -> None:
     threads = sum(each.thread_count for each in process.executors if each.kind != "nested")
     if not 1 <= threads < _THREADS_PER_PROCESS:
         raise UsageError(f"a process has 1 to 8 threads of executors — process {process.name}")
+
+
+def _check_links(node: Node) -> None:
+    subscriptions = {subscription.topic: subscription for subscription in node.subscriptions}
+    publishers = {publisher.topic for publisher in node.publishers}
+    for link in node.links:
+        if missing := sorted({*link.inputs} - {*subscriptions}):
+            raise UsageError(f"no subscription of {missing[0]} — node {node.full_name}")
+        if missing := sorted({*link.outputs} - publishers):
+            raise UsageError(f"no publisher of {missing[0]} — node {node.full_name}")
+        if link.kind == "periodic_async":
+            continue
+        inputs = [subscriptions[topic] for topic in link.inputs]
+        if any({*link.outputs} - {*each.publishes} for each in inputs):
+            raise UsageError(
+                f"whatever input comes last has to publish — partial_sync of {node.full_name}"
+            )
+        # What the callbacks do with the caches is in a certain order only if one runs at a time.
+        groups = {each.group for each in inputs}
+        reentrant = {group.name for group in node.groups if group.is_reentrant}
+        if len(groups) > 1 or groups & reentrant:
+            raise UsageError(
+                f"inputs have to exclude each other — partial_sync of {node.full_name}"
+            )
 
 
 def _check_topics(node: Node) -> None:

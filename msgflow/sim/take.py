@@ -63,16 +63,17 @@ class Taken:
         )  # fmt: skip
 
     def reach_sink(self, thread: Thread, subscription: SubscriptionObject, end: int | None) -> None:
-        """Write down the flow that ends here, if it began in a timer and is no self loop."""
-        root, machine = self.message.root, thread.machine
-        if root is None or end is None or self.message.is_self_loop(subscription):
+        """Write down the flows that end here, if they began in timers and are no self loops."""
+        machine = thread.machine
+        if end is None or self.message.is_self_loop(subscription):
             return
-        thread.world.truth.end_to_end.add(
-            root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns,
-            self.message.path, machine.hostname, thread.process.pid, thread.tid,
-            subscription.node, self.take_id, self.time + machine.epoch, end + machine.epoch,
-            end - root.start,
-        )  # fmt: skip
+        for root, path in self.message.origins:
+            thread.world.truth.end_to_end.add(
+                root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns,
+                path, machine.hostname, thread.process.pid, thread.tid,
+                subscription.node, self.take_id, self.time + machine.epoch, end + machine.epoch,
+                end - root.start,
+            )  # fmt: skip
 
 
 def take(

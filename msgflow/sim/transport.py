@@ -32,17 +32,21 @@ class Root:
     start_ns: int
 
 
+# Where a flow began, and the topics since then.
+Origin = tuple[Root, tuple[str, ...]]
+
+
 class Message:
     """One publication, on its way. Names in `_ns` are stamps of the publisher's host.
 
     Attributes:
-        root: where its flow began, if in a timer; `path` are the topics since then.
+        origins: the flows that lead to it, as far as they began in timers.
         rmw: time of rmw_publish; `intra` that of rclcpp_intra_publish.
     """
 
     __slots__ = (
-        "intra", "intra_ns", "path", "publication_id", "publisher", "rcl_ns", "rclcpp_ns", "rmw",
-        "rmw_ns", "root", "stamp_ns", "tid",
+        "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns", "rclcpp_ns", "rmw",
+        "rmw_ns", "stamp_ns", "tid",
     )  # fmt: skip
 
     def __init__(
@@ -58,10 +62,9 @@ class Message:
         self.publication_id = publication_id
         self.publisher = publisher
         self.tid = tid
-        self.root: Root | None = None
-        self.path: tuple[str, ...] = ()
+        self.origins: tuple[Origin, ...] = ()
         if instance is not None:
-            self.root, self.path = instance.root, (*instance.path, publisher.topic)
+            self.origins = _origins(instance, publisher.topic)
         self.intra = intra
         self.intra_ns = intra_ns
         self.rclcpp_ns: int | None = None
@@ -93,6 +96,21 @@ class Message:
             and subscription.intra is not None
             and subscription.process is self.publisher.process
         )
+
+
+def _origins(instance: CallbackInstance, topic: str) -> tuple[Origin, ...]:
+    """The flows that a message is part of; a timer is no begin where it uses messages."""
+    if not instance.causes:
+        return tuple((root, (*path, topic)) for root, path in instance.origins)
+    inputs = [cause.instance for cause in instance.causes]
+    if instance.take_id is not None:
+        inputs.insert(0, instance)
+    origins = {
+        (root.callback_instance_id, path): (root, (*path, topic))
+        for each in inputs
+        for root, path in each.origins
+    }
+    return tuple(origins.values())
 
 
 @dataclass(slots=True)

@@ -68,7 +68,7 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "causal": _schema(
         callback_instance_id=_ID, publication_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER,
         kind=_TEXT, callback_start_ns=_TIME, take_id=_ID, take_rmw_ns=_TIME, topic_name=_TEXT,
-        publication_rcl_ns=_TIME, publication_rmw_ns=_TIME, is_internal=_FLAG,
+        publication_rcl_ns=_TIME, publication_rmw_ns=_TIME, is_internal=_FLAG, is_reuse=_FLAG,
     ),
     "end_to_end": _schema(
         root_callback_instance_id=_ID, root_host=_TEXT, root_pid=_NUMBER, root_tid=_NUMBER,

@@ -127,6 +127,8 @@ def _plain(value: Any) -> Any:
     if "String" in type(value).__name__:
         # bt2 2.0.4 shows the text of an earlier field instead of an empty one.
         return str(value) if len(value) else ""
+    if "DynamicArray" in type(value).__name__:
+        return tuple(int(element) for element in value)
     if "Array" in type(value).__name__:
         return bytes(int(element) for element in value)
     return int(value)

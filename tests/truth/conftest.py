@@ -21,6 +21,8 @@ _LENGTHS = {
     "container_restarts": 0.9,
     "services": 0.4,
     "mixed_intra_process": 0.5,
+    "autoware": 0.2,
+    "autoware_two_threads": 0.2,
 }
 _SHORT = 0.15
 # Flows in them pass ring buffers, messages taken without a callback, or calls of services.

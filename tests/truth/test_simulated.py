@@ -79,7 +79,7 @@ CASES = {
         SELECT host, pid, tid, kind, callback_start_ns, take_rmw_ns, topic_name,
             publication_rcl_ns, publication_rmw_ns
         FROM truth_causal
-        WHERE kind = 'direct'
+        WHERE kind <> 'take_adjacent'
         """,
         """
         SELECT p.hostname, p.pid, p.tid, l.kind, i.start_ns, t.taken_ns, u.topic_name, b.rcl_ns,
@@ -90,7 +90,7 @@ CASES = {
         JOIN publication AS b USING (publication_id)
         JOIN publisher AS u USING (publisher_id)
         LEFT JOIN take AS t ON i.take_id = t.take_id AND t.method = 'rmw'
-        WHERE l.kind = 'direct'
+        WHERE l.kind <> 'take_adjacent'
         """,
     ),
     "executor_state": (

@@ -1,0 +1,241 @@
+"""Compares two runs, and tells whether one is worse than it may be."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.errors import QueryError, UsageError
+from msgflow.query.clocks import clock_notes
+from msgflow.query.header import Header, read
+from msgflow.query.result import QueryResult
+from msgflow.query.run import first_line, read_runs
+from msgflow.query.topics import require_topic
+from msgflow.query.window import MAXIMUM_NS, Run, choose_runs
+from msgflow.resources import resource_directory
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+THINGS = ("paths", "callbacks", "topics")
+CASES = ("first", "last", "newest", "every_pair")
+STATISTICS = ("median", "mean", "p95", "p99", "max")
+_CONDITION = re.compile(
+    rf"\s*(?P<statistic>{'|'.join(STATISTICS)})\s*>\s*(?P<limit>\d+(?:\.\d+)?)"
+    r"\s*(?P<unit>%|ns|us|µs|ms|s)\s*"
+)
+_UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
+_SQL = """
+FROM main.comparison(
+    $what, $run_a, $run_b, from_topic := $from_topic, to_topic := $to_topic,
+    wanted_case := $wanted_case, skip_ns := $skip_ns, confidence := $confidence,
+    resamples := $resamples, seed := $seed, internal := $internal
+)
+"""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """By how much a statistic of run B may exceed that of run A.
+
+    Attributes:
+        text: as it was given, such as 'p95>5%'.
+        statistic: one of STATISTICS.
+        limit: in percent of run A, or in nanoseconds.
+        is_relative: the limit is in percent.
+    """
+
+    text: str
+    statistic: str
+    limit: float
+    is_relative: bool
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What does not meet a condition.
+
+    Attributes:
+        condition: as it was given.
+        subject: path, callback or topic.
+        reason: what was measured instead.
+    """
+
+    condition: str
+    subject: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Run B compared with run A.
+
+    Attributes:
+        result: one row per path (callback, topic) and statistic, see `main.comparison`.
+        run_a: what run B is compared with.
+        run_b: the other run.
+    """
+
+    result: QueryResult
+    run_a: Run
+    run_b: Run
+
+    def failures(self, conditions: Iterable[str]) -> list[Failure]:
+        """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
+
+        What has values in run A and none in run B fails, too. The limits are compared with what was
+        measured, whether or not it may be chance.
+
+        Raises:
+            UsageError: a condition that cannot be read.
+        """
+        wanted = parse_conditions(conditions)
+        rows = self.result.to_arrow().to_pylist()
+        return [
+            Failure(condition.text, row["subject"], reason)
+            for condition in wanted
+            for row in rows
+            if row["statistic"] == condition.statistic
+            and (reason := _excess(condition, row)) is not None
+        ]
+
+
+def parse_conditions(texts: Iterable[str]) -> list[Condition]:
+    """Read conditions; several may stand in one text, separated by commas.
+
+    Raises:
+        UsageError: one that cannot be read.
+    """
+    parts = [part for text in texts for part in text.split(",")]
+    return [_parse(part) for part in parts]
+
+
+def _parse(text: str) -> Condition:
+    found = _CONDITION.fullmatch(text)
+    if found is None:
+        raise UsageError(
+            f"cannot read the condition — {text.strip() or 'an empty one'}",
+            "such as 'p95>5%' or 'median>2ms', of " + ", ".join(STATISTICS),
+        )
+    unit = found["unit"]
+    return Condition(
+        text.strip(), found["statistic"], float(found["limit"]) * _UNIT_NS.get(unit, 1), unit == "%"
+    )
+
+
+def _excess(condition: Condition, row: dict[str, int | float | None]) -> str | None:
+    a_ns, b_ns = row["a_ns"], row["b_ns"]
+    if a_ns is None:
+        return None
+    if b_ns is None:
+        return "has no value in run B"
+    difference = b_ns - a_ns
+    if not condition.is_relative:
+        return f"{_ms(difference)} more" if difference > condition.limit else None
+    if a_ns <= 0:
+        return f"{_ms(a_ns)} in run A, so that no share of it can be told" if difference else None
+    if difference * 100 > condition.limit * a_ns:
+        return f"{100 * difference / a_ns:.4g} % more ({_ms(a_ns)} to {_ms(b_ns)})"
+    return None
+
+
+def _ms(nanoseconds: float) -> str:
+    return f"{nanoseconds / 1e6:.6g} ms"
+
+
+def compare(
+    connection: duckdb.DuckDBPyConnection,
+    run_a: str | int,
+    run_b: str | int,
+    *,
+    what: str = "paths",
+    from_topic: str | None = None,
+    to_topic: str | None = None,
+    case: str = "first",
+    skip_first: float = 0.0,
+    confidence: float = 0.95,
+    resamples: int = 1_000,
+    seed: int = 0,
+    internal: bool = False,
+) -> Comparison:
+    """Compare two runs of a database; see `Database.compare`."""
+    _choose("what can be compared", what, THINGS)
+    _choose("which arrivals count", case, CASES)
+    if not 0 < confidence < 1:
+        raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")
+    if resamples < 1:
+        raise UsageError(f"there is at least one resample — {resamples}", "1000 is usual")
+    if not 0 <= skip_first <= MAXIMUM_NS / 1_000_000_000:
+        raise UsageError(f"seconds to leave out are not negative — {skip_first}")
+    if what != "paths" and (from_topic is not None or to_topic is not None):
+        raise UsageError(f"only paths start and end at topics, not {what}", "leave out the topics")
+    runs = read_runs(connection)
+    first, second = _one(runs, run_a), _one(runs, run_b)
+    for run in (first, second):
+        for topic in (from_topic, to_topic):
+            if topic is not None:
+                require_topic(connection, [run], topic)
+    parameters = {
+        "what": what,
+        "run_a": first.run_id,
+        "run_b": second.run_id,
+        "from_topic": from_topic,
+        "to_topic": to_topic,
+        "wanted_case": case,
+        "skip_ns": round(skip_first * 1_000_000_000),
+        "confidence": confidence,
+        "resamples": resamples,
+        "seed": seed,
+        "internal": internal,
+    }
+    try:
+        table = connection.sql(_SQL, params=parameters).to_arrow_table()
+    except duckdb.Error as error:
+        raise QueryError(f"the comparison failed: {first_line(error)}") from error
+    result = QueryResult(table, _header(), (first, second))
+    result.notes.extend(_one_sided(result, what, first, second))
+    if len(result):
+        result.notes.extend(clock_notes(connection, list(dict.fromkeys((first, second)))))
+    return Comparison(result, first, second)
+
+
+@cache
+def _header() -> Header:
+    return read(resource_directory("schema") / "public" / "comparison.sql")
+
+
+def _choose(what: str, value: str, known: Sequence[str]) -> None:
+    if value not in known:
+        raise UsageError(f"{what}: no such choice — {value}", f"choose {' or '.join(known)}")
+
+
+def _one(runs: Sequence[Run], wanted: str | int) -> Run:
+    chosen = choose_runs(runs, wanted)
+    if not chosen:
+        raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+    if len(chosen) > 1:
+        raise UsageError(f"one run is compared with another — {wanted}", "give a name or an id")
+    return chosen[0]
+
+
+def _one_sided(result: QueryResult, what: str, first: Run, second: Run) -> Iterable[str]:
+    """Say what only one run has; nothing in common is an error."""
+    rows = [row for row in result.to_arrow().to_pylist() if row["statistic"] == STATISTICS[0]]
+    if not any(row["a_count"] and row["b_count"] for row in rows):
+        only = {row["subject"] for row in rows}
+        example = f"; one of them has {min(only)}" if only else ""
+        raise UsageError(
+            f"the runs have no {what} with values in common — {first.name} ({first.run_id}) and"
+            f" {second.name} ({second.run_id}){example}",
+            f"msgflow query e2e-latency --run {first.run_id}, and likewise"
+            f" --run {second.run_id}, tell what each has",
+        )
+    for side, run in (("A", first), ("B", second)):
+        number = sum(row["verdict"] == f"only in {side}" for row in rows)
+        if number:
+            thing = what[:-1] if number == 1 else what
+            yield f"{number} {thing} with values only in run {side}, {run.name} ({run.run_id})"

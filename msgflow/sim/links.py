@@ -1,0 +1,124 @@
+"""Annotated links of a node: what its caches hold, and what a publication is made of."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from msgflow.sim.publish import CallbackInstance, Cause
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from msgflow.sim.entity import MessageLink
+
+# More callbacks than this cannot end while another one is being run.
+_KEPT = 64
+
+
+@dataclass(slots=True, eq=False)
+class LinkObject:
+    """A link of a node that runs.
+
+    Attributes:
+        description: what the scenario says about it.
+        ended: for each input the runs of its callback that have ended, each with its end.
+        waiting: for each input the run whose message is there to be used (partial_sync).
+        used: runs whose messages have been used.
+    """
+
+    description: MessageLink
+    ended: dict[str, deque[tuple[int, CallbackInstance]]] = field(default_factory=dict)
+    waiting: dict[str, CallbackInstance] = field(default_factory=dict)
+    used: set[int | None] = field(default_factory=set)
+
+    def keep(self, topic: str, end: int, instance: CallbackInstance) -> None:
+        """The callback of an input has ended: its message is in the cache."""
+        self.ended.setdefault(topic, deque(maxlen=_KEPT)).append((end, instance))
+
+    def fire(self, topic: str, instance: CallbackInstance) -> tuple[CallbackInstance, ...] | None:
+        """A message of this input is there: the others that are used with it, None if any lacks."""
+        others = [other for other in self.description.inputs if other != topic]
+        if not all(other in self.waiting for other in others):
+            self.waiting[topic] = instance
+            return None
+        completed = tuple(self.waiting[other] for other in others)
+        self.waiting.clear()
+        return completed
+
+    def latest(self, own: str | None, cut: int) -> Iterable[CallbackInstance]:
+        """For each input but `own` the run that was the last to end up to the cut."""
+        for topic in self.description.inputs:
+            if topic == own:
+                continue
+            before = [entry for entry in self.ended.get(topic, ()) if entry[0] <= cut]
+            if before:
+                yield max(before, key=lambda entry: entry[0])[1]
+
+
+@dataclass(slots=True, eq=False)
+class CallbackLinks:
+    """What the links of its node mean for one callback.
+
+    Attributes:
+        topic: of its subscription, None for a timer or service.
+        inputs: links that its messages are inputs of.
+        outputs: links that have outputs which it publishes on.
+    """
+
+    topic: str | None
+    inputs: tuple[LinkObject, ...]
+    outputs: tuple[LinkObject, ...]
+
+    def begin(self, instance: CallbackInstance) -> dict[LinkObject, tuple[CallbackInstance, ...]]:
+        """Put the message into the caches; returns the links that fire, with what they use."""
+        fired = {}
+        for link in self.inputs:
+            assert self.topic is not None
+            if link.description.kind == "partial_sync":
+                completed = link.fire(self.topic, instance)
+                if completed is not None:
+                    fired[link] = completed
+        return fired
+
+    def may_publish(self, topic: str, fired: Iterable[LinkObject]) -> bool:
+        """Whether it publishes on a topic, when these links have fired."""
+        gates = [
+            link
+            for link in self.inputs
+            if link.description.kind == "partial_sync" and topic in link.description.outputs
+        ]
+        return not gates or any(link in fired for link in gates)
+
+    def is_gated(self, topics: Sequence[str]) -> bool:
+        """Whether everything that it publishes waits for other inputs."""
+        return bool(topics) and not any(self.may_publish(topic, ()) for topic in topics)
+
+    def cause(
+        self,
+        topic: str,
+        instance: CallbackInstance,
+        fired: dict[LinkObject, tuple[CallbackInstance, ...]],
+    ) -> CallbackInstance:
+        """The run of the callback, with all that its publication on a topic is made of."""
+        causes = []
+        for link in self.outputs:
+            description = link.description
+            if topic not in description.outputs:
+                continue
+            if description.kind == "partial_sync":
+                used: Iterable[CallbackInstance] = fired.get(link, ())
+            else:
+                used = link.latest(self.topic, instance.start)
+            for each in used:
+                number = each.callback_instance_id
+                causes.append(Cause(description.kind, each, number in link.used))
+                link.used.add(number)
+        return replace(instance, causes=tuple(causes))
+
+    def end(self, end: int, instance: CallbackInstance) -> None:
+        """It has ended."""
+        for link in self.inputs:
+            assert self.topic is not None
+            link.keep(self.topic, end, instance)

@@ -1,0 +1,297 @@
+-- name: main.comparison
+-- kind: macro
+-- description: How a run differs from another one, by path, callback or topic: what was measured in
+--     each, the difference with a bootstrap confidence interval, and how large the effect is.
+--     Blocks of neighbouring values are resampled (circular block bootstrap, blocks as long as the
+--     cube root of their number), because values that follow each other are alike. A quantile has
+--     an interval where five values at least lie beyond it in either run, a mean where there are
+--     ten values, the maximum never. The same seed gives the same interval.
+-- grain: one row per thing compared and statistic; things that only one run has, too
+-- param: what VARCHAR  'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (transport
+--     latency)
+-- param: run_a BIGINT  Run that the other one is compared with
+-- param: run_b BIGINT  The other one
+-- param: from_topic VARCHAR = NULL  Topic where paths start; every source when NULL
+-- param: to_topic VARCHAR = NULL  Topic where paths end; wherever they end when NULL
+-- param: wanted_case VARCHAR = 'first'  Arrivals of paths: 'first' or 'last' of each root, 'newest'
+--     root of each arrival, or 'every_pair'
+-- param: skip_ns BIGINT = 0  Time left out at the begin of each run
+-- param: confidence DOUBLE = 0.95  Share of intervals that would contain the true difference
+-- param: resamples BIGINT = 1000  Resamples that the interval is from
+-- param: seed BIGINT = 0  Of the random numbers
+-- param: internal BOOLEAN = false  Also what ROS does for itself
+-- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
+-- column: a_ns BIGINT [ns]  Its value in run A
+-- column: b_ns BIGINT [ns]  Its value in run B
+-- column: difference_ns BIGINT [ns]  B less A
+-- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
+-- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
+-- column: high_ns BIGINT [ns]  Its upper end
+-- column: verdict VARCHAR  'B is longer', 'B is shorter', 'no difference shown', 'too few values'
+--     for an interval, 'not estimated' (maximum), 'only in A' or 'only in B'
+-- column: cliffs_delta DOUBLE  How often a value of B exceeds one of A, less how often it is the
+--     other way round: -1 to 1, of all values
+-- column: effect VARCHAR  'negligible', 'small', 'medium' or 'large'
+-- column: a_count BIGINT  Values of run A
+-- column: b_count BIGINT  Values of run B
+-- column: a_share DOUBLE  Share of the roots that reached the end, of the runs of a callback that
+--     were seen to end, of the takes whose publication is known; in run A
+-- column: b_share DOUBLE  Likewise in run B
+-- column: subject VARCHAR  Path, callback, or topic and receiving node
+-- needs: main.run, main.flow_path, main.end_to_end, main.callback_instance, main.callback_label,
+--     main.take, main.link_transport, main.subscription, main.process, main.node,
+--     derive.node_label
+CREATE OR REPLACE MACRO main.comparison(
+    what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
+    skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false
+) AS TABLE
+WITH thing AS (
+    -- A root counts once, however often it arrived; of those at the edge it is not known.
+    SELECT
+        e.run_id,
+        p.path AS subject,
+        false AS is_internal,
+        e.root_ns AS at_ns,
+        e.root_id AS id,
+        CASE
+            WHEN e.status <> 'reached' THEN NULL
+            WHEN wanted_case = 'first' AND NOT e.is_first THEN NULL
+            WHEN wanted_case = 'last' AND NOT e.is_last THEN NULL
+            WHEN wanted_case = 'newest' AND NOT e.is_newest THEN NULL
+            ELSE e.latency_ns
+        END AS value_ns,
+        e.is_first AND e.status <> 'edge' AS is_unit,
+        e.status = 'reached' AS is_complete
+    FROM main.end_to_end(
+        [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
+        (-9223372036854775808)::BIGINT, 9223372036854775807
+    ) AS e
+    JOIN main.flow_path([run_a, run_b], from_topic, to_topic) AS p ON e.path_id = p.path_id
+    WHERE what = 'paths'
+    UNION ALL
+    SELECT
+        i.run_id,
+        l.node || ' · ' || l.label AS subject,
+        l.is_internal,
+        i.start_ns AS at_ns,
+        i.callback_instance_id AS id,
+        i.end_ns - i.start_ns AS value_ns,
+        true AS is_unit,
+        i.end_ns IS NOT NULL AS is_complete
+    FROM main.callback_instance AS i
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    WHERE what = 'callbacks' AND list_contains([run_a, run_b], i.run_id)
+    UNION ALL
+    SELECT
+        t.run_id,
+        coalesce(s.topic_name, '?') || ' → ' || derive.node_label(n.full_name, p.name, p.pid)
+            AS subject,
+        coalesce(s.is_internal, false) AS is_internal,
+        t.taken_ns AS at_ns,
+        t.take_id AS id,
+        l.latency_ns AS value_ns,
+        true AS is_unit,
+        l.take_id IS NOT NULL AS is_complete
+    FROM main.take AS t
+    LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
+    LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
+    LEFT JOIN main.process AS p ON s.process_id = p.process_id
+    LEFT JOIN main.node AS n ON s.node_id = n.node_id
+    WHERE what = 'topics'
+        AND list_contains([run_a, run_b], t.run_id)
+        AND t.method <> 'callback_only'
+),
+side (side, run_id) AS (
+    VALUES ('a', run_a), ('b', run_b)
+),
+sided AS MATERIALIZED (
+    SELECT s.side, t.subject, t.at_ns, t.id, t.value_ns, t.is_unit, t.is_complete
+    FROM thing AS t
+    JOIN side AS s ON t.run_id = s.run_id
+    JOIN main.run AS r ON t.run_id = r.run_id
+    WHERE t.at_ns >= r.start_ns + skip_ns AND (internal OR NOT t.is_internal)
+),
+measured AS MATERIALIZED (
+    SELECT
+        side,
+        subject,
+        count(value_ns) AS number,
+        quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        avg(value_ns) AS mean_ns,
+        max(value_ns) AS max_ns,
+        list(value_ns ORDER BY at_ns, id, value_ns) FILTER (WHERE value_ns IS NOT NULL)
+            AS series,
+        count(*) FILTER (WHERE is_unit AND is_complete) / nullif(count(*) FILTER (WHERE is_unit), 0)
+            AS share
+    FROM sided
+    GROUP BY side, subject
+),
+-- Rank sums, ties in the middle: how often values of B exceed values of A.
+ranked AS (
+    SELECT
+        subject,
+        side,
+        rank() OVER (PARTITION BY subject ORDER BY value_ns)
+        + (count(*) OVER (PARTITION BY subject, value_ns) - 1) / 2 AS value_rank
+    FROM sided
+    WHERE value_ns IS NOT NULL
+),
+effect AS (
+    SELECT
+        subject,
+        2 * (
+            sum(value_rank) FILTER (WHERE side = 'b')
+            - count(*) FILTER (WHERE side = 'b') * (count(*) FILTER (WHERE side = 'b') + 1) / 2
+        ) / (
+            count(*) FILTER (WHERE side = 'a') * count(*) FILTER (WHERE side = 'b')
+        ) - 1 AS cliffs_delta
+    FROM ranked
+    GROUP BY subject
+    HAVING count(DISTINCT side) = 2
+),
+-- Blocks wrap around the end. More than 1000 values are not drawn at once: the spread of fewer is
+-- wider by the root of how many times fewer they are, and is made narrower by that.
+ring AS (
+    SELECT
+        m.side,
+        m.subject,
+        m.number,
+        m.quantiles,
+        m.mean_ns,
+        ceil(cbrt(m.number))::BIGINT AS block_length,
+        ceil(least(m.number, 1000) / ceil(cbrt(m.number)))::BIGINT AS blocks,
+        list_concat(m.series, m.series[:ceil(cbrt(m.number))::BIGINT - 1]) AS series,
+        hash(m.side, m.subject, seed) AS salt
+    FROM measured AS m
+    JOIN effect AS e ON m.subject = e.subject
+    WHERE m.number >= 10
+),
+drawn AS (
+    SELECT
+        r.side,
+        r.subject,
+        r.number,
+        r.quantiles,
+        r.mean_ns,
+        n.resample,
+        list_sort(flatten(list_transform(
+            list_transform(
+                range(r.blocks),
+                lambda block: (hash(r.salt, n.resample, block) % r.number)::BIGINT
+            ),
+            lambda before: r.series[1 + before:r.block_length + before]
+        ))) AS sorted
+    FROM ring AS r
+    CROSS JOIN range(resamples) AS n (resample)
+),
+resampled AS (
+    SELECT
+        side,
+        subject,
+        resample,
+        sqrt(len(sorted) / number) AS narrowing,
+        [
+            sorted[ceil(0.5 * len(sorted))::BIGINT] - quantiles[1],
+            list_avg(sorted) - mean_ns,
+            sorted[ceil(0.95 * len(sorted))::BIGINT] - quantiles[2],
+            sorted[ceil(0.99 * len(sorted))::BIGINT] - quantiles[3]
+        ]::DOUBLE[] AS deviations
+    FROM drawn
+),
+deviation AS (
+    SELECT
+        side,
+        subject,
+        resample,
+        unnest(['median', 'mean', 'p95', 'p99']) AS statistic,
+        unnest(list_transform(deviations, lambda each: each * narrowing)) AS deviation_ns
+    FROM resampled
+),
+spread AS (
+    SELECT
+        a.subject,
+        a.statistic,
+        quantile_cont(
+            b.deviation_ns - a.deviation_ns, [(1 - confidence) / 2, (1 + confidence) / 2]
+        ) AS ends
+    FROM deviation AS a
+    JOIN deviation AS b
+        ON a.subject = b.subject AND a.statistic = b.statistic AND a.resample = b.resample
+    WHERE a.side = 'a' AND b.side = 'b'
+    GROUP BY a.subject, a.statistic
+),
+value AS (
+    SELECT
+        side,
+        subject,
+        number,
+        share,
+        unnest(['median', 'mean', 'p95', 'p99', 'max']) AS statistic,
+        unnest([0.5, NULL, 0.95, 0.99, 1.0]) AS quantile,
+        unnest([
+            quantiles[1], round(mean_ns)::BIGINT, quantiles[2], quantiles[3], max_ns
+        ]) AS value_ns
+    FROM measured
+),
+paired AS (
+    SELECT
+        coalesce(a.subject, b.subject) AS subject,
+        coalesce(a.statistic, b.statistic) AS statistic,
+        coalesce(a.quantile, b.quantile) AS quantile,
+        a.value_ns AS a_ns,
+        b.value_ns AS b_ns,
+        coalesce(a.number, 0) AS a_count,
+        coalesce(b.number, 0) AS b_count,
+        a.share AS a_share,
+        b.share AS b_share
+    FROM (SELECT * FROM value WHERE side = 'a') AS a
+    FULL JOIN (SELECT * FROM value WHERE side = 'b') AS b
+        ON a.subject = b.subject AND a.statistic = b.statistic
+),
+judged AS (
+    SELECT
+        p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_share, p.b_share,
+        e.cliffs_delta,
+        CASE
+            WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
+            WHEN p.b_count = 0 THEN 'only in A'
+            WHEN p.a_count = 0 THEN 'only in B'
+            WHEN p.quantile = 1 THEN 'not estimated'
+            WHEN least(p.a_count, p.b_count) * (1 - coalesce(p.quantile, 0.5)) < 5 - 1e-9
+                THEN 'too few values'
+        END AS reason,
+        p.b_ns - p.a_ns + round(s.ends[1])::BIGINT AS low_ns,
+        p.b_ns - p.a_ns + round(s.ends[2])::BIGINT AS high_ns
+    FROM paired AS p
+    LEFT JOIN effect AS e ON p.subject = e.subject
+    LEFT JOIN spread AS s ON p.subject = s.subject AND p.statistic = s.statistic
+)
+SELECT
+    statistic,
+    a_ns,
+    b_ns,
+    b_ns - a_ns AS difference_ns,
+    CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
+    CASE WHEN reason IS NULL THEN low_ns END AS low_ns,
+    CASE WHEN reason IS NULL THEN high_ns END AS high_ns,
+    CASE
+        WHEN reason IS NOT NULL THEN reason
+        WHEN low_ns > 0 THEN 'B is longer'
+        WHEN high_ns < 0 THEN 'B is shorter'
+        ELSE 'no difference shown'
+    END AS verdict,
+    round(cliffs_delta, 4) AS cliffs_delta,
+    CASE
+        WHEN abs(cliffs_delta) < 0.147 THEN 'negligible'
+        WHEN abs(cliffs_delta) < 0.33 THEN 'small'
+        WHEN abs(cliffs_delta) < 0.474 THEN 'medium'
+        WHEN cliffs_delta IS NOT NULL THEN 'large'
+    END AS effect,
+    a_count,
+    b_count,
+    round(a_share, 4) AS a_share,
+    round(b_share, 4) AS b_share,
+    subject
+FROM judged
+ORDER BY
+    subject, list_position(['median', 'mean', 'p95', 'p99', 'max'], statistic)

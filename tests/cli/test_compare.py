@@ -1,0 +1,79 @@
+"""msgflow compare: what is printed, and when the exit code is 1."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from golden import fill
+from typer.testing import Result
+
+Msgflow = Callable[..., Result]
+CASES = Path(__file__).parents[1] / "schema" / "cases" / "main.comparison"
+
+
+@pytest.fixture
+def database(fresh_database: Path) -> Path:
+    """Two runs: before (1) with latencies of 300 and 500 ns, after (2) with 300 and 400 ns."""
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill(connection, CASES / "paths" / "input")
+    return fresh_database
+
+
+def test_a_table_and_the_runs(msgflow: Msgflow, database: Path) -> None:
+    result = msgflow("compare", "before", "2", "--db", database)
+    assert result.exit_code == 0
+    assert "runs: before (1), after (2)" in result.stderr
+    header, _, *rows = result.stdout.splitlines()
+    assert header.split()[:4] == ["statistic", "a", "b", "difference"]
+    assert [row.split()[0] for row in rows] == ["median", "mean", "p95", "p99", "max"]
+    assert "-100 ns" in rows[-1]
+    assert "too few values" in rows[0]
+
+
+def test_json_is_exact(msgflow: Msgflow, database: Path) -> None:
+    result = msgflow("compare", 1, 2, "--format", "json", "--db", database)
+    rows = {row["statistic"]: row for row in json.loads(result.stdout)}
+    assert (rows["mean"]["a_ns"], rows["mean"]["b_ns"]) == (400, 350)
+    assert rows["mean"]["subject"] == "/camera → /image → /viewer"
+    assert rows["mean"]["b_share"] == 0.6667
+
+
+def test_the_exit_code_tells_whether_a_condition_holds(msgflow: Msgflow, database: Path) -> None:
+    assert msgflow("compare", 1, 2, "--fail-on", "p95>5%", "--db", database).exit_code == 0
+    worse = msgflow("compare", 2, 1, "--fail-on", "median>1%,p95>5%", "--db", database)
+    assert worse.exit_code == 1
+    assert worse.stdout
+    errors = [line for line in worse.stderr.splitlines() if line.startswith("error: ")]
+    assert errors == [
+        "error: p95>5%: 25 % more (0.0004 ms to 0.0005 ms) — /camera → /image → /viewer"
+    ]
+
+
+def test_every_kind_of_thing(msgflow: Msgflow, database: Path) -> None:
+    topics = msgflow("compare", 1, 2, "--what", "topics", "--format", "csv", "--db", database)
+    assert '"/image → /viewer"' in topics.stdout
+    case = msgflow("compare", 1, 2, "--case", "last", "--from", "/image", "--db", database)
+    assert case.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (("1", "2", "--fail-on", "p95"), "cannot read the condition — p95"),
+        (("1", "3"), "there is no such run — 3"),
+        (("1", "2", "--what", "callbacks"), "the runs have no callbacks with values in common"),
+        (("1", "2", "--skip-first", "100"), "the runs have no paths with values in common"),
+        (("1",), "missing argument 'RUN_B'"),
+    ],
+)
+def test_what_makes_no_sense_is_a_usage_error(
+    msgflow: Msgflow, database: Path, arguments: tuple[str, ...], error: str
+) -> None:
+    result = msgflow("compare", *arguments, "--db", database)
+    assert result.exit_code == 2
+    assert f"error: {error}" in result.stderr
+    assert not result.stdout
