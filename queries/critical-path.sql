@@ -1,7 +1,7 @@
 -- name: critical-path
 -- title: What one flow waited for
--- description: The flow that took longest, or the longest that ends with a given take (see the query
---     flows), piece by piece. Waits are replaced by what they waited for, as far as the trace
+-- description: The flow that took longest, or the longest that ends with a given take (see the
+--     query flows), piece by piece. Waits are replaced by what they waited for, as far as the trace
 --     shows: what the executor ran meanwhile, the timer that was not due yet, or the message that
 --     was still missing and how that came about. The pieces add up to the latency exactly.
 -- grain: one row per piece of the flow
@@ -47,9 +47,9 @@ SELECT
         l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
     ) AS node,
     CASE
-        WHEN c.activity IN ('callback', 'service', 'executor', 'busy', 'blocked', 'timer', 'request')
-            THEN coalesce(l.label, p.topic_name)
-        WHEN c.activity = 'cache' THEN l.label
+        WHEN c.activity IN (
+            'callback', 'cache', 'executor', 'request', 'service', 'busy', 'blocked', 'timer'
+        ) THEN l.label
         ELSE coalesce(p.topic_name, '?')
     END AS what,
     round(c.duration_ns / nullif(c.latency_ns, 0), 4) AS share,

@@ -1,10 +1,11 @@
 -- name: path-breakdown
 -- title: What the latency of each path consists of
 -- description: End-to-end latency of every path hop by hop. The parts of a flow follow each other
---     from its start to its end and add up to its latency exactly. A part is negative where the next began before it ended (overlaps), as between hosts
---     whose clocks are apart. Parts of a hop are the callback up to its publication; the wait in
---     a cache for other messages or a timer; calls of services; publishing by layer; transport up
---     to the take, with any wait for a busy executor; and from the take to the callback.
+--     from its start to its end and add up to its latency exactly. A part is negative where the
+--     next began before it ended (overlaps), as between hosts whose clocks are apart. Parts of a
+--     hop are the callback up to its publication; the wait in a cache for other messages or a
+--     timer; calls of services; publishing by layer; transport up to the take, with any wait for
+--     a busy executor; and from the take to the callback.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
 -- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
