@@ -1,7 +1,7 @@
 -- name: critical-path
 -- title: What one flow waited for
--- description: The flow that took longest, or the longest that ends with a given take (see the query
---     flows), piece by piece. Waits are replaced by what they waited for, as far as the trace
+-- description: The flow that took longest, or the longest that ends with a given take (see the
+--     query flows), piece by piece. Waits are replaced by what they waited for, as far as the trace
 --     shows: what the executor ran meanwhile, the timer that was not due yet, or the message that
 --     was still missing and how that came about. The pieces add up to the latency exactly.
 -- grain: one row per piece of the flow
@@ -15,7 +15,6 @@
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
 -- column: run_id BIGINT            Run
--- column: from_ns BIGINT [epoch ns]  Begin
 -- column: at_ns BIGINT [ns]        Begin, since the start of the flow
 -- column: duration_ns BIGINT [ns]  Duration; negative where parts of the flow overlap
 -- column: hop BIGINT               Which message of the path it is, or leads to
@@ -26,9 +25,10 @@
 --     of the way of that message
 -- column: node VARCHAR             Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
--- column: share DOUBLE             Part of the latency
+-- column: share DOUBLE             Part of the latency, rounded to 4 places
 -- column: is_certain BOOLEAN       Of 'busy' and 'blocked': what waited was ready by then; no: it
 --     may have arrived during this piece
+-- column: from_ns BIGINT [epoch ns]  Begin
 -- column: callback_instance_id BIGINT  Run of the callback
 -- column: publication_id BIGINT    Message
 -- column: take_id BIGINT           Take at the end of the flow
@@ -38,7 +38,6 @@
 --     main.publisher, main.node, main.process
 SELECT
     c.run_id,
-    c.from_ns,
     c.from_ns - min(CASE WHEN c.position = 1 THEN c.from_ns END) OVER () AS at_ns,
     c.duration_ns,
     c.hop,
@@ -48,13 +47,14 @@ SELECT
         l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
     ) AS node,
     CASE
-        WHEN c.activity IN ('callback', 'service', 'executor', 'busy', 'blocked', 'timer', 'request')
-            THEN coalesce(l.label, p.topic_name)
-        WHEN c.activity = 'cache' THEN l.label
+        WHEN c.activity IN (
+            'callback', 'cache', 'executor', 'request', 'service', 'busy', 'blocked', 'timer'
+        ) THEN l.label
         ELSE coalesce(p.topic_name, '?')
     END AS what,
-    c.duration_ns / nullif(c.latency_ns, 0) AS share,
+    round(c.duration_ns / nullif(c.latency_ns, 0), 4) AS share,
     c.is_certain,
+    c.from_ns,
     c.callback_instance_id,
     c.publication_id,
     c.take_id,

@@ -1,11 +1,11 @@
 -- name: path-breakdown
 -- title: What the latency of each path consists of
 -- description: End-to-end latency of every path hop by hop. The parts of a flow follow each other
---     from its start to its end and add up to its latency exactly; so the shares of a path add up
---     to 1. A part is negative where the next began before it ended (overlaps), as between hosts
---     whose clocks are apart. Parts of a hop are the callback up to its publication; the wait in
---     a cache for other messages or a timer; calls of services; publishing by layer; transport up
---     to the take, with any wait for a busy executor; and from the take to the callback.
+--     from its start to its end and add up to its latency exactly. A part is negative where the
+--     next began before it ended (overlaps), as between hosts whose clocks are apart. Parts of a
+--     hop are the callback up to its publication; the wait in a cache for other messages or a
+--     timer; calls of services; publishing by layer; transport up to the take, with any wait for
+--     a busy executor; and from the take to the callback.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
 -- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
@@ -31,7 +31,8 @@
 -- column: mean_ns BIGINT [ns]      Mean duration
 -- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
 -- column: max_ns BIGINT [ns]       Longest duration
--- column: share DOUBLE             Part of the latency of all flows of the path
+-- column: share DOUBLE             Part of the latency of all flows of the path, rounded to 4
+--     places
 -- column: total_ns BIGINT [ns]     Sum over all flows; adds up to that of their latencies
 -- column: path VARCHAR             Nodes and topics
 -- note: clocks
@@ -90,7 +91,7 @@ SELECT
     m.mean_ns,
     m.quantiles[2] AS p95_ns,
     m.max_ns,
-    m.total_ns / nullif(sum(m.total_ns) OVER (PARTITION BY m.path_id), 0) AS share,
+    round(m.total_ns / nullif(sum(m.total_ns) OVER (PARTITION BY m.path_id), 0), 4) AS share,
     m.total_ns,
     p.path
 FROM measured AS m

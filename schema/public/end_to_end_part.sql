@@ -25,8 +25,8 @@
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end of the path
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: hop BIGINT  Which message of the path it is, or leads to; behind the last for the callback
---     at the end
+-- column: hop BIGINT  Which message of the path it is, or leads to; behind the last for the
+--     callback at the end
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
 --     publishes or calls), 'cache' (from the end of the callback to the run that publishes for it),
@@ -41,7 +41,7 @@
 -- column: publication_id BIGINT  Message that is published or under way
 -- needs: main.end_to_end, main.flow_path, main.publication, main.take, main.callback_instance,
 --     main.request, derive.flow_transport, derive.flow_caller, derive.flow_root,
---     store.link_causal, store.link_request, store.take, store.callback_instance
+--     store.callback_instance, store.take, store.link_causal, store.link_request
 CREATE OR REPLACE MACRO main.end_to_end_part(
     runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns, flow_case,
     sink_take_id := NULL, max_depth := 32, max_paths := 1000
