@@ -2,7 +2,8 @@
 
 `raw` is a temporary database file with one table per tracepoint, the packets, and the threads, all
 as read. `staging` is a database in memory, which spills to the temporary directory:
-`staging.source` (one row per trace), `staging.event_count`, `staging.event` (all events of known
+`staging.source` (one row per trace), `staging.event_count`, `staging.left_out` (events that
+another trace holds as well), `staging.event` (all events of known
 tracepoints, without payload), `staging.predecessor` (the pointers from event to event), and the
 objects of `schema/model`.
 """
@@ -50,6 +51,13 @@ CREATE TABLE staging.event_count (
 )
 """
 
+_LEFT_OUT_TABLE = """
+CREATE TABLE staging.left_out (
+    trace_index INTEGER, used_index INTEGER, event_count BIGINT, thread_count BIGINT,
+    length_ns BIGINT
+)
+"""
+
 _DAMAGE_TABLE = """
 CREATE TABLE staging.damage (
     trace_index INTEGER, file VARCHAR, position BIGINT, byte_offset BIGINT, message VARCHAR
@@ -71,11 +79,19 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         _THREAD_TABLES,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,
+        _LEFT_OUT_TABLE,
         _DAMAGE_TABLE,
     ):
         con.execute(statement)
     con.execute(_event_view(tracepoints))
     con.execute(_predecessor_view(tracepoints))
+
+
+def empty(con: duckdb.DuckDBPyConnection) -> None:
+    """Empty `raw`, to read everything again."""
+    tables = [tracepoint.table for tracepoint in load().tracepoints.values()]
+    for table in (*tables, "packet", "thread", "thread_name"):
+        con.execute(f"TRUNCATE raw.{table}")
 
 
 def _event_view(tracepoints: Sequence[Tracepoint]) -> str:

@@ -4,7 +4,7 @@
 -- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
 --     staging.callback_instance, staging.callback_left_over,
 --     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host,
---     staging.trace_overlap, staging.source, staging.publisher_known, staging.subscription_known,
+--     staging.left_out, staging.source, staging.publisher_known, staging.subscription_known,
 --     staging.client, staging.service, staging.client_event, staging.service_event,
 --     staging.client_gid, staging.request_pair
 WITH unmatched_end AS (
@@ -153,17 +153,16 @@ JOIN process_label AS l ON i.process_id = l.process_id
 GROUP BY i.kind
 UNION ALL
 SELECT
-    o.second_index + 1,
+    o.trace_index + 1,
     'overlapping_traces',
-    'error',
+    'warning',
     o.event_count,
     printf(
-        'events of %d threads, over %.3f s, that the trace %s holds as well: what they did is '
-        || 'counted twice',
+        'events of %d threads, over %.3f s, that the trace %s holds as well: left out',
         o.thread_count, o.length_ns / 1e9, s.path
     )
-FROM staging.trace_overlap AS o
-JOIN staging.source AS s ON o.first_index = s.trace_index
+FROM staging.left_out AS o
+JOIN staging.source AS s ON o.used_index = s.trace_index
 UNION ALL
 SELECT
     NULL,
