@@ -236,6 +236,7 @@ def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[
                 trace.clock_uuid or f"host {hostname}",
                 trace.begin_ns,
                 trace.end_ns,
+                trace.clock_correction_ns,
             ]
         )
     return rows

@@ -41,7 +41,8 @@ CREATE TABLE raw.thread_name (
 _SOURCE_TABLE = """
 CREATE TABLE staging.source (
     trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR, hostname VARCHAR,
-    tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT
+    tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT,
+    clock_correction_ns BIGINT
 )
 """
 

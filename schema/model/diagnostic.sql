@@ -166,6 +166,20 @@ JOIN staging.source AS s ON o.used_index = s.trace_index
 UNION ALL
 SELECT
     NULL,
+    'clock_offsets_differ',
+    'info',
+    count(*),
+    printf(
+        'traces of one boot that are off the first one of it by %+.3f ms to %+.3f ms, as their '
+        || 'tracer measured its clock: brought to one time base',
+        -max(clock_correction_ns) / 1e6, -min(clock_correction_ns) / 1e6
+    )
+FROM staging.source
+WHERE clock_correction_ns <> 0
+HAVING count(*) > 0
+UNION ALL
+SELECT
+    NULL,
     'repeated_initialisation',
     'info',
     count(*),

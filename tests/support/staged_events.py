@@ -152,7 +152,7 @@ class StagedEvents:
         for index, source in sorted(self.sources.items()):
             con.execute(
                 "INSERT INTO staging.source "
-                "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL)",
+                "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL, 0)",
                 [
                     index,
                     f"trace-{index}",
