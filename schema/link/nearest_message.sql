@@ -49,22 +49,24 @@ located AS (
     FROM derive.unstamped_publication(only_run) AS b
     ASOF JOIN course AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
 ),
--- Around a jump of the clock a publication may be on either side of it.
+-- Around a jump of the clock a publication may be on either side of it. A message that one of
+-- either side could be of is ambiguous.
 published AS MATERIALIZED (
     SELECT
-        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        0 AS side, run_id, topic_name, publisher_id, publication_id, written_ns,
+        tolerance_ns,
         written_ns + difference_ns - tolerance_ns AS origin_ns,
         next_event_ns + difference_ns AS until_ns
     FROM located
     UNION ALL
     SELECT
-        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        -1, run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
         written_ns + previous_ns - tolerance_ns, next_event_ns + previous_ns
     FROM located
     WHERE has_jumped_before
     UNION ALL
     SELECT
-        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        1, run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
         written_ns + next_ns - tolerance_ns, next_event_ns + next_ns
     FROM located
     WHERE has_jumped_after
@@ -91,17 +93,25 @@ message AS MATERIALIZED (
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id
 ),
+sided AS MATERIALIZED (
+    SELECT m.publisher_id, m.source_timestamp_ns, m.taken_ns, p.side
+    FROM message AS m
+    JOIN (SELECT DISTINCT publisher_id, side FROM published) AS p
+        ON m.publisher_id = p.publisher_id
+),
 after AS MATERIALIZED (
     SELECT
         m.publisher_id, m.source_timestamp_ns, p.publication_id, p.until_ns,
         m.source_timestamp_ns - p.origin_ns AS delay_ns,
         row_number() OVER (
-            PARTITION BY p.publication_id
+            PARTITION BY p.publication_id, p.side
             ORDER BY m.source_timestamp_ns - p.origin_ns, m.source_timestamp_ns
         ) AS place
-    FROM message AS m
+    FROM sided AS m
     ASOF JOIN published AS p
-        ON m.publisher_id = p.publisher_id AND m.source_timestamp_ns >= p.origin_ns
+        ON m.publisher_id = p.publisher_id
+        AND m.side = p.side
+        AND m.source_timestamp_ns >= p.origin_ns
     WHERE m.source_timestamp_ns < coalesce(
         p.until_ns + p.tolerance_ns // 4, p.origin_ns + 1000000000
     )
@@ -163,11 +173,13 @@ before AS (
         m.publisher_id, m.source_timestamp_ns, p.publication_id,
         p.origin_ns - m.source_timestamp_ns AS lead_ns,
         greatest(p.tolerance_ns, least((p.until_ns - p.origin_ns) // 4, u.spread_ns)) AS limit_ns
-    FROM message AS m
+    FROM sided AS m
     ANTI JOIN first_match AS f
         ON m.publisher_id = f.publisher_id AND m.source_timestamp_ns = f.source_timestamp_ns
     ASOF JOIN published AS p
-        ON m.publisher_id = p.publisher_id AND m.source_timestamp_ns < p.origin_ns
+        ON m.publisher_id = p.publisher_id
+        AND m.side = p.side
+        AND m.source_timestamp_ns < p.origin_ns
     LEFT JOIN usual AS u ON m.publisher_id = u.publisher_id
     WHERE coalesce(p.written_ns < m.taken_ns, true)
 ),
@@ -181,9 +193,14 @@ second_match AS (
     ) = 1
 ),
 matched AS (
-    SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM first_match
-    UNION ALL
-    SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM second_match
+    SELECT
+        publisher_id, source_timestamp_ns, publication_id, bool_or(is_rivalled) AS is_rivalled
+    FROM (
+        SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM first_match
+        UNION ALL
+        SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM second_match
+    )
+    GROUP BY publisher_id, source_timestamp_ns, publication_id
 ),
 placed AS (
     SELECT
