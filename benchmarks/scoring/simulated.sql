@@ -64,13 +64,11 @@ WHERE h.ts_ns IS NOT NULL;
 
 -- Times in the trace by which a row may name an instance; a take also by its callback's start.
 CREATE OR REPLACE TEMP TABLE truth_time AS
+-- All traces of a host are on the clock of the first one.
 WITH clock_error AS (
-    SELECT p.host, p.pid, coalesce(any_value(own.clock_error_ns), any_value(t.clock_error_ns), 0)
-            AS error_ns
-    FROM (SELECT DISTINCT host, pid FROM truth_event) AS p
-    LEFT JOIN simulated_trace AS own ON p.host = own.host AND p.pid = own.pid
-    LEFT JOIN simulated_trace AS t ON p.host = t.host AND t.pid IS NULL
-    GROUP BY p.host, p.pid
+    SELECT host, arg_min(clock_error_ns, path) AS error_ns
+    FROM simulated_trace
+    GROUP BY host
 ),
 named AS (
     SELECT kind, id, host, pid, tid, ts_ns FROM truth_event
@@ -81,7 +79,7 @@ named AS (
 )
 SELECT n.kind, n.id, n.host, n.pid, n.tid, n.ts_ns + c.error_ns AS ts_ns
 FROM named AS n
-JOIN clock_error AS c ON n.host = c.host AND n.pid = c.pid;
+JOIN clock_error AS c ON n.host = c.host;
 
 CREATE OR REPLACE TEMP TABLE truth_link AS
 WITH recorded AS (

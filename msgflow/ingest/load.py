@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import UsageError
+from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.sequences import Sequences
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from msgflow.ingest.reconciled import Corrections
     from msgflow.query.interrupt import Interrupts
 
 # Rows that wait for a commit take memory that nothing limits.
@@ -93,7 +95,6 @@ def load_traces(
     sources = _sources(traces.traces, hostnames)
     for source in sources:
         con.execute(f"INSERT INTO staging.source VALUES ({', '.join('?' * len(source))})", source)
-    sequences = Sequences(catalogue, _hosts(sources))
     started = time.monotonic()
 
     def report(state: Progress) -> None:
@@ -102,20 +103,31 @@ def load_traces(
             progress(state, time.monotonic() - started)
 
     tables = _Tables(con, replace)
+
+    def read(corrections: Corrections | None) -> None:
+        batches = traces.batches(wanted, progress=report)
+        sequences = Sequences(catalogue, _hosts(sources))
+        con.begin()
+        try:
+            with Inserter(tables.add) as inserter:
+                for batch in _placed(batches, sequences, corrections):
+                    interrupts.check()
+                    inserter.put(batch)
+            con.commit()
+        except BaseException:
+            with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+                con.rollback()
+            raise
+
     # What is staged is written once and read a few times: compressing it costs more than it saves.
     con.execute("SET force_compression = 'uncompressed'")
     con.execute("SET wal_autocheckpoint = '1TB'")
-    con.begin()
     try:
-        with Inserter(tables.add) as inserter:
-            for batch in _placed(traces.batches(wanted, progress=report), sequences):
-                interrupts.check()
-                inserter.put(batch)
-        con.commit()
-    except BaseException:
-        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
-            con.rollback()
-        raise
+        read(None)
+        corrections = reconciled.find(con)
+        if corrections:
+            staging.empty(con)
+            read(corrections)
     finally:
         con.execute("RESET force_compression")
         con.execute("RESET wal_autocheckpoint")
@@ -141,7 +153,7 @@ def load_traces(
 
 
 def _placed(
-    batches: Iterable[EventBatch], sequences: Sequences
+    batches: Iterable[EventBatch], sequences: Sequences, corrections: Corrections | None
 ) -> Iterator[tuple[str, pa.RecordBatch]]:
     """Yield (table, rows) of all batches, round by round."""
     tracepoints = load().tracepoints
@@ -150,8 +162,10 @@ def _placed(
         for batch in of_round:
             if batch.name == PACKET:
                 yield PACKET, batch.batch
-            else:
-                events.append((batch.name, batch.batch))
+                continue
+            rows = batch.batch if corrections is None else corrections.applied(batch.batch)
+            if rows.num_rows:
+                events.append((batch.name, rows))
         if events:
             placed = sequences.place(events)
             yield "thread", placed.threads
@@ -222,6 +236,7 @@ def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[
                 trace.clock_uuid or f"host {hostname}",
                 trace.begin_ns,
                 trace.end_ns,
+                trace.clock_correction_ns,
             ]
         )
     return rows

@@ -2,7 +2,8 @@
 
 `raw` is a temporary database file with one table per tracepoint, the packets, and the threads, all
 as read. `staging` is a database in memory, which spills to the temporary directory:
-`staging.source` (one row per trace), `staging.event_count`, `staging.event` (all events of known
+`staging.source` (one row per trace), `staging.event_count`, `staging.left_out` (events that
+another trace holds as well), `staging.event` (all events of known
 tracepoints, without payload), `staging.predecessor` (the pointers from event to event), and the
 objects of `schema/model`.
 """
@@ -40,13 +41,21 @@ CREATE TABLE raw.thread_name (
 _SOURCE_TABLE = """
 CREATE TABLE staging.source (
     trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR, hostname VARCHAR,
-    tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT
+    tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT, end_ns BIGINT,
+    clock_correction_ns BIGINT
 )
 """
 
 _EVENT_COUNT_TABLE = """
 CREATE TABLE staging.event_count (
     trace_index INTEGER, name VARCHAR, is_known BOOLEAN, event_count BIGINT
+)
+"""
+
+_LEFT_OUT_TABLE = """
+CREATE TABLE staging.left_out (
+    trace_index INTEGER, used_index INTEGER, event_count BIGINT, thread_count BIGINT,
+    length_ns BIGINT
 )
 """
 
@@ -71,11 +80,19 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         _THREAD_TABLES,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,
+        _LEFT_OUT_TABLE,
         _DAMAGE_TABLE,
     ):
         con.execute(statement)
     con.execute(_event_view(tracepoints))
     con.execute(_predecessor_view(tracepoints))
+
+
+def empty(con: duckdb.DuckDBPyConnection) -> None:
+    """Empty `raw`, to read everything again."""
+    tables = [tracepoint.table for tracepoint in load().tracepoints.values()]
+    for table in (*tables, "packet", "thread", "thread_name"):
+        con.execute(f"TRUNCATE raw.{table}")
 
 
 def _event_view(tracepoints: Sequence[Tracepoint]) -> str:

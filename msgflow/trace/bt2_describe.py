@@ -16,13 +16,16 @@ if TYPE_CHECKING:
 
     from msgflow.trace.bt2_library import Bt2Library
     from msgflow.trace.model import TraceLocation
+    from msgflow.trace.time_base import TimeBase
 
 _STREAM_MAGIC = (b"\xc1\x1f\xfc\xc1", b"\xc1\xfc\x1f\xc1")
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
 
-def describe(library: Bt2Library, location: TraceLocation, index: int) -> TraceInfo:
-    """Read the metadata and the packet index of one trace.
+def describe(
+    library: Bt2Library, location: TraceLocation, index: int, base: TimeBase
+) -> TraceInfo:
+    """Read the metadata and the packet index of one trace, and put its clock on `base`.
 
     Raises:
         TraceError: Babeltrace cannot open it.
@@ -41,7 +44,7 @@ def describe(library: Bt2Library, location: TraceLocation, index: int) -> TraceI
             return undeclared(location.path, index)
         # Only after the trace could be opened: on a damaged one this query ends the process.
         begin_ns, end_ns = _range(library, location)
-        return _info(trace, location, index, begin_ns, end_ns)
+        return _info(trace, location, index, (begin_ns, end_ns), base)
     except bt2._Error as error:
         stranger = _not_a_stream(location)
         if stranger is not None:
@@ -90,7 +93,11 @@ def _first_trace(library: Bt2Library, location: TraceLocation) -> Any:
 
 
 def _info(
-    trace: Any, location: TraceLocation, index: int, begin_ns: int | None, end_ns: int | None
+    trace: Any,
+    location: TraceLocation,
+    index: int,
+    extent: tuple[int | None, int | None],
+    base: TimeBase,
 ) -> TraceInfo:
     environment = {str(name): value for name, value in trace.environment.items()}
     stream_classes = list(trace.cls.values())
@@ -103,6 +110,9 @@ def _info(
     clock = clocks[0]
     offset = clock.offset
     epoch = Clock(clock.frequency, offset.seconds, offset.cycles)
+    uuid = None if clock.uuid is None else str(clock.uuid)
+    correction = base.correction_ns(uuid, clock.name, clock.frequency, epoch.to_ns(0))
+    begin_ns, end_ns = (None if time is None else time + correction for time in extent)
     return TraceInfo(
         index=index,
         path=location.path,
@@ -110,9 +120,10 @@ def _info(
         domain=_text(environment, "domain"),
         hostname=_text(environment, "hostname"),
         tracer=_tracer(environment),
-        clock_uuid=None if clock.uuid is None else str(clock.uuid),
+        clock_uuid=uuid,
         clock_name=clock.name,
         clock_offset_ns=epoch.to_ns(0),
+        clock_correction_ns=correction,
         begin_ns=begin_ns,
         end_ns=end_ns,
         has_process_context=all(_has_process_context(sc) for sc in stream_classes),

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.trace.bt2_library import Bt2Library
+    from msgflow.trace.model import TraceInfo
 
 _ADDRESS = re.compile(r"[\w-]*addr=0x[0-9a-f]+,?")
 
@@ -30,9 +31,9 @@ class Bt2Graph:
         stream_count: number of data streams of all traces.
     """
 
-    def __init__(self, library: Bt2Library, paths: Sequence[Path]) -> None:
+    def __init__(self, library: Bt2Library, traces: Sequence[TraceInfo]) -> None:
         self._library = library
-        self._paths = paths
+        paths = self._paths = [trace.path for trace in traces]
         bt2 = library.bt2
         self._native = library.native
         source_class = plugin_class(library, "ctf", "source", "fs")
@@ -40,8 +41,11 @@ class Bt2Graph:
         self._graph: Any = bt2.Graph(0)
         muxer = self._graph.add_component(muxer_class, "muxer")
         self.stream_count = 0
-        for index, path in enumerate(paths):
-            parameters = source_parameters(path) | {"trace-name": str(index)}
+        for index, (path, trace) in enumerate(zip(paths, traces, strict=True)):
+            parameters = source_parameters(path) | {
+                "trace-name": str(index),
+                "clock-class-offset-ns": trace.clock_correction_ns,
+            }
             try:
                 source = self._graph.add_component(source_class, str(index), parameters)
             except bt2._Error as error:

@@ -49,7 +49,7 @@ class Iteration:
         self._wanted = wanted
         self._progress = progress
         self._batch_rows = batch_rows
-        self._graph = Bt2Graph(library, [trace.path for trace in traces])
+        self._graph = Bt2Graph(library, traces)
         self._fields = FieldReader(library)
         self._streams = StreamTable(library)
         self._duplicates: DuplicateFilter | None = None

@@ -8,6 +8,7 @@ from msgflow.trace import bt2_library
 from msgflow.trace.bt2_describe import describe
 from msgflow.trace.bt2_iteration import Iteration
 from msgflow.trace.exclusive import ExclusiveTraceSet
+from msgflow.trace.time_base import TimeBase
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence
@@ -28,8 +29,10 @@ class Bt2TraceSet(ExclusiveTraceSet):
         """
         super().__init__()
         self._library = bt2_library.load()
+        base = TimeBase()
         self.traces = tuple(
-            describe(self._library, location, index) for index, location in enumerate(locations)
+            describe(self._library, location, index, base)
+            for index, location in enumerate(locations)
         )
 
     def _batches(

@@ -39,7 +39,9 @@ class TraceInfo:
         tracer: name and version, such as 'lttng-ust 2.13', or None.
         clock_uuid: uuid of the clock (LTTng: the boot id), or None.
         clock_name: name of the clock, such as 'monotonic', or None.
-        clock_offset_ns: nanoseconds from the epoch to the origin of the clock.
+        clock_offset_ns: nanoseconds from the epoch to the origin of the clock, as declared.
+        clock_correction_ns: what is added to that, to be on one time base with the first trace of
+            the same clock.
         begin_ns: time of the first packet's begin, epoch nanoseconds, or None.
         end_ns: time of the last packet's end, epoch nanoseconds, or None.
         has_process_context: every event carries both `vpid` and `vtid`.
@@ -55,6 +57,7 @@ class TraceInfo:
     clock_uuid: str | None
     clock_name: str | None
     clock_offset_ns: int
+    clock_correction_ns: int
     begin_ns: int | None
     end_ns: int | None
     has_process_context: bool
@@ -73,6 +76,7 @@ def undeclared(path: Path, index: int) -> TraceInfo:
         clock_uuid=None,
         clock_name=None,
         clock_offset_ns=0,
+        clock_correction_ns=0,
         begin_ns=None,
         end_ns=None,
         has_process_context=False,

@@ -1,11 +1,11 @@
 -- name: finding.overlapping_traces
 -- title: Two traces hold the same events
--- description: Threads were recorded twice at the same time, by different sessions. Everything they
---     did appears twice, so that messages and callbacks are counted twice or paired wrongly.
+-- description: Threads were recorded twice at the same time, by different sessions. What both hold
+--     was read from one of them only: that with more events of the thread.
 -- cause: Two tracing sessions ran at once with the same events, and both were given to one ingest.
--- cure: Ingest only one of them: msgflow ingest --replace TRACE.
+-- cure: None needed, unless one of them is the better record: msgflow ingest --replace TRACE.
 -- grain: one row per pair of traces
--- severity: error
+-- severity: warning
 -- needs: main.diagnostic, main.trace
 SELECT
     d.run_id,

@@ -5,7 +5,8 @@
 --     message has one publication and a publication one message, the nearest of each other. Where
 --     the thread goes on late, the delays that are usual for the publisher bound the search. A
 --     message with a publication of several publishers, or one of two messages that may both be of
---     one publication, has none: that would be a guess.
+--     one publication, has none: that would be a guess. Nor has one where the difference of the
+--     clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock
@@ -16,9 +17,11 @@ WITH clock AS (
         (end_ns - start_ns) // 1000000 + 4000 AS tolerance_ns,
         row_number() OVER on_clock = 1 AS is_first,
         lag(difference_ns) OVER on_clock AS previous_ns,
+        lag(message_count) OVER on_clock AS previous_count,
         lead(difference_ns) OVER on_clock AS next_ns,
         at_ns - lag(at_ns) OVER on_clock AS since_previous_ns,
-        lead(at_ns) OVER on_clock - at_ns AS until_next_ns
+        lead(at_ns) OVER on_clock - at_ns AS until_next_ns,
+        message_count
     FROM store.stamp_clock
     WHERE run_id = only_run
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
@@ -28,6 +31,9 @@ course AS (
         clock_id,
         CASE WHEN is_first THEN -9223372036854775807 ELSE start_ns END AS start_ns,
         difference_ns, drift_ppb, at_ns, tolerance_ns, previous_ns, next_ns,
+        message_count > 0 AS is_known,
+        is_first,
+        coalesce(previous_count > 0, true) AS was_known,
         abs(difference_ns - previous_ns) > 50000 + since_previous_ns // 5000
             AS has_jumped_before,
         abs(next_ns - difference_ns) > 50000 + until_next_ns // 5000 AS has_jumped_after
@@ -43,25 +49,38 @@ located AS (
     FROM derive.unstamped_publication(only_run) AS b
     ASOF JOIN course AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
 ),
--- Around a jump of the clock a publication may be on either side of it.
+-- Around a jump of the clock a publication may be on either side of it. A message that one of
+-- either side could be of is ambiguous.
 published AS MATERIALIZED (
     SELECT
-        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        0 AS side, run_id, topic_name, publisher_id, publication_id, written_ns,
+        tolerance_ns,
         written_ns + difference_ns - tolerance_ns AS origin_ns,
         next_event_ns + difference_ns AS until_ns
     FROM located
     UNION ALL
     SELECT
-        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        -1, run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
         written_ns + previous_ns - tolerance_ns, next_event_ns + previous_ns
     FROM located
     WHERE has_jumped_before
     UNION ALL
     SELECT
-        run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
+        1, run_id, topic_name, publisher_id, publication_id, written_ns, tolerance_ns,
         written_ns + next_ns - tolerance_ns, next_event_ns + next_ns
     FROM located
     WHERE has_jumped_after
+),
+-- Where the clocks stood in what relation: from one jump to the next.
+segment AS (
+    SELECT
+        clock_id,
+        start_ns + CASE WHEN is_first THEN 0 ELSE difference_ns END AS start_stamp_ns,
+        sum(CASE WHEN has_jumped_before OR is_known <> was_known THEN 1 ELSE 0 END) OVER (
+            PARTITION BY clock_id ORDER BY start_ns ROWS UNBOUNDED PRECEDING
+        ) AS segment,
+        is_known
+    FROM course
 ),
 publisher AS (
     SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located
@@ -74,17 +93,25 @@ message AS MATERIALIZED (
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id
 ),
+sided AS MATERIALIZED (
+    SELECT m.publisher_id, m.source_timestamp_ns, m.taken_ns, p.side
+    FROM message AS m
+    JOIN (SELECT DISTINCT publisher_id, side FROM published) AS p
+        ON m.publisher_id = p.publisher_id
+),
 after AS MATERIALIZED (
     SELECT
         m.publisher_id, m.source_timestamp_ns, p.publication_id, p.until_ns,
         m.source_timestamp_ns - p.origin_ns AS delay_ns,
         row_number() OVER (
-            PARTITION BY p.publication_id
+            PARTITION BY p.publication_id, p.side
             ORDER BY m.source_timestamp_ns - p.origin_ns, m.source_timestamp_ns
         ) AS place
-    FROM message AS m
+    FROM sided AS m
     ASOF JOIN published AS p
-        ON m.publisher_id = p.publisher_id AND m.source_timestamp_ns >= p.origin_ns
+        ON m.publisher_id = p.publisher_id
+        AND m.side = p.side
+        AND m.source_timestamp_ns >= p.origin_ns
     WHERE m.source_timestamp_ns < coalesce(
         p.until_ns + p.tolerance_ns // 4, p.origin_ns + 1000000000
     )
@@ -146,11 +173,13 @@ before AS (
         m.publisher_id, m.source_timestamp_ns, p.publication_id,
         p.origin_ns - m.source_timestamp_ns AS lead_ns,
         greatest(p.tolerance_ns, least((p.until_ns - p.origin_ns) // 4, u.spread_ns)) AS limit_ns
-    FROM message AS m
+    FROM sided AS m
     ANTI JOIN first_match AS f
         ON m.publisher_id = f.publisher_id AND m.source_timestamp_ns = f.source_timestamp_ns
     ASOF JOIN published AS p
-        ON m.publisher_id = p.publisher_id AND m.source_timestamp_ns < p.origin_ns
+        ON m.publisher_id = p.publisher_id
+        AND m.side = p.side
+        AND m.source_timestamp_ns < p.origin_ns
     LEFT JOIN usual AS u ON m.publisher_id = u.publisher_id
     WHERE coalesce(p.written_ns < m.taken_ns, true)
 ),
@@ -164,18 +193,67 @@ second_match AS (
     ) = 1
 ),
 matched AS (
-    SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM first_match
-    UNION ALL
-    SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM second_match
+    SELECT
+        publisher_id, source_timestamp_ns, publication_id, bool_or(is_rivalled) AS is_rivalled
+    FROM (
+        SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM first_match
+        UNION ALL
+        SELECT publisher_id, source_timestamp_ns, publication_id, is_rivalled FROM second_match
+    )
+    GROUP BY publisher_id, source_timestamp_ns, publication_id
+),
+placed AS (
+    SELECT
+        m.run_id, m.topic_name, m.source_timestamp_ns, m.publisher_id, p.clock_id,
+        coalesce(g.segment, 0) AS segment, coalesce(g.is_known, true) AS is_known
+    FROM message AS m
+    JOIN publisher AS p ON m.publisher_id = p.publisher_id
+    ASOF LEFT JOIN segment AS g
+        ON p.clock_id = g.clock_id AND m.source_timestamp_ns >= g.start_stamp_ns
+),
+-- A difference of the clocks explains the messages; one that fits few of them is none. Topics may
+-- have publishers that were not traced, but not all of them will.
+explained AS (
+    SELECT
+        clock_id, segment, topic_name, is_known,
+        count(*) AS message_count,
+        sum(CASE WHEN is_matched THEN 1 ELSE 0 END) AS matched_count
+    FROM (
+        SELECT
+            p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_known,
+            bool_or(x.publication_id IS NOT NULL) AS is_matched
+        FROM placed AS p
+        LEFT JOIN matched AS x
+            ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
+        GROUP BY p.clock_id, p.segment, p.topic_name, p.source_timestamp_ns, p.is_known
+    )
+    GROUP BY clock_id, segment, topic_name, is_known
+),
+trusted AS (
+    SELECT
+        clock_id, segment,
+        bool_and(is_known) AND (
+            coalesce(max(CASE WHEN message_count >= 8 THEN matched_count / message_count END), 0)
+                >= 0.5
+            OR sum(matched_count) >= 0.5 * sum(message_count)
+        ) AS is_trusted
+    FROM explained
+    GROUP BY clock_id, segment
 )
 SELECT
-    m.run_id,
-    m.topic_name,
-    m.source_timestamp_ns,
-    CASE WHEN count(*) = 1 AND NOT bool_or(x.is_rivalled) THEN any_value(x.publication_id) END
-        AS publication_id,
-    count(*) AS candidate_count
-FROM matched AS x
-JOIN message AS m
-    ON x.publisher_id = m.publisher_id AND x.source_timestamp_ns = m.source_timestamp_ns
-GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns
+    p.run_id,
+    p.topic_name,
+    p.source_timestamp_ns,
+    CASE
+        WHEN count(x.publication_id) = 1
+            AND NOT bool_or(coalesce(x.is_rivalled, false))
+            AND bool_and(x.publication_id IS NULL OR t.is_trusted)
+            THEN any_value(x.publication_id)
+    END AS publication_id,
+    count(x.publication_id) AS candidate_count
+FROM placed AS p
+JOIN trusted AS t ON p.clock_id = t.clock_id AND p.segment = t.segment
+LEFT JOIN matched AS x
+    ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
+GROUP BY p.run_id, p.topic_name, p.source_timestamp_ns
+HAVING count(x.publication_id) > 0 OR bool_or(NOT t.is_trusted)

@@ -7,7 +7,9 @@
 --     greatest of these: the lower envelope of stamp less time of writing. It follows the stretch
 --     before (both clocks are slewed a little) unless several messages agree on a jump. A message
 --     taken on the clock of the publisher is looked for among the publications right before its
---     take, others among those around the stamp; a few messages per stretch are enough.
+--     take, others among those around the stamp; a few messages per stretch are enough. Where
+--     nearly as many allow a lesser difference, by which the messages would be those of later
+--     publications, the clock may have jumped by a period: no message agrees then.
 -- grain: one row per clock and stretch of time with messages that agree
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message
@@ -172,8 +174,10 @@ ballot AS MATERIALIZED (
 -- A difference that few agree with, several times in a row, is given up for that of the latest
 -- publications that many agree with: a message is taken soon after it was published. Where no
 -- message was taken on this clock the nearest such difference is as good.
-followed (clock_id, number, stretch, difference_ns, vote_count, miss_count) AS (
-    SELECT clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT
+followed (
+    clock_id, number, stretch, difference_ns, vote_count, miss_count, is_ambiguous
+) AS (
+    SELECT clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, false
     FROM ballot
     WHERE number = 1
     UNION ALL
@@ -186,9 +190,13 @@ followed (clock_id, number, stretch, difference_ns, vote_count, miss_count) AS (
             WHEN is_missed THEN previous_ns
             ELSE near.difference_ns
         END,
-        CASE WHEN has_jumped THEN jump.vote_count WHEN is_missed THEN 0 ELSE near.vote_count END
-            ::BIGINT,
-        CASE WHEN has_jumped OR NOT is_missed THEN 0 ELSE miss_count + 1 END
+        CASE
+            WHEN has_jumped THEN jump.vote_count
+            WHEN is_missed OR is_rivalled THEN 0
+            ELSE near.vote_count
+        END::BIGINT,
+        CASE WHEN has_jumped OR NOT is_missed THEN 0 ELSE miss_count + 1 END,
+        is_rivalled AND NOT has_jumped
     FROM (
         SELECT
             clock_id, number, stretch, previous_stretch, previous_ns, miss_count,
@@ -210,7 +218,14 @@ followed (clock_id, number, stretch, difference_ns, vote_count, miss_count) AS (
                 )
             )) AS jump,
             near IS NULL OR (most >= 8 AND most_close < 0.6 * most) AS is_missed,
-            is_missed AND most >= 8 AND miss_count + 1 >= patience AS has_jumped
+            is_missed AND most >= 8 AND miss_count + 1 >= patience AS has_jumped,
+            NOT is_missed AND is_taken_here AND most_close >= 8 AND coalesce(
+                list_max(list_transform(
+                    list_filter(peaks, lambda p: p.difference_ns < previous_ns - 500000),
+                    lambda p: p.vote_count
+                )) >= 0.9 * most_close,
+                false
+            ) AS is_rivalled
         FROM (
             SELECT
                 b.clock_id, b.number, b.stretch, b.most, b.patience, b.peaks, b.is_taken_here,
@@ -245,7 +260,10 @@ agreed AS (
             )) AS near
         FROM ballot AS b
         JOIN followed AS f
-            ON b.clock_id = f.clock_id AND b.number = f.number AND f.vote_count = 0
+            ON b.clock_id = f.clock_id
+            AND b.number = f.number
+            AND f.vote_count = 0
+            AND NOT f.is_ambiguous
         ASOF JOIN (SELECT * FROM followed WHERE vote_count > 0) AS n
             ON b.clock_id = n.clock_id AND b.stretch < n.stretch
     )
@@ -377,3 +395,16 @@ SELECT
 FROM rough AS r
 JOIN extent AS x ON r.clock_id = x.clock_id
 LEFT JOIN fine AS f ON r.clock_id = f.clock_id AND r.stretch = f.stretch
+UNION ALL
+SELECT
+    x.run_id,
+    f.clock_id,
+    x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2,
+    x.start_ns + f.stretch * x.stretch_ns,
+    x.start_ns + (f.stretch + 1) * x.stretch_ns,
+    f.difference_ns,
+    0,
+    0
+FROM followed AS f
+JOIN extent AS x ON f.clock_id = x.clock_id
+WHERE f.is_ambiguous

@@ -4,7 +4,7 @@
 -- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
 --     staging.callback_instance, staging.callback_left_over,
 --     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host,
---     staging.trace_overlap, staging.source, staging.publisher_known, staging.subscription_known,
+--     staging.left_out, staging.source, staging.publisher_known, staging.subscription_known,
 --     staging.client, staging.service, staging.client_event, staging.service_event,
 --     staging.client_gid, staging.request_pair,
 --     staging.annotation, staging.annotation_object
@@ -154,17 +154,30 @@ JOIN process_label AS l ON i.process_id = l.process_id
 GROUP BY i.kind
 UNION ALL
 SELECT
-    o.second_index + 1,
+    o.trace_index + 1,
     'overlapping_traces',
-    'error',
+    'warning',
     o.event_count,
     printf(
-        'events of %d threads, over %.3f s, that the trace %s holds as well: what they did is '
-        || 'counted twice',
+        'events of %d threads, over %.3f s, that the trace %s holds as well: left out',
         o.thread_count, o.length_ns / 1e9, s.path
     )
-FROM staging.trace_overlap AS o
-JOIN staging.source AS s ON o.first_index = s.trace_index
+FROM staging.left_out AS o
+JOIN staging.source AS s ON o.used_index = s.trace_index
+UNION ALL
+SELECT
+    NULL,
+    'clock_offsets_differ',
+    'info',
+    count(*),
+    printf(
+        'traces of one boot that are off the first one of it by %+.3f ms to %+.3f ms, as their '
+        || 'tracer measured its clock: brought to one time base',
+        -max(clock_correction_ns) / 1e6, -min(clock_correction_ns) / 1e6
+    )
+FROM staging.source
+WHERE clock_correction_ns <> 0
+HAVING count(*) > 0
 UNION ALL
 SELECT
     NULL,

@@ -207,3 +207,35 @@ def test_a_gap_after_the_publication_makes_the_link_doubtful(
         "SELECT b.rcl_ns FROM link_transport AS l JOIN publication AS b USING (publication_id) "
         "WHERE l.is_loss_affected"
     ) == [published]
+
+
+class Jumping(Unstamped):
+    """The clock of ROS jumps back by just one period after four seconds."""
+
+    def difference(self, time: int) -> int:
+        return -10_000_000 if time - _EPOCH > 4_000_000_000 else 0
+
+
+class Coarse(Unstamped):
+    """The clock of ROS advances every four milliseconds."""
+
+    def difference(self, time: int) -> int:
+        return -(time % 4_000_000)
+
+
+@pytest.mark.parametrize(("kind", "share"), [(Jumping, 0.4), (Coarse, 0.0)])
+def test_a_clock_that_fits_by_chance_tells_nothing(
+    system: RosSystem, analyse: Analyse, kind: type[Unstamped], share: float
+) -> None:
+    """No link is wrong; what cannot be told is ambiguous."""
+    unstamped = kind(system)
+    system.wait(_EPOCH - 10_000_000)
+    system.publisher(TALKER, 0x10, "/a")
+    system.subscription(LISTENER, 0x20, "/a")
+    for n in range(800):
+        unstamped.message(_EPOCH + n * 10_000_000 + unstamped.random.randrange(300_000))
+    model = analyse(system)
+    links = {(published, stamp) for published, stamp, _ in model.rows(LINKS)}
+    assert links <= set(unstamped.truth)
+    assert len(links) >= share * len(unstamped.truth)
+    assert "ambiguous" in model.column("SELECT DISTINCT reason FROM store.orphan_take")

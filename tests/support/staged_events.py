@@ -22,7 +22,7 @@ import pyarrow as pa
 from msgflow.db.connection import connect
 from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
-from msgflow.ingest import model, staging
+from msgflow.ingest import model, reconciled, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.memory import Memory
 from msgflow.ingest.sequences import Sequences
@@ -152,7 +152,7 @@ class StagedEvents:
         for index, source in sorted(self.sources.items()):
             con.execute(
                 "INSERT INTO staging.source "
-                "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL)",
+                "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL, 0)",
                 [
                     index,
                     f"trace-{index}",
@@ -169,6 +169,20 @@ class StagedEvents:
         for name, events in rows.items():
             schema = pa.schema([*COMMON_SCHEMA, *load().tracepoints[name].arrow_schema()])
             batches.append((name, pa.RecordBatch.from_pylist(events, schema=schema)))
+        packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
+        self._read(con, batches, packets)
+        corrections = reconciled.find(con)
+        if corrections:
+            staging.empty(con)
+            self._read(con, [(n, corrections.applied(batch)) for n, batch in batches], packets)
+
+    def _read(
+        self,
+        con: duckdb.DuckDBPyConnection,
+        batches: list[tuple[str, pa.RecordBatch]],
+        packets: pa.RecordBatch,
+    ) -> None:
+        batches = [(name, batch) for name, batch in batches if batch.num_rows]
         if batches:
             hosts: dict[Source, int] = {}
             sources = [self.sources.get(n, Source()) for n in range(max(self.sources) + 1)]
@@ -178,7 +192,6 @@ class StagedEvents:
             _insert(con, "raw.thread_name", placed.thread_names)
             for name, batch in placed.batches:
                 _insert(con, f"raw.{load().tracepoints[name].table}", batch)
-        packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
         _insert(con, "raw.packet", packets)
 
     def _all_packets(self) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 import msgflow.trace
 from msgflow.errors import ExitCode, TraceError, UsageError
 from msgflow.trace import PACKET, EventBatch, TraceSet, bt2_graph, bt2_library
+from msgflow.trace.model import undeclared
 
 Open = Callable[..., TraceSet]
 
@@ -176,7 +177,7 @@ class TestInterrupt:
                 return bt2_bindings.native.bt2_self_component_port_input_get_msg_range(iterator)
 
         library = dataclasses.replace(bt2_bindings, native=Native())
-        graph = bt2_graph.Bt2Graph(library, [trace])
+        graph = bt2_graph.Bt2Graph(library, [undeclared(trace, 0)])
 
         def read_all() -> None:
             for step in graph.steps():

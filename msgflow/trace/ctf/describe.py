@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
@@ -15,12 +16,15 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
     from msgflow.trace.ctf.streams import Stream
     from msgflow.trace.ctf.types import Structure
+    from msgflow.trace.time_base import TimeBase
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
 
-def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream]) -> TraceInfo:
-    """Return the description of a trace that has event data.
+def describe(
+    trace: TraceClass, path: Path, index: int, streams: Sequence[Stream], base: TimeBase
+) -> TraceInfo:
+    """Return the description of a trace that has event data, and put its clocks on `base`.
 
     Raises:
         TraceError: its events have no time.
@@ -33,6 +37,10 @@ def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream
         )
     clock = used[0].clock
     assert clock is not None
+    correction = base.correction_ns(clock.uuid, clock.name, clock.frequency, clock.to_ns(0))
+    for stream_class in classes:
+        if correction and stream_class.clock == clock:
+            stream_class.clock = replace(clock, offset_cycles=clock.offset_cycles + correction)
     spans = [_range(stream) for stream in streams]
     begins = [begin for begin, _ in spans if begin is not None]
     ends = [end for _, end in spans if end is not None]
@@ -47,6 +55,7 @@ def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream
         clock_uuid=clock.uuid,
         clock_name=clock.name,
         clock_offset_ns=clock.to_ns(0),
+        clock_correction_ns=correction,
         begin_ns=min(begins, default=None),
         end_ns=max(ends, default=None),
         has_process_context=all(_has_process_context(stream) for stream in classes),

@@ -17,6 +17,7 @@ from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.discovery import stream_files
 from msgflow.trace.exclusive import ExclusiveTraceSet
 from msgflow.trace.model import Damage, undeclared
+from msgflow.trace.time_base import TimeBase
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence
@@ -45,6 +46,7 @@ class CtfTraceSet(ExclusiveTraceSet):
         self._streams: list[Stream] = []
         self._begins: dict[Packet, tuple[int, int]] | None = None
         self._found_early: list[Damage] = []
+        self._time_base = TimeBase()
         self.damages: list[Damage] = []
         self.traces: tuple[TraceInfo, ...] = tuple(
             self._open(location, index) for index, location in enumerate(locations)
@@ -79,7 +81,7 @@ class CtfTraceSet(ExclusiveTraceSet):
         for stream in streams:
             stream.rank = len(self._streams)
             self._streams.append(stream)
-        return describe(declared, path, index, streams)
+        return describe(declared, path, index, streams, self._time_base)
 
     def _batches(
         self,

@@ -1,0 +1,32 @@
+"""One time base for the traces of one boot.
+
+A tracer measures how far its clock is from the epoch for every trace anew. The clock itself is the
+same for all traces of a boot, as its uuid says: what the offsets differ by is an error of measuring
+or, between sessions, what the time of day was set or slewed by meanwhile.
+"""
+
+from __future__ import annotations
+
+GIGA = 1_000_000_000
+
+
+class TimeBase:
+    """The offsets of the clocks of traces that are opened one after the other."""
+
+    def __init__(self) -> None:
+        self._offsets: dict[tuple[str, str | None], int] = {}
+
+    def correction_ns(
+        self, uuid: str | None, name: str | None, frequency: int, offset_ns: int
+    ) -> int:
+        """Return what to add to the times of a trace, so that they are those of the first one.
+
+        Args:
+            uuid: of the trace's clock, or None, which is a clock of its own.
+            name: of the clock, or None.
+            frequency: of the clock [Hz]; only clocks that count nanoseconds are corrected.
+            offset_ns: what the trace says that its clock is ahead of the epoch.
+        """
+        if uuid is None or frequency != GIGA:
+            return 0
+        return self._offsets.setdefault((uuid, name), offset_ns) - offset_ns

@@ -1,0 +1,240 @@
+"""Two sessions that record one host at once: every event counts once."""
+
+from __future__ import annotations
+
+import pytest
+from ros_system import RosSystem
+from staged_events import Analyse, Analysis, Thread
+
+from msgflow.db.check import run_checks
+
+MILLISECOND = 1_000_000
+PERIOD = 2 * MILLISECOND
+FOUND = (
+    "SELECT trace_id, severity, count, detail FROM diagnostic WHERE name = 'overlapping_traces' "
+    "ORDER BY trace_id"
+)
+
+
+
+
+def session(trace: int, pid: int = 100, **more: int) -> Thread:
+    return Thread(pid, trace=trace, **more)
+
+
+def create(system: RosSystem, *threads: Thread) -> None:
+    """A publisher and a subscription, in the record of every given session."""
+    for thread in threads:
+        system.context(thread)
+        system.node(thread, 0x1, "talker")
+        system.publisher(thread, 0x10, "/topic")
+        system.subscription(thread, 0x20, "/topic", callback=0x30)
+
+
+def cycle(system: RosSystem, number: int, *threads: Thread) -> None:
+    """One message is published, taken and handled; each event is recorded session by session."""
+    stamp = 1_000 + number
+    events = [
+        ("ros2:rclcpp_publish", {"message": 0xA}),
+        ("ros2:rcl_publish", {"publisher_handle": 0x10, "message": 0xA}),
+        ("ros2:rmw_publish", {"rmw_publisher_handle": 0x1010, "message": 0xA, "timestamp": stamp}),
+        (
+            "ros2:rmw_take",
+            {
+                "rmw_subscription_handle": 0x1020,
+                "message": 0xB,
+                "source_timestamp": stamp,
+                "taken": 1,
+            },
+        ),
+        ("ros2:rcl_take", {"message": 0xB}),
+        ("ros2:rclcpp_take", {"message": 0xB}),
+        ("ros2:callback_start", {"callback": 0x30, "is_intra_process": 0}),
+        ("ros2:callback_end", {"callback": 0x30}),
+    ]
+    for name, fields in events:
+        for thread in threads:
+            system.add(name, thread, **fields)
+    system.wait(PERIOD)
+
+
+def sessions(system: RosSystem, *hosts: str) -> None:
+    for trace, host in enumerate(hosts):
+        system.add_source(trace, host, "boot")
+
+
+def counts(model: Analysis) -> tuple[int, int, int, int]:
+    """Publications, takes, callback instances, and links with an instance behind the take."""
+    return tuple(  # type: ignore[return-value]
+        model.value(f"SELECT count(*) FROM {table}")
+        for table in (
+            "publication",
+            "take",
+            "callback_instance",
+            "link_transport JOIN callback_instance USING (run_id, take_id)",
+        )
+    )
+
+
+def failed_checks(model: Analysis) -> list[str]:
+    return [r.name for r in run_checks(model.connection, 1) if r.row_count]
+
+
+def test_a_second_session_counts_nothing_twice(system: RosSystem, analyse: Analyse) -> None:
+    threads = session(0), session(1)
+    sessions(system, "alpha", "alpha")
+    create(system, *threads)
+    for number in range(5):
+        cycle(system, number, *threads)
+    model = analyse(system)
+    assert counts(model) == (5, 5, 5, 5)
+    for table in ("node", "publisher", "subscription", "callback"):
+        assert model.value(f"SELECT count(*) FROM {table}") == 1, table
+    ((trace, severity, count, detail),) = model.rows(FOUND)
+    assert (trace, severity, count) == (2, "warning", 9 + 5 * 8)
+    assert detail.endswith("that the trace trace-0 holds as well: left out")
+    assert failed_checks(model) == []
+
+
+@pytest.mark.parametrize("longer", [0, 1])
+def test_the_usable_rest_of_both_is_kept(
+    system: RosSystem, analyse: Analyse, longer: int
+) -> None:
+    """One session begins and ends before the other; in between that with more events is used."""
+    threads = session(0), session(1)
+    sessions(system, "alpha", "alpha")
+    create(system, threads[0])
+    only = [6, 2] if longer == 0 else [2, 6]
+    for number in range(only[0]):
+        cycle(system, number, threads[0])
+    for number in range(10, 13):
+        cycle(system, number, *threads)
+    for number in range(20, 20 + only[1]):
+        cycle(system, number, threads[1])
+    model = analyse(system)
+    assert counts(model) == (11, 11, 11, 11)
+    ((trace, _, count, _),) = model.rows(FOUND)
+    assert (trace, count) == (2 - longer, 3 * 8)
+    assert failed_checks(model) == []
+
+
+def test_sessions_of_different_events_are_one_record(system: RosSystem, analyse: Analyse) -> None:
+    """Initialisation in one, the rest in the other; a layer of its own in a third."""
+    sessions(system, "alpha", "alpha", "alpha")
+    create(system, session(0))
+    system.writer(session(0), 0x10, "/topic")
+    for number in range(3):
+        system.add("ros2:rclcpp_publish", session(1), message=0xA)
+        system.add("ros2:rcl_publish", session(1), publisher_handle=0x10, message=0xA)
+        system.add("ros2:rmw_publish", session(1), message=0xA)
+        system.add("dds:write", session(2), writer=0x2010, timestamp=number, data=0xA)
+        system.wait(PERIOD)
+    system.add("ros2:rcl_node_init", session(0), node_handle=0x2, node_name="b", namespace="/")
+    model = analyse(system)
+    assert model.rows(FOUND) == []
+    assert model.rows(
+        "SELECT topic_name, dds_ns IS NOT NULL FROM publication JOIN publisher USING "
+        "(publisher_id)"
+    ) == [("/topic", True)] * 3
+
+
+def test_sessions_one_after_the_other_are_no_copies(system: RosSystem, analyse: Analyse) -> None:
+    sessions(system, "alpha", "alpha")
+    create(system, session(0))
+    for trace in (0, 1):
+        for number in range(3):
+            cycle(system, 10 * trace + number, session(trace))
+    model = analyse(system)
+    assert counts(model) == (6, 6, 6, 6)
+    assert model.rows(FOUND) == []
+
+
+def test_a_trace_per_process_holds_no_copies(system: RosSystem, analyse: Analyse) -> None:
+    sessions(system, "alpha", "alpha")
+    threads = session(0, 100), session(1, 200)
+    create(system, *threads)
+    for number in range(3):
+        for thread in threads:
+            cycle(system, 10 * thread.pid + number, thread)
+    model = analyse(system)
+    assert counts(model)[:3] == (6, 6, 6)
+    assert model.rows(FOUND) == []
+
+
+def test_other_hosts_hold_no_copies(system: RosSystem, analyse: Analyse) -> None:
+    sessions(system, "alpha", "beta")
+    threads = session(0), session(1)
+    create(system, *threads)
+    for number in range(3):
+        cycle(system, number, *threads)
+    model = analyse(system)
+    assert counts(model)[:3] == (6, 6, 6)
+    assert model.rows(FOUND) == []
+
+
+def test_three_sessions(system: RosSystem, analyse: Analyse) -> None:
+    sessions(system, "alpha", "alpha", "alpha")
+    threads = session(0), session(1), session(2)
+    create(system, *threads)
+    for number in range(4):
+        cycle(system, number, *threads)
+    model = analyse(system)
+    assert counts(model) == (4, 4, 4, 4)
+    assert [row[0] for row in model.rows(FOUND)] == [2, 3]
+
+
+def test_the_other_session_stands_in_for_a_cpu(system: RosSystem, analyse: Analyse) -> None:
+    """A session without the buffer of a CPU has no record of what happened there."""
+    sessions(system, "alpha", "alpha")
+    create(system, session(0), session(1))
+    for number in range(4):
+        cycle(system, number, session(0), session(1))
+    for number in range(4, 7):
+        cycle(system, number, session(1, cpu=1))
+    for number in range(7, 16):
+        cycle(system, number, session(0), session(1))
+    for number in range(16, 26):
+        cycle(system, number, session(0))
+    model = analyse(system)
+    assert counts(model) == (26, 26, 26, 26)
+
+
+def test_namespaces_of_process_ids_that_one_session_lacks(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """The initialisation tells the namespace, the rest does not: it is one process."""
+    sessions(system, "alpha", "alpha")
+    create(system, session(0, pid_ns=7))
+    for number in range(3):
+        cycle(system, number, session(1))
+    system.node(session(0, 200, pid_ns=7), 0x1, "other")
+    model = analyse(system)
+    assert counts(model) == (3, 3, 3, 3)
+    assert model.rows("SELECT pid, pid_namespace FROM store.process ORDER BY ALL") == [
+        (100, 7),
+        (200, 7),
+    ]
+    assert model.value("SELECT count(*) FROM thread") == 2
+    assert model.column("SELECT DISTINCT is_inferred FROM publisher") == [False]
+
+
+def test_copies_are_found_where_only_one_session_has_namespaces(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    sessions(system, "alpha", "alpha")
+    threads = session(0), session(1, pid_ns=7)
+    create(system, *threads)
+    for number in range(3):
+        cycle(system, number, *threads)
+    model = analyse(system)
+    assert counts(model) == (3, 3, 3, 3)
+    assert model.column("SELECT pid_namespace FROM store.process") == [7]
+
+
+def test_a_pid_in_several_namespaces_is_left_apart(system: RosSystem, analyse: Analyse) -> None:
+    sessions(system, "alpha", "alpha")
+    for namespace in (1, 2):
+        system.publisher(session(0, pid_ns=namespace), 0x10, f"/{namespace}")
+    system.publish(session(1), 0x10, 1)
+    model = analyse(system)
+    assert model.column("SELECT pid_namespace FROM store.process ORDER BY ALL") == [1, 2, None]

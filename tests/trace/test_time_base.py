@@ -1,0 +1,73 @@
+"""Traces of one boot are on one time base, whatever offset each of them declares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from uuid import UUID
+
+from ctf_writer import Event, Packet, TraceContent, write_trace
+
+from msgflow.trace import PACKET, TraceSet
+
+Open = Callable[..., TraceSet]
+EPOCH = 1_700_000_000_000_000_000
+OTHER_BOOT = UUID(int=7)
+
+
+def write(path: Path, offset: int, times: list[int], **more: object) -> None:
+    packet = Packet([Event(time, "ros2:x", (time,)) for time in times])
+    content = TraceContent(
+        {"ros2:x": {"n": "u64"}},
+        {0: [packet]},
+        trace_uuid=UUID(int=len(times)),
+        offset_cycles=offset,
+        **more,  # type: ignore[arg-type]
+    )
+    write_trace(path, content)
+
+
+def read(traces: TraceSet) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """Return (trace, time) of each event, and (begin, end) of each packet, since the epoch."""
+    events, packets = [], []
+    for batch in traces.batches():
+        for row in batch.batch.to_pylist():
+            if batch.name == PACKET:
+                packets.append((row["begin_ns"] - EPOCH, row["end_ns"] - EPOCH))
+            else:
+                events.append((row["trace_index"], row["ts_ns"] - EPOCH))
+    return events, packets
+
+
+def test_the_first_trace_of_a_boot_decides(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "a", 1_000, [10, 20])
+    write(tmp_path / "b", 400, [15])
+    write(tmp_path / "c", 2_000_000_000, [12, 18, 22])
+    with open_traces(tmp_path) as traces:
+        declared = [info.clock_offset_ns - EPOCH for info in traces.traces]
+        corrections = [info.clock_correction_ns for info in traces.traces]
+        extents = [(i.begin_ns - EPOCH, i.end_ns - EPOCH) for i in traces.traces]  # type: ignore[operator]
+        events, packets = read(traces)
+    assert declared == [1_000, 400, 2_000_000_000]
+    assert corrections == [0, 600, -1_999_999_000]
+    assert extents == [(1_010, 1_020), (1_015, 1_015), (1_012, 1_022)]
+    assert events == [(0, 1_010), (2, 1_012), (1, 1_015), (2, 1_018), (0, 1_020), (2, 1_022)]
+    assert sorted(packets) == [(1_010, 1_020), (1_012, 1_022), (1_015, 1_015)]
+
+
+def test_another_boot_keeps_its_offset(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "a", 1_000, [10])
+    write(tmp_path / "b", 4_000, [15, 16], clock_uuid=OTHER_BOOT)
+    with open_traces(tmp_path) as traces:
+        assert [info.clock_correction_ns for info in traces.traces] == [0, 0]
+        assert read(traces)[0] == [(0, 1_010), (1, 4_015), (1, 4_016)]
+
+
+def test_a_clock_that_counts_no_nanoseconds_is_left_alone(
+    tmp_path: Path, open_traces: Open
+) -> None:
+    write(tmp_path / "a", 1_000, [10], frequency=500_000_000)
+    write(tmp_path / "b", 4_000, [15, 16], frequency=500_000_000)
+    with open_traces(tmp_path) as traces:
+        assert [info.clock_correction_ns for info in traces.traces] == [0, 0]
+        assert read(traces)[0] == [(0, 2_020), (1, 8_030), (1, 8_032)]
