@@ -22,9 +22,7 @@ _STREAM_MAGIC = (b"\xc1\x1f\xfc\xc1", b"\xc1\xfc\x1f\xc1")
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
 
-def describe(
-    library: Bt2Library, location: TraceLocation, index: int, base: TimeBase
-) -> TraceInfo:
+def describe(library: Bt2Library, location: TraceLocation, index: int, base: TimeBase) -> TraceInfo:
     """Read the metadata and the packet index of one trace, and put its clock on `base`.
 
     Raises:

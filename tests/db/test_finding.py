@@ -65,7 +65,9 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         [("database", 3, "two of one")],
     ),
     "overlapping_traces": (
-        {"diagnostic": "trace_id,name,severity,count,detail\n1,overlapping_traces,warning,9,twice\n"},
+        {
+            "diagnostic": "trace_id,name,severity,count,detail\n1,overlapping_traces,warning,9,twice\n"
+        },
         [("trace", 9, "twice")],
     ),
     "started_late": (

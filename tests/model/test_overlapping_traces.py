@@ -16,8 +16,6 @@ FOUND = (
 )
 
 
-
-
 def session(trace: int, pid: int = 100, **more: int) -> Thread:
     return Thread(pid, trace=trace, **more)
 
@@ -97,9 +95,7 @@ def test_a_second_session_counts_nothing_twice(system: RosSystem, analyse: Analy
 
 
 @pytest.mark.parametrize("longer", [0, 1])
-def test_the_usable_rest_of_both_is_kept(
-    system: RosSystem, analyse: Analyse, longer: int
-) -> None:
+def test_the_usable_rest_of_both_is_kept(system: RosSystem, analyse: Analyse, longer: int) -> None:
     """One session begins and ends before the other; in between that with more events is used."""
     threads = session(0), session(1)
     sessions(system, "alpha", "alpha")
@@ -132,10 +128,13 @@ def test_sessions_of_different_events_are_one_record(system: RosSystem, analyse:
     system.add("ros2:rcl_node_init", session(0), node_handle=0x2, node_name="b", namespace="/")
     model = analyse(system)
     assert model.rows(FOUND) == []
-    assert model.rows(
-        "SELECT topic_name, dds_ns IS NOT NULL FROM publication JOIN publisher USING "
-        "(publisher_id)"
-    ) == [("/topic", True)] * 3
+    assert (
+        model.rows(
+            "SELECT topic_name, dds_ns IS NOT NULL FROM publication JOIN publisher USING "
+            "(publisher_id)"
+        )
+        == [("/topic", True)] * 3
+    )
 
 
 def test_sessions_one_after_the_other_are_no_copies(system: RosSystem, analyse: Analyse) -> None:

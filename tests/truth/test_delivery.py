@@ -21,8 +21,6 @@ RECORDED = (
 )
 # A process that computes until the trace ends, and is not heard of again, looks as if it had ended.
 UNDECIDED = {("pending_at_end", "subscription_ended")}
-    "before_discovery", "not_delivered", "pending_at_end", "lost_in_transport", "unknown"
-}  # fmt: skip
 UNDELIVERED = """
     SELECT ph.hostname AS publication_host, pp.pid AS publication_pid,
         b.rmw_ns AS publication_rmw_ns, sh.hostname AS subscription_host,
