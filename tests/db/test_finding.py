@@ -66,7 +66,8 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "overlapping_traces": (
         {
-            "diagnostic": "trace_id,name,severity,count,detail\n1,overlapping_traces,warning,9,twice\n"
+            "diagnostic": "trace_id,name,severity,count,detail\n"
+            "1,overlapping_traces,warning,9,twice\n"
         },
         [("trace", 9, "twice")],
     ),
