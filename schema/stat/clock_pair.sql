@@ -5,10 +5,10 @@
 --     to each other, which is the shortest round trip that was observed once the drift is taken
 --     out, the middle between them is the offset and half the distance bounds its error; the line
 --     there that keeps away from both most is the drift, and the steepest and the flattest line
---     bound its error. With messages in a quarter of the stretches, these bounds of the drift are
---     narrowed: the ways may differ by as much as they like, but that does not change by more than
---     half the round trip from begin to end (Duda 1987; Poirier, Roy and Dagenais 2010;
---     Jabbarifar and Dagenais 2014).
+--     bound its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar and Dagenais 2014).
+--     With messages in a quarter of the stretches, the bound of the drift is narrowed: one way at
+--     one time and the other at another are supposed to take together at least three quarters of
+--     the shortest round trip.
 --     Where no line is possible, the clocks do not run evenly: the line that misses least is
 --     given, and its error at any time is bounded by the fastest messages of each stretch.
 --     Without messages in both directions at the same time, all is NULL.
@@ -121,12 +121,15 @@ SELECT
     coalesce(ceil(m.greatest_miss), floor(l.distance / 2))::BIGINT AS uncertainty_ns,
     CASE
         WHEN l.distance >= 0
-            THEN least(
-                ceil(greatest(l.highest * 1e9 - l.drift_ppb, l.drift_ppb - l.lowest * 1e9)),
-                CASE
-                    WHEN p.stretches >= 64
-                        THEN greatest(floor(l.distance / 2 * 1e9 / p.overlap_ns), 1)
-                END
+            THEN greatest(
+                ceil(
+                    greatest(l.highest * 1e9 - l.drift_ppb, l.drift_ppb - l.lowest * 1e9)
+                    - CASE
+                        WHEN p.stretches >= 64 THEN 0.75 * l.distance * 1e9 / p.overlap_ns
+                        ELSE 0
+                    END
+                ),
+                1
             )
     END::BIGINT AS drift_uncertainty_ppb,
     l.distance >= 0 AS is_even
