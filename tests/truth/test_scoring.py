@@ -53,9 +53,11 @@ def test_quick_comparison_is_faultless():
 
 def test_lost_events_are_not_asked_for(simulation, database):
     scores = _scores(simulation, database)
-    for kind in ("publication", "take", "callback_instance", "transport", "direct"):
+    kinds = ("publication", "take", "callback_instance", "transport", "direct")
+    assert any(scores[kind].decided < scores[kind].happened for kind in kinds)
+    for kind in kinds:
         score = scores[kind]
-        assert 100 < score.decided < score.happened
+        assert 100 < score.decided <= score.happened
         assert (score.wrong, score.missing, score.precision, score.recall) == (0, 0, 1, 1)
     assert scores["transport"].labels.startswith("exact")
 
