@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from msgflow.db.objects import definition_hash, head_revision
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 # Older clients (DBeaver, Grafana, notebooks) read files of this storage version.
@@ -42,6 +44,21 @@ def connect(
     return con
 
 
+def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
+    """Attach an existing, current msgflow database for writing, and make it the current one.
+
+    Raises:
+        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
+    """
+    if not path.exists():
+        raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
+    quoted = str(path).replace("'", "''")
+    with _opening(path):
+        con.execute(f"ATTACH '{quoted}' AS target")
+    con.execute("USE target")
+    require_current(con, path)
+
+
 def open_file(
     path: Path, *, read_only: bool, memory_limit: str | None = None
 ) -> duckdb.DuckDBPyConnection:
@@ -55,11 +72,29 @@ def open_file(
         config["memory_limit"] = memory_limit
     if not read_only:
         config["storage_compatibility_version"] = STORAGE_VERSION
-    try:
+    with _opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
-        # stdout is for data: DuckDB would draw its bar there when a statement takes long.
-        con.execute("SET enable_progress_bar = false")
+        _hide_progress(con)
         return con
+
+
+def open_memory() -> duckdb.DuckDBPyConnection:
+    """Open a new database in memory."""
+    con = duckdb.connect(":memory:")
+    _hide_progress(con)
+    return con
+
+
+def _hide_progress(con: duckdb.DuckDBPyConnection) -> None:
+    """Keep stdout for data: DuckDB would draw its bar there when a statement takes long."""
+    con.execute("SET enable_progress_bar = false")
+
+
+@contextlib.contextmanager
+def _opening(path: Path) -> Iterator[None]:
+    """Raise what opening a file raises as a DatabaseError."""
+    try:
+        yield
     except duckdb.IOException as error:
         text = str(error)
         if "lock" in text.lower():

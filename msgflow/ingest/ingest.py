@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migrate, objects
 from msgflow.db.check import run_checks
-from msgflow.db.connection import connect
+from msgflow.db.connection import attach, open_memory
 from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
 from msgflow.errors import DatabaseError, TraceError, UsageError
@@ -154,21 +155,24 @@ def ingest(
             with (
                 workspace(database) as directory,
                 _target(database, directory) as target,
-                contextlib.closing(connect(target, read_only=False)) as con,
+                contextlib.closing(open_memory()) as con,
             ):
                 memory = Memory(con, memory_limit)
                 con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET preserve_insertion_order = false")
-                if name is not None and not replace:
-                    _require_free_name(con, name)
+                if not target.is_new:
+                    attach(con, target.path)
+                    if name is not None and not replace:
+                        _require_free_name(con, name)
                 staging.attach(con, directory / "raw.duckdb")
                 watch.enter("reading the traces")
-                with memory.loading():
+                with memory.loading(), staging.writing(con):
                     loaded = load_traces(
                         con,
                         traces,
                         hostnames=hostnames,
                         ignore=ignore,
+                        may_hold=not target.is_new,
                         replace=replace,
                         interrupts=interrupts,
                         progress=watch.reading,
@@ -180,6 +184,7 @@ def ingest(
                     lambda: _write(
                         con,
                         memory,
+                        target,
                         names,
                         loaded,
                         (declared, clocks),
@@ -189,12 +194,15 @@ def ingest(
                     ),
                 )
                 watch.enter("closing the database")
+                staging.leave(con)
+                con.execute("CHECKPOINT")
         return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
 
 
 def _write(
     con: duckdb.DuckDBPyConnection,
     memory: Memory,
+    target: _Target,
     names: tuple[str | None, str],
     loaded: Loaded,
     given: tuple[LinksFile | None, ClockSync],
@@ -203,7 +211,10 @@ def _write(
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
     watch.enter("building the model")
-    model.build(con, memory, keep=keep_staging is not None)
+    with staging.writing(con), _created_meanwhile(target):
+        model.build(con, memory, keep=keep_staging is not None)
+    if target.is_new:
+        attach(con, target.path)
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)
@@ -342,15 +353,21 @@ def _hostnames(traces: Sequence[TraceInfo], hosts: Mapping[str, str]) -> dict[in
     return names
 
 
+@dataclass(frozen=True)
+class _Target:
+    """The file to write to: the database, or a new one that takes its place at the end."""
+
+    path: Path
+    is_new: bool
+
+
 @contextlib.contextmanager
-def _target(database: Path, directory: Path) -> Iterator[Path]:
-    """Yield the file to write to: the database, or a new one that takes its place at the end."""
+def _target(database: Path, directory: Path) -> Iterator[_Target]:
     if database.exists():
-        yield database
+        yield _Target(database, is_new=False)
         return
     fresh = directory / "target.duckdb"
-    migrate.create(fresh)
-    yield fresh
+    yield _Target(fresh, is_new=True)
     try:
         os.link(fresh, database)
     except FileExistsError:
@@ -359,6 +376,18 @@ def _target(database: Path, directory: Path) -> Iterator[Path]:
         ) from None
     except OSError:
         os.replace(fresh, database)  # a file system without hard links
+
+
+@contextlib.contextmanager
+def _created_meanwhile(target: _Target) -> Iterator[None]:
+    """Create the database while something else is done that leaves Python alone."""
+    if not target.is_new:
+        yield
+        return
+    with ThreadPoolExecutor(1, "create the database") as executor:
+        created = executor.submit(migrate.create, target.path)
+        yield
+    created.result()
 
 
 class _Watch:

@@ -66,6 +66,7 @@ def load_traces(
     *,
     hostnames: Mapping[int, str],
     ignore: Sequence[str],
+    may_hold: bool,
     replace: bool,
     interrupts: Interrupts,
     progress: Callable[[Progress, float], None] | None,
@@ -73,10 +74,11 @@ def load_traces(
     """Load all wanted events and all packets of `traces`.
 
     Args:
-        con: connection with the target database as current and `staging` attached.
+        con: connection with `raw` and `staging` attached.
         traces: what to read.
         hostnames: trace index -> name of the host, where the user gave one.
         ignore: patterns of event names to leave out, such as 'dds:*'.
+        may_hold: a database is current that may hold some of these packets already.
         replace: packets that the database holds already are no error.
         interrupts: asked at every batch.
         progress: called with the reader's progress and the seconds since the begin.
@@ -102,7 +104,7 @@ def load_traces(
         if progress is not None:
             progress(state, time.monotonic() - started)
 
-    tables = _Tables(con, replace)
+    tables = _Tables(con, may_hold=may_hold, may_replace=replace)
 
     def read(corrections: Corrections | None) -> None:
         batches = traces.batches(wanted, progress=report)
@@ -119,18 +121,11 @@ def load_traces(
                 con.rollback()
             raise
 
-    # What is staged is written once and read a few times: compressing it costs more than it saves.
-    con.execute("SET force_compression = 'uncompressed'")
-    con.execute("SET wal_autocheckpoint = '1TB'")
-    try:
-        read(None)
-        corrections = reconciled.find(con)
-        if corrections:
-            staging.empty(con)
-            read(corrections)
-    finally:
-        con.execute("RESET force_compression")
-        con.execute("RESET wal_autocheckpoint")
+    read(None)
+    corrections = reconciled.find(con)
+    if corrections:
+        staging.empty(con)
+        read(corrections)
     for (trace_index, name), count in traces.event_counts.items():
         con.execute(
             "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",
@@ -181,9 +176,12 @@ class _Tables:
         replaced: ids of the runs that hold some of the packets added already.
     """
 
-    def __init__(self, con: duckdb.DuckDBPyConnection, replace: bool) -> None:
+    def __init__(
+        self, con: duckdb.DuckDBPyConnection, *, may_hold: bool, may_replace: bool
+    ) -> None:
         self._con = con
-        self._may_replace = replace
+        self._may_hold = may_hold
+        self._may_replace = may_replace
         self._uncommitted = 0
         self.replaced: set[int] = set()
 
@@ -194,7 +192,7 @@ class _Tables:
             UsageError: the database holds these packets already, and must not replace them.
         """
         table, rows = item
-        if table == PACKET:
+        if table == PACKET and self._may_hold:
             self.replaced |= self._same_packets(rows)
         self._con.register("rows_read", rows)
         self._con.execute(f"INSERT INTO raw.{table} SELECT * FROM rows_read")

@@ -22,6 +22,9 @@ DEFAULT_LIMIT = "560MB"
 _LOADING_LIMIT = "288MB"
 _SHARE_OF_MACHINE = 0.7
 
+# What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
+_KEPT_BLOCKS = "256MB"
+
 
 class Memory:
     """The memory limit of a connection: fixed by the user, or growing from a modest default."""
@@ -31,6 +34,7 @@ class Memory:
         self._is_fixed = limit is not None
         self._limit = limit or DEFAULT_LIMIT
         self._set(self._limit)
+        con.execute("SET block_allocator_memory = ?", [_KEPT_BLOCKS])
 
     @contextlib.contextmanager
     def loading(self) -> Iterator[None]:

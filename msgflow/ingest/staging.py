@@ -10,12 +10,13 @@ objects of `schema/model`.
 
 from __future__ import annotations
 
+import contextlib
 from typing import TYPE_CHECKING
 
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Tracepoint, load
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     import duckdb
@@ -93,6 +94,28 @@ def empty(con: duckdb.DuckDBPyConnection) -> None:
     tables = [tracepoint.table for tracepoint in load().tracepoints.values()]
     for table in (*tables, "packet", "thread", "thread_name"):
         con.execute(f"TRUNCATE raw.{table}")
+
+
+@contextlib.contextmanager
+def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
+    """Keep `raw` as it is first written, meanwhile.
+
+    It is read a few times and thrown away: writing it anew, or compressed, costs more than it
+    saves.
+    """
+    con.execute("SET force_compression = 'uncompressed'")
+    con.execute("SET wal_autocheckpoint = '1TB'")
+    yield
+    con.execute("RESET force_compression")
+    con.execute("RESET wal_autocheckpoint")
+
+
+def leave(con: duckdb.DuckDBPyConnection) -> None:
+    """Let the connection close without writing `raw` once more.
+
+    That holds for all databases of the connection: what must last needs a checkpoint before.
+    """
+    con.execute("PRAGMA disable_checkpoint_on_shutdown")
 
 
 def _event_view(tracepoints: Sequence[Tracepoint]) -> str:

@@ -14,6 +14,6 @@ WITH found AS (
 SELECT
     s.event_id AS start_event_id, f.end_event_id, s.ts_ns AS start_ns, f.end_ns, s.trace_index,
     s.thread_id, s.process_id, s.callback_handle, s.is_intra_process, s.previous_event_id,
-    s.previous_executor_event_id, s.executor_event_id, f.is_plain
+    s.previous_callback_event_id, s.previous_executor_event_id, s.executor_event_id, f.is_plain
 FROM staging.callback_event AS s
 JOIN found AS f ON s.event_id = f.start_event_id

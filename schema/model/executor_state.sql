@@ -21,12 +21,12 @@ WITH state AS (
     FROM staging.executor_event
     GROUP BY thread_id
 ),
+-- The first run of a callback after the event: the callback event before it was earlier.
 first_run AS (
-    SELECT p.executor_event_id, min(c.callback_instance_id) AS callback_instance_id
+    SELECT p.executor_event_id, c.callback_instance_id
     FROM staging.callback_pair AS p
     JOIN staging.callback_instance AS c ON p.start_event_id = c.start_event_id
-    WHERE p.executor_event_id IS NOT NULL
-    GROUP BY p.executor_event_id
+    WHERE coalesce(p.previous_callback_event_id < p.executor_event_id, true)
 )
 SELECT
     t.executor_id,
