@@ -17,24 +17,29 @@ WITH received AS (
         PARTITION BY t.subscription_id, t.source_timestamp_ns ORDER BY t.take_id
     ) = 1
 ),
+sent AS (
+    SELECT
+        r.run_id, r.take_id, r.subscription_id, r.publication_id, r.candidate_count,
+        b.publisher_id, b.trace_id, b.start_ns,
+        coalesce(b.next_event_ns, b.end_ns + 5000000) AS until_ns
+    FROM received AS r
+    JOIN store.publication AS b ON r.publication_id = b.publication_id
+),
 affected AS (
-    SELECT b.publication_id
-    FROM store.publication AS b
+    SELECT s.take_id
+    FROM sent AS s
     ASOF JOIN store.loss_interval AS l
-        ON b.trace_id = l.trace_id
-        AND coalesce(b.next_event_ns, b.end_ns + 5000000) >= l.start_ns
-    WHERE l.end_ns >= b.start_ns
-        AND b.publication_id IN (SELECT publication_id FROM received)
+        ON s.trace_id = l.trace_id AND s.until_ns >= l.start_ns
+    WHERE l.end_ns >= s.start_ns
 )
 SELECT
-    r.run_id,
-    r.publication_id,
-    r.take_id,
-    b.publisher_id,
-    r.subscription_id,
+    s.run_id,
+    s.publication_id,
+    s.take_id,
+    s.publisher_id,
+    s.subscription_id,
     'nearest' AS method,
-    r.candidate_count,
-    a.publication_id IS NOT NULL AS is_loss_affected
-FROM received AS r
-JOIN store.publication AS b ON r.publication_id = b.publication_id
-LEFT JOIN affected AS a ON r.publication_id = a.publication_id
+    s.candidate_count,
+    a.take_id IS NOT NULL AS is_loss_affected
+FROM sent AS s
+LEFT JOIN affected AS a ON s.take_id = a.take_id
