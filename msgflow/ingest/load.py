@@ -194,9 +194,7 @@ class _Tables:
         table, rows = item
         if table == PACKET and self._may_hold:
             self.replaced |= self._same_packets(rows)
-        self._con.register("rows_read", rows)
-        self._con.execute(f"INSERT INTO raw.{table} SELECT * FROM rows_read")
-        self._con.unregister("rows_read")
+        self._con.from_arrow(rows).insert_into(f"raw.main.{table}")
         self._uncommitted += rows.num_rows
         if self._uncommitted >= _ROWS_PER_TRANSACTION:
             self._con.commit()
