@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 DEFAULT_LIMIT = "560MB"
-_LOADING_LIMIT = "288MB"
+_LOADING_LIMIT = "352MB"
 _SHARE_OF_MACHINE = 0.7
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
