@@ -8,6 +8,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.extent import DynamicError, is_dense, lay_out
+from msgflow.trace.ctf.tail import Tail, compile_tail, dtype_of, is_selector
 from msgflow.trace.ctf.types import (
     BYTE,
     Array,
@@ -18,6 +19,7 @@ from msgflow.trace.ctf.types import (
     String,
     Structure,
     Type,
+    Variant,
 )
 from msgflow.trace.ctf.walk import FieldError
 
@@ -52,7 +54,7 @@ class PlainField:
         width: bytes of the number or element.
         count: of the elements of an array, otherwise 1.
         length_at: for a sequence, the place in the list of the field with its length.
-        is_length: it is the length of a sequence.
+        is_length: it is the length of a sequence, or chooses the option of the tail.
         type: as declared.
         size: in bytes, None if it varies.
     """
@@ -84,11 +86,17 @@ class EventBody:
         fields: its fields in order; None if they must be read one by one.
         sizes: of the whole in bytes, by residue of its position; None if that varies.
         offsets: of each field, by residue; None if the sizes are.
+        tail: the variant behind the fields, None if there is none.
+        tail_name: its name in the payload.
+        selector: place in the list of the field that chooses its option.
     """
 
     fields: tuple[PlainField, ...] | None
     sizes: tuple[int, ...] | None
     offsets: tuple[tuple[int, ...], ...] | None
+    tail: Tail | None = None
+    tail_name: str = ""
+    selector: int = -1
 
     def end(self, data: bytearray, position: int, limit: int) -> int:
         """Return the byte at which the body that begins at `position` ends.
@@ -117,6 +125,8 @@ class EventBody:
             position += size
             if position > limit:
                 raise FieldError("a field goes beyond the end of the packet")
+        if self.tail is not None:
+            return self.tail.end(data, position, lengths[self.selector], limit)
         return position
 
 
@@ -133,15 +143,38 @@ def compile_body(stream: StreamClass, event: EventClass, residues: int) -> Event
         Scope.SPECIFIC_CONTEXT: event.specific_context,
         Scope.PAYLOAD: event.payload,
     }
+    sizes = _sizes(list(structures.values()), residues)
+    last = event.payload.members[-1] if event.payload.members else None
+    variant = last.type if last is not None and isinstance(last.type, Variant) else None
+    if variant is not None:
+        before = Structure(event.payload.members[:-1], event.payload.align)
+        structures[Scope.PAYLOAD] = before
     fields: list[PlainField] | None = []
     for scope, structure in structures.items():
         if fields is not None:
             fields = _add_fields(fields, scope, structure)
-    sizes = _sizes(list(structures.values()), residues)
+    if fields is not None and variant is not None and last is not None:
+        return _with_tail(fields, variant, last.name)
     offsets = None
     if fields is not None and sizes is not None:
         offsets = tuple(zip(*(_offsets(fields, r) for r in range(residues)), strict=True))
     return EventBody(None if fields is None else tuple(fields), sizes, offsets)
+
+
+def _with_tail(fields: list[PlainField], variant: Variant, name: str) -> EventBody:
+    reference, tail = variant.selector, compile_tail(variant)
+    for number, field in enumerate(fields):
+        if (
+            tail is not None
+            and reference.path == (field.name,)
+            and field.scope is Scope.PAYLOAD
+            and reference.scope in {None, Scope.PAYLOAD}
+            and field.type is not None
+            and is_selector(field.type)
+        ):
+            fields[number] = replace(field, is_length=True)
+            return EventBody(tuple(fields), None, None, tail, name, number)
+    return EventBody(None, None, None)
 
 
 def _sizes(structures: list[Structure], residues: int) -> tuple[int, ...] | None:
@@ -199,7 +232,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
                 name,
                 Kind.NUMBER,
                 align,
-                _dtype(declared),
+                dtype_of(declared),
                 declared.size // BYTE,
                 type=declared,
             )
@@ -212,7 +245,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
                 name,
                 kind,
                 align,
-                _dtype(element),
+                dtype_of(element),
                 element.size // BYTE,
                 declared.length,
                 type=declared,
@@ -229,7 +262,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
                 name,
                 kind,
                 align,
-                _dtype(element),
+                dtype_of(element),
                 element.size // BYTE,
                 length_at=length_at,
                 type=declared,
@@ -240,11 +273,6 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
 
 def _is_plain_element(element: Type) -> bool:
     return isinstance(element, Integer | Real) and element.size in _WIDTHS and is_dense(element)
-
-
-def _dtype(number: Integer | Real) -> str:
-    kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
-    return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"
 
 
 def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) -> int | None:
