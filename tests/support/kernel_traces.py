@@ -176,8 +176,14 @@ def _split(
 ) -> Iterable[list[tuple[int, bytes]]]:
     part: list[tuple[int, bytes]] = []
     size = 0
+    latest = 0
     for event in events:
-        record = _record(event, names, trace)
+        cycles, place = event.time_ns - trace.offset_ns, names.index(event.name)
+        head = struct.pack("<HI", place, cycles & 0xFFFFFFFF)
+        if cycles - latest >= 1 << 32:
+            head = struct.pack("<HIQ", 65535, place, cycles)
+        record = head + _body(event, trace)
+        latest = cycles
         if size + len(record) > _CONTENT_BYTES:
             yield part
             part, size = [], 0
@@ -187,10 +193,10 @@ def _split(
         yield part
 
 
-def _record(event: KernelEvent, names: Sequence[str], trace: KernelTrace) -> bytes:
-    head = struct.pack("<HIQ", 65535, names.index(event.name), event.time_ns - trace.offset_ns)
+def _body(event: KernelEvent, trace: KernelTrace) -> bytes:
+    head = b""
     if trace.contexts:
-        head += struct.pack("<ii17s", 4242, 4243, b"swapper/0")
+        head = struct.pack("<ii17s", 4242, 4243, b"swapper/0")
     if event.name == NOISE:
         return head + struct.pack("<16siiq16sii", b"swapper", 0, 20, 0, b"ros", 7, 20)
     if event.name in {SENT, RECEIVED, "net_if_rx"}:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from enum import Enum
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 from msgflow.trace.ctf.extent import DynamicError, is_dense, lay_out
 from msgflow.trace.ctf.tail import Tail, compile_tail, dtype_of, is_selector
@@ -98,31 +99,55 @@ class EventBody:
     tail_name: str = ""
     selector: int = -1
 
+    @cached_property
+    def _orders(self) -> tuple[Literal["big", "little"], ...]:
+        """Byte orders of the fields."""
+        return tuple("big" if field.dtype[0] == ">" else "little" for field in self.fields or ())
+
+    @cached_property
+    def _steps(self) -> tuple[tuple[int, int, Kind, int], ...]:
+        """What leads from the begin of a body to its end, as few steps as possible.
+
+        Alignment, and what follows: NOTHING goes on by so many bytes, NUMBER is a length or
+        selector of so many bytes, STRING is a text, and of SEQUENCE there are as many elements of
+        so many bytes as the field of that number says.
+        """
+        steps: list[tuple[int, int, Kind, int]] = []
+        for number, field in enumerate(self.fields or ()):
+            if field.kind is Kind.STRING:
+                steps.append((field.align, 0, Kind.STRING, number))
+            elif field.size is None:
+                steps.append((field.align, field.width, Kind.SEQUENCE, field.length_at))
+            elif field.is_length:
+                steps.append((field.align, field.size, Kind.NUMBER, number))
+            elif steps and steps[-1][2] is Kind.NOTHING and field.align == 1:
+                steps[-1] = (steps[-1][0], steps[-1][1] + field.size, Kind.NOTHING, number)
+            else:
+                steps.append((field.align, field.size, Kind.NOTHING, number))
+        return tuple(steps)
+
     def end(self, data: bytearray, position: int, limit: int) -> int:
         """Return the byte at which the body that begins at `position` ends.
 
         Raises:
             FieldError: it does not fit in front of the byte `limit`.
         """
-        assert self.fields is not None
         lengths: dict[int, int] = {}
-        for number, field in enumerate(self.fields):
-            position = (position + field.align - 1) & -field.align
-            size = field.size
-            if size is None:
-                if field.kind is Kind.STRING:
-                    size = data.find(0, position, limit) + 1 - position
-                    if size <= 0:
-                        raise FieldError("a text does not end within the packet")
-                else:
-                    size = lengths[field.length_at] * field.width
-            elif field.is_length:
-                order = "big" if field.dtype[0] == ">" else "little"
-                lengths[number] = int.from_bytes(
-                    data[position : position + size],
-                    order,  # type: ignore[arg-type]
-                )
-            position += size
+        for align, size, kind, number in self._steps:
+            if align > 1:
+                position = (position + align - 1) & -align
+            if kind is Kind.NOTHING:
+                position += size
+            elif kind is Kind.STRING:
+                position = data.find(0, position, limit) + 1
+                if position == 0:
+                    raise FieldError("a text does not end within the packet")
+            elif kind is Kind.NUMBER:
+                content = data[position : position + size]
+                lengths[number] = int.from_bytes(content, self._orders[number])
+                position += size
+            else:
+                position += lengths[number] * size
             if position > limit:
                 raise FieldError("a field goes beyond the end of the packet")
         if self.tail is not None:
