@@ -17,9 +17,7 @@ def upgrade() -> None:
     op.create_table(
         "link_packet",
         sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
-        sa.Column(
-            "sent_trace_id", sa.BigInteger(), nullable=False, comment="Trace of its sender"
-        ),
+        sa.Column("sent_trace_id", sa.BigInteger(), nullable=False, comment="Trace of its sender"),
         sa.Column(
             "received_trace_id", sa.BigInteger(), nullable=False, comment="Trace of its receiver"
         ),

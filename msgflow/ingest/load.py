@@ -173,9 +173,7 @@ def _placed(
                 yield tracepoints[name].table, rows
 
 
-def without_thread(
-    tracepoint: Tracepoint, batch: pa.RecordBatch
-) -> tuple[str, pa.RecordBatch]:
+def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, pa.RecordBatch]:
     """Return table and rows of an event of the kernel, whose contexts say nothing."""
     columns = [name for name, _ in tracepoint.common_columns]
     columns += [field.name for field in tracepoint.fields]

@@ -83,7 +83,7 @@ SELECT
     sum(e.event_count)::BIGINT AS count,
     'events that are not in the catalogue and were not loaded: '
     || CASE
-        WHEN s.domain = 'kernel' THEN printf('%d kinds of the kernel', count(*))
+        WHEN s.domain = 'kernel' THEN printf('kernel events of %d names', count(*))
         ELSE string_agg(printf('%s (%d)', e.name, e.event_count), ', ' ORDER BY e.name)
     END AS detail
 FROM staging.event_count AS e

@@ -1,10 +1,11 @@
 -- name: derive.clock_envelope
 -- kind: macro
 -- description: The fastest messages and packets between two clocks, of each direction, in 256
---     stretches of the time, and which of them are corners of the convex hull: the lower envelope of the delays.
---     Leaving out others can only widen what they allow. So that a drift does not
---     hide which was fastest, its rough size (the regression through the fastest of each stretch as they are) is taken out for the choice. Times count from `base_ns`, and
---     differences from `base_bound_ns`, which keeps them exact as DOUBLE.
+--     stretches of the time, and which of them are corners of the convex hull: the lower envelope
+--     of the delays. Leaving out others can only widen what they allow. So that a drift does not
+--     hide which was fastest, its rough size (the regression through the fastest of each stretch as
+--     they are) is taken out for the choice. Times count from `base_ns`, and differences from
+--     `base_bound_ns`, which keeps them exact as DOUBLE.
 -- grain: one row per pair of clocks, direction and stretch of the time
 -- needs: derive.clock_bound
 CREATE OR REPLACE MACRO derive.clock_envelope(of_run) AS TABLE

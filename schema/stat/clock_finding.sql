@@ -1,7 +1,7 @@
 -- name: derive.clock_finding
 -- kind: macro
--- description: What messages and packets cannot tell of the clocks: those that nothing connects with the
---     others, and why, and those that do not run evenly.
+-- description: What messages and packets cannot tell of the clocks: those that nothing connects
+--     with the others, and why, and those that do not run evenly.
 -- grain: one row per pair of clocks or clock
 -- needs: store.host, derive.clock_pair, derive.clock_sync
 CREATE OR REPLACE MACRO derive.clock_finding(of_run) AS TABLE

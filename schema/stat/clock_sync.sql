@@ -1,9 +1,9 @@
 -- name: derive.clock_sync
 -- kind: macro
 -- description: How the times of each clock become those of a reference: the first clock of those
---     that messages or packets in both directions connect. A clock that exchanges none with the reference is
---     joined through others, along the chain with the smallest sum of uncertainties; the errors of
---     its steps add up.
+--     that messages or packets in both directions connect. A clock that exchanges none with the
+--     reference is joined through others, along the chain with the smallest sum of uncertainties;
+--     the errors of its steps add up.
 -- grain: one row per clock
 -- needs: store.clock, derive.clock_pair
 CREATE OR REPLACE MACRO derive.clock_sync(of_run) AS TABLE

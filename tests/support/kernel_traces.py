@@ -106,7 +106,6 @@ class KernelTrace:
         events: in any order.
         with_network: whether the classes of network packets are declared.
         contexts: whether events carry the contexts vpid, vtid and procname.
-        begin_ns: of the first packet of the trace; that of the first event if None.
     """
 
     hostname: str
@@ -115,7 +114,6 @@ class KernelTrace:
     events: Sequence[KernelEvent] = ()
     with_network: bool = True
     contexts: bool = False
-    begin_ns: int | None = None
     cpus: int = 2
     trace_uuid: uuid.UUID = field(default_factory=uuid.uuid4)
 
@@ -135,7 +133,6 @@ def kernel_trace_of(
             tuple(events),
             with_network=with_network,
             contexts=contexts,
-            begin_ns=info.begin_ns,
         )
 
 
@@ -150,7 +147,7 @@ def write_kernel_trace(directory: Path, trace: KernelTrace) -> Path:
             key=lambda event: event.time_ns,
         )
         data = b""
-        begin = trace.begin_ns
+        begin: int | None = None
         for sequence, records in enumerate(_split(events, names, trace)):
             first, last = records[0][0], records[-1][0]
             content = b"".join(record for _, record in records)
@@ -218,7 +215,9 @@ def _packet(
     return (head + content).ljust(size, b"\0")
 
 
-def _integer(size: int, *, align: int = 8, signed: int = 0, base: int = 10, big: bool = False) -> str:
+def _integer(
+    size: int, *, align: int = 8, signed: int = 0, base: int = 10, big: bool = False
+) -> str:
     order = " byte_order = be;" if big else ""
     return (
         f"integer {{ size = {size}; align = {align}; signed = {signed};"

@@ -179,16 +179,16 @@ def _blocks(
         if block.tail is not None:
             selected = _values(memory, at, block.parts[block.selector])
             inner = _blocks(block.tail, memory, chosen, at + block.size, selected)
-            for name, *found in inner:
-                yield (f"{choice.name}.{block.name}.{name}", *found)
+            for name, found, found_at, inner_block in inner:
+                yield f"{choice.name}.{block.name}.{name}", found, found_at, inner_block
 
 
 def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:
-    view = memory.view(part.dtype)
-    if part.count is None:
-        return view[at + part.offset]
-    places = (at + part.offset)[:, np.newaxis] + np.arange(part.count) * part.width
-    return view[places]
+    places = at + part.offset
+    if part.count is not None:
+        places = places[:, np.newaxis] + np.arange(part.count) * part.width
+    values: NDArray[Any] = memory.view(part.dtype)[places]
+    return values
 
 
 def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]:

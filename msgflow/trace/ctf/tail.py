@@ -76,15 +76,14 @@ class Tail:
         Raises:
             FieldError: there is none.
         """
-        found = self._chosen.get(value)
-        if found is None:
-            for choice, found in self.options:
+        chosen = self._chosen.get(value)
+        if chosen is None:
+            for choice, block in self.options:
                 if choice.holds(value):
-                    break
-            else:
-                raise FieldError(f"a variant has no option for the value {value}")
-            self._chosen[value] = found
-        return found
+                    self._chosen[value] = block
+                    return block
+            raise FieldError(f"a variant has no option for the value {value}")
+        return chosen
 
     def has(self, path: Sequence[str]) -> bool:
         """Tell whether a field can be read that is named by its option and what is around it."""
@@ -164,11 +163,12 @@ def _part(leaf: Leaf) -> Part | None:
     """Return where a number or array lies; None if that is not on whole bytes."""
     if leaf.position % BYTE:
         return None
-    element, count = leaf.type, None
-    if isinstance(element, Array):
-        if element.is_text or not is_dense(element.element):
+    element: Type = leaf.type
+    count: int | None = None
+    if isinstance(leaf.type, Array):
+        if leaf.type.is_text or not is_dense(leaf.type.element):
             return None
-        element, count = element.element, element.length
+        element, count = leaf.type.element, leaf.type.length
     if not isinstance(element, Integer | Real) or not _is_whole(element):
         return None
     return Part(leaf.position // BYTE, dtype_of(element), element.size // BYTE, count)
