@@ -14,7 +14,8 @@ WITH clock_name AS (
 pair AS MATERIALIZED (
     SELECT
         p.clock_id, p.other_clock_id, c.name, o.name AS other_name, p.received_count,
-        p.sent_count, p.received_packet_count, p.sent_packet_count, p.offset_ns, p.uncertainty_ns, p.is_even
+        p.sent_count, p.received_packet_count, p.sent_packet_count, p.offset_ns,
+        p.uncertainty_ns, p.is_even
     FROM derive.clock_pair(of_run) AS p
     JOIN clock_name AS c ON p.clock_id = c.clock_id
     JOIN clock_name AS o ON p.other_clock_id = o.clock_id
