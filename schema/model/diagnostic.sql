@@ -252,7 +252,7 @@ SELECT
     printf(
         'of %d network packets sent and %d received on %s, %d were seen on both ends; not used: '
         || '%d that nothing tells from others, %d whose like was seen less than 2 s before or '
-        || 'after or sent by several hosts, %d of which the other end was not seen',
+        || 'after or sent by several hosts, %d whose other end was not seen or cannot be told',
         u.sent, u.number - u.sent, u.hosts, l.links, u.unknown, u.repeated, u.single - l.ends
     )
 FROM packet_use AS u

@@ -1,19 +1,61 @@
 -- name: staging.link_packet
--- description: Packets seen being sent on one clock and received on another. Keys that occur once
---     in the whole run tell roughly how far two clocks are apart (the median, which a few packets
---     mistaken for others do not move); two ends of a key belong together where they are within one
---     second of that.
+-- description: Packets seen being sent on one clock and received on another. Roughly how far two
+--     clocks are apart is what most ends of equal keys agree on to within a second, those of the
+--     rarest keys, unless another difference does nearly as well; two ends of a key belong together
+--     where they are within one second of that.
 -- grain: one row per packet and clock that received it
 -- needs: raw, staging.single_packet
-WITH apart AS (
+WITH counted AS (
+    SELECT clock_id, is_sent, key, count(*) AS number
+    FROM staging.single_packet
+    GROUP BY clock_id, is_sent, key
+),
+shared AS (
+    SELECT s.clock_id AS from_clock_id, r.clock_id AS to_clock_id, s.key
+    FROM counted AS s
+    JOIN counted AS r ON s.key = r.key
+    WHERE s.is_sent AND NOT r.is_sent AND s.clock_id <> r.clock_id
+    QUALIFY sum(s.number * r.number) OVER (
+        PARTITION BY s.clock_id, r.clock_id ORDER BY s.number * r.number, s.key
+        ROWS UNBOUNDED PRECEDING
+    ) <= 1_000_000
+),
+difference AS (
+    SELECT k.from_clock_id, k.to_clock_id, r.ts_ns - s.ts_ns AS way_ns
+    FROM shared AS k
+    JOIN staging.single_packet AS s ON k.key = s.key AND k.from_clock_id = s.clock_id
+    JOIN staging.single_packet AS r ON k.key = r.key AND k.to_clock_id = r.clock_id
+    WHERE s.is_sent AND NOT r.is_sent
+),
+-- Each difference votes for both of the stretches of two seconds that it lies in.
+stretch AS (
     SELECT
-        s.clock_id AS from_clock_id,
-        r.clock_id AS to_clock_id,
-        quantile_disc(r.ts_ns - s.ts_ns, 0.5) AS shift_ns
-    FROM staging.single_packet AS s
-    JOIN staging.single_packet AS r ON s.key = r.key
-    WHERE s.is_sent AND NOT r.is_sent AND s.is_only AND r.is_only AND s.clock_id <> r.clock_id
-    GROUP BY s.clock_id, r.clock_id
+        from_clock_id, to_clock_id, second, count(*) AS votes,
+        quantile_disc(way_ns, 0.5) AS shift_ns
+    FROM (
+        SELECT
+            from_clock_id, to_clock_id, way_ns,
+            unnest([floor(way_ns / 1e9)::BIGINT, floor(way_ns / 1e9)::BIGINT + 1]) AS second
+        FROM difference
+    )
+    GROUP BY from_clock_id, to_clock_id, second
+),
+elected AS (
+    SELECT from_clock_id, to_clock_id, second, votes, shift_ns
+    FROM stretch
+    QUALIFY row_number() OVER (
+        PARTITION BY from_clock_id, to_clock_id ORDER BY votes DESC, second
+    ) = 1
+),
+apart AS (
+    SELECT e.from_clock_id, e.to_clock_id, e.shift_ns
+    FROM elected AS e
+    LEFT JOIN stretch AS o
+        ON e.from_clock_id = o.from_clock_id
+        AND e.to_clock_id = o.to_clock_id
+        AND abs(e.second - o.second) > 1
+    GROUP BY e.from_clock_id, e.to_clock_id, e.shift_ns, e.votes
+    HAVING coalesce(max(o.votes), 0) * 1.2 <= e.votes
 ),
 -- When it should be received; a second before or after that is the same or a neighbouring second.
 due AS (

@@ -8,8 +8,7 @@ WITH spaced AS (
     SELECT
         event_id, trace_id, clock_id, ts_ns, is_sent, key,
         coalesce(ts_ns - lag(ts_ns) OVER along >= 2_000_000_000, true) AS is_first,
-        coalesce(lead(ts_ns) OVER along - ts_ns >= 2_000_000_000, true) AS is_last,
-        count(*) OVER (PARTITION BY clock_id, is_sent, key) AS number
+        coalesce(lead(ts_ns) OVER along - ts_ns >= 2_000_000_000, true) AS is_last
     FROM staging.network_packet
     WHERE key IS NOT NULL
     WINDOW along AS (PARTITION BY clock_id, is_sent, key ORDER BY ts_ns, event_id)
@@ -21,7 +20,7 @@ sent_twice AS (
     GROUP BY key
     HAVING min(clock_id) < max(clock_id)
 )
-SELECT p.event_id, p.trace_id, p.clock_id, p.ts_ns, p.is_sent, p.key, p.number = 1 AS is_only
+SELECT p.event_id, p.trace_id, p.clock_id, p.ts_ns, p.is_sent, p.key
 FROM spaced AS p
 ANTI JOIN sent_twice AS t ON p.key = t.key
 WHERE p.is_first AND p.is_last
