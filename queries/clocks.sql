@@ -6,7 +6,8 @@
 -- grain: one row per clock
 -- column: run_id BIGINT                       Run
 -- column: hosts VARCHAR                       Hosts that have it
--- column: method VARCHAR                      'messages' or 'file'; 'none': as recorded
+-- column: method VARCHAR                      'messages', 'packets' (those of kernel traces as
+--     well) or 'file'; 'none': as recorded
 -- column: reference VARCHAR                   Hosts of the clock whose times its times become;
 --     NULL: not brought together with others
 -- column: offset_ns BIGINT [ns]               Added to its times

@@ -454,6 +454,22 @@ CREATE TABLE store.link_transport (
     is_loss_affected BOOLEAN NOT NULL            -- A gap of the trace may hide a better partner
 );
 
+-- One row per network packet and clock that received it from another.
+CREATE TABLE store.link_packet (
+    run_id              BIGINT NOT NULL,         -- Run that the row belongs to -> run.run_id
+    sent_trace_id       BIGINT NOT NULL,         -- Trace of its sender -> trace.trace_id
+    received_trace_id   BIGINT NOT NULL,         -- Trace of its receiver -> trace.trace_id
+    sent_ns             BIGINT NOT NULL,         -- Handed to the network device [epoch ns]
+    received_ns         BIGINT NOT NULL,         -- Came from the network device [epoch ns]
+    protocol            VARCHAR NOT NULL,        -- 'tcp' or 'udp'
+    source_address      VARCHAR NOT NULL,        -- IP address that it was sent from
+    source_port         INTEGER NOT NULL,        -- Port that it was sent from
+    destination_address VARCHAR NOT NULL,        -- IP address that it was sent to
+    destination_port    INTEGER NOT NULL,        -- Port that it was sent to
+    identification      INTEGER,                 -- Identification of the datagram; NULL: IPv6 has none
+    sequence_number     BIGINT                   -- Sequence number of its first byte; NULL: not TCP
+);
+
 -- One row per callback run, or take outside of any, that led to a publication.
 CREATE TABLE store.link_causal (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id

@@ -28,8 +28,8 @@ def apply(
         str,
         typer.Argument(
             metavar="none|messages|FILE",
-            help="As recorded, by the messages between hosts, or by the offsets in a YAML or TOML"
-            " file",
+            help="As recorded, by the messages between hosts (and the network packets of their"
+            " kernel traces), or by the offsets in a YAML or TOML file",
         ),
     ],
     run: RunOption = None,
@@ -46,6 +46,14 @@ def apply(
             clocks = opened.query("clocks", run=one.run_id).to_arrow().to_pylist()
             corrected = [clock for clock in clocks if clock["method"] != "none"]
             print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks show")
+            pairs = opened.query("clock-pairs", run=one.run_id).to_arrow().to_pylist()
+            if how == "messages" and pairs:
+                messages = sum(pair["message_count"] for pair in pairs)
+                packets = sum(pair["packet_count"] for pair in pairs)
+                print_status(
+                    f"by {messages:,} messages and {packets:,} network packets:"
+                    " msgflow clocks pairs"
+                )
             findings = opened.query("info-diagnostics", run=one.run_id).to_arrow().to_pylist()
             for finding in findings:
                 if finding["name"].startswith("clock_"):
@@ -65,4 +73,20 @@ def show(
 
     with Database(database) as opened:
         result = opened.query("clocks", run=run)
+    print_result(result, form, output)
+
+
+@app.command("pairs")
+def pairs(
+    run: RunOption = None,
+    form: FormatOption = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Count the messages and packets that tell how far clocks are apart: the query clock-pairs."""
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        result = opened.query("clock-pairs", run=run)
     print_result(result, form, output)

@@ -57,8 +57,8 @@ def command(
         typer.Option(
             "--clock-sync",
             metavar="none|messages|FILE",
-            help="Bring the clocks of several hosts together: by their messages, or by offsets in a"
-            " file",
+            help="Bring the clocks of several hosts together: by their messages (and the network"
+            " packets of kernel traces), or by offsets in a file",
         ),
     ] = "none",
     reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (

@@ -42,7 +42,11 @@ UPDATE store.clock SET
     offset_ns = sync.offset_ns, drift_ppb = sync.drift_ppb, reference_ns = sync.reference_ns,
     uncertainty_ns = sync.uncertainty_ns, drift_uncertainty_ppb = sync.drift_uncertainty_ppb,
     reference_clock_id = sync.reference_clock_id,
-    method = CASE WHEN sync.clock_id = sync.reference_clock_id THEN 'none' ELSE 'messages' END
+    method = CASE
+        WHEN sync.clock_id = sync.reference_clock_id THEN 'none'
+        WHEN sync.has_packets THEN 'packets'
+        ELSE 'messages'
+    END
 FROM (
     SELECT *, count(*) OVER (PARTITION BY reference_clock_id) AS number
     FROM derive.clock_sync($run_id)

@@ -695,6 +695,23 @@ link_transport = _table(
     _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
 )
 
+link_packet = _table(
+    "link_packet",
+    "One row per network packet and clock that received it from another",
+    _run(),
+    _reference("sent_trace_id", "Trace of its sender", to="trace.trace_id", required=True),
+    _reference("received_trace_id", "Trace of its receiver", to="trace.trace_id", required=True),
+    _time("sent_ns", "Handed to the network device", required=True),
+    _time("received_ns", "Came from the network device", required=True),
+    _text("protocol", "'tcp' or 'udp'", required=True),
+    _text("source_address", "IP address that it was sent from", required=True),
+    _column("source_port", Integer, "Port that it was sent from", required=True),
+    _text("destination_address", "IP address that it was sent to", required=True),
+    _column("destination_port", Integer, "Port that it was sent to", required=True),
+    _column("identification", Integer, "Identification of the datagram; NULL: IPv6 has none"),
+    _count("sequence_number", "Sequence number of its first byte; NULL: not TCP"),
+)
+
 link_causal = _table(
     "link_causal",
     "One row per callback run, or take outside of any, that led to a publication",

@@ -24,7 +24,7 @@ COMMON_COLUMNS = (
     ("cpu_id", "INTEGER"),
     ("thread_index", "INTEGER"),
 )
-"""First columns of every staging table."""
+"""First columns of every staging table; those of kernel events have no thread."""
 
 _FILE = Path(__file__).with_name("tracepoints.toml")
 
@@ -90,6 +90,8 @@ class Tracepoint:
         since: first version of tracetools that has it, None for other providers.
         until: last version of tracetools that has it, None if it is still there.
         where: other places that have it, None if there are no others.
+        is_kernel: it is of the kernel: in no provider, and whatever thread it interrupted has
+            nothing to do with it.
     """
 
     name: str
@@ -101,21 +103,27 @@ class Tracepoint:
     since: str | None = None
     until: str | None = None
     where: str | None = None
+    is_kernel: bool = False
 
     @property
     def provider(self) -> str:
-        """The part before the colon."""
-        return self.name.partition(":")[0]
+        """The part before the colon, empty for events of the kernel."""
+        return self.name.rpartition(":")[0]
 
     @property
     def event(self) -> str:
         """The part after the colon."""
-        return self.name.partition(":")[2]
+        return self.name.rpartition(":")[2]
 
     @property
     def table(self) -> str:
         """Name of the staging table."""
-        return f"{self.provider}_{self.event}"
+        return self.name.replace(":", "_")
+
+    @property
+    def common_columns(self) -> tuple[tuple[str, str], ...]:
+        """First columns of the staging table."""
+        return COMMON_COLUMNS[:-1] if self.is_kernel else COMMON_COLUMNS
 
     def arrow_schema(self) -> pa.Schema:
         """Return the payload columns as `TraceSet.batches` wants them."""
@@ -140,7 +148,7 @@ class Tracepoint:
             Origin.LABEL: f"ENUM({', '.join(repr(label) for label in labels)})",
         }
         columns = [
-            *COMMON_COLUMNS,
+            *self.common_columns,
             *((before.column, types[before.origin]) for before in self.predecessors),
             *((field.name, field.type) for field in self.fields),
         ]
@@ -157,6 +165,11 @@ class Catalogue:
     """
 
     tracepoints: Mapping[str, Tracepoint]
+
+    @property
+    def of_threads(self) -> tuple[Tracepoint, ...]:
+        """Those that happen in a thread of a process: all but the kernel's."""
+        return tuple(t for t in self.tracepoints.values() if not t.is_kernel)
 
     @property
     def sequences(self) -> tuple[str, ...]:

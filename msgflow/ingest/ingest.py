@@ -264,7 +264,9 @@ def _store(
     con.execute(
         "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "
         "start_ns, end_ns, event_count) SELECT ?, ?, now() AT TIME ZONE 'UTC', ?, ?, "
-        "min(start_ns), max(end_ns), sum(event_count) FROM store.trace WHERE run_id = ?",
+        "min(start_ns) FILTER (domain IS DISTINCT FROM 'kernel'), "
+        "max(end_ns) FILTER (domain IS DISTINCT FROM 'kernel'), sum(event_count) "
+        "FROM store.trace WHERE run_id = ?",
         [run_id, run_name, __version__, objects.derivation_hash(), run_id],
     )
     if loaded.duplicate_packet_count:

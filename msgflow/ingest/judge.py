@@ -66,7 +66,7 @@ def require_ros_events(traces: Sequence[TraceInfo], counts: Mapping[tuple[int, s
 
 
 def _ros_events(names: Sequence[str] | Mapping[str, int]) -> list[str]:
-    known = load().tracepoints
+    known = {tracepoint.name for tracepoint in load().of_threads}
     return [name for name in names if name in known]
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from msgflow.ingest.catalogue import Tracepoint
     from msgflow.ingest.reconciled import Corrections
     from msgflow.query.interrupt import Interrupts
 
@@ -158,6 +159,9 @@ def _placed(
             if batch.name == PACKET:
                 yield PACKET, batch.batch
                 continue
+            if tracepoints[batch.name].is_kernel:
+                yield without_thread(tracepoints[batch.name], batch.batch)
+                continue
             rows = batch.batch if corrections is None else corrections.applied(batch.batch)
             if rows.num_rows:
                 events.append((batch.name, rows))
@@ -167,6 +171,13 @@ def _placed(
             yield "thread_name", placed.thread_names
             for name, rows in placed.batches:
                 yield tracepoints[name].table, rows
+
+
+def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, pa.RecordBatch]:
+    """Return table and rows of an event of the kernel, whose contexts say nothing."""
+    columns = [name for name, _ in tracepoint.common_columns]
+    columns += [field.name for field in tracepoint.fields]
+    return tracepoint.table, batch.select(columns)
 
 
 class _Tables:

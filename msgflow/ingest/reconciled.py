@@ -58,6 +58,7 @@ SELECT
 FROM raw.packet AS p
 JOIN session_trace AS s ON p.trace_index = s.trace_index
 JOIN staging.source AS o ON p.trace_index = o.trace_index
+WHERE o.domain IS DISTINCT FROM 'kernel'
 GROUP BY s.host, s.session, p.cpu_id
 """
 
@@ -224,7 +225,7 @@ def _events() -> str:
     return "\n    UNION ALL\n    ".join(
         f"SELECT event_id, ts_ns, trace_index, cpu_id, thread_index, {number} AS tracepoint "
         f"FROM raw.{tracepoint.table}"
-        for number, tracepoint in enumerate(load().tracepoints.values())
+        for number, tracepoint in enumerate(load().of_threads)
     )
 
 

@@ -4,8 +4,8 @@
 as read. `staging` is a database in memory, which spills to the temporary directory:
 `staging.source` (one row per trace), `staging.event_count`, `staging.left_out` (events that
 another trace holds as well), `staging.event` (all events of known
-tracepoints, without payload), `staging.predecessor` (the pointers from event to event), and the
-objects of `schema/model`.
+tracepoints but those of the kernel, without payload), `staging.predecessor` (the pointers from
+event to event), and the objects of `schema/model`.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         _DAMAGE_TABLE,
     ):
         con.execute(statement)
-    con.execute(_event_view(tracepoints))
-    con.execute(_predecessor_view(tracepoints))
+    con.execute(_event_view(catalogue.of_threads))
+    con.execute(_predecessor_view(catalogue.of_threads))
 
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:

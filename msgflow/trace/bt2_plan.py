@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from msgflow.trace.columns import matching, record_batch, renumber
+from msgflow.trace.columns import (
+    first_inner_value,
+    inner_matching,
+    matching,
+    record_batch,
+    renumber,
+)
 from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
@@ -25,15 +31,30 @@ _WITHOUT_CONTEXT = {"vpid": -1, "vtid": -1}
 
 @dataclass
 class RowStore:
-    """Rows of one event name and one layout, in order of arrival."""
+    """Rows of one event name and one layout, in order of arrival.
+
+    Attributes:
+        columns: what they hold.
+        inner: column to the paths of the fields inside others that fill it.
+        rows: the values.
+    """
 
     columns: tuple[str, ...]
+    inner: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
     rows: list[list[Any]] = field(default_factory=list)
 
     def take(self, schema: pa.Schema, new_ids: Mapping[int, int]) -> pa.RecordBatch:
         """Empty the store into a batch."""
         rows = renumber(self.rows, new_ids) if new_ids else self.rows
         columns = dict(zip(self.columns, zip(*rows, strict=True), strict=True))
+        for column, paths in self.inner.items():
+            # All paths of a column begin with fields that are held whole.
+            names = {path[0] for path in paths}
+            held = [columns[_whole(name)] for name in names]
+            columns[_distinct(column)] = tuple(
+                first_inner_value(dict(zip(names, values, strict=True)), paths)
+                for values in zip(*held, strict=True)
+            )
         payload = list(schema)[len(COMMON_SCHEMA) :]
         distinct = pa.schema([*COMMON_SCHEMA, *(f.with_name(_distinct(f.name)) for f in payload)])
         batch = record_batch(distinct, columns, _WITHOUT_CONTEXT, len(rows))
@@ -72,7 +93,7 @@ class Planner:
             name: pa.schema([*COMMON_SCHEMA, *schema]) for name, schema in schemas.items()
         }
         self._payloads = schemas
-        self._stores: dict[str, dict[tuple[str, ...], RowStore]] = {}
+        self._stores: dict[str, dict[tuple[Any, ...], RowStore]] = {}
 
     def plan(self, event_class: Any, trace_index: int) -> ClassPlan:
         """Make the plan of the event class at this pointer."""
@@ -96,15 +117,29 @@ class Planner:
         missing = [field for field in contexts if field.name not in from_common]
         from_specific = matching(missing, specific)
         from_payload = matching(payload_schema, payload)
-        columns = (*_ROW_HEAD, *from_common, *from_specific, *map(_distinct, from_payload))
-        store = self._stores.setdefault(name, {}).setdefault(columns, RowStore(columns))
+        inner = {
+            column: tuple(field.path for field in fields)
+            for column, fields in inner_matching(payload_schema, payload).items()
+            if column not in from_payload
+        }
+        outer = {path[0] for paths in inner.values() for path in paths}
+        whole = [member for member in payload if member.name in outer]
+        columns = (
+            *_ROW_HEAD,
+            *from_common,
+            *from_specific,
+            *map(_distinct, from_payload),
+            *(_whole(member.name) for member in whole),
+        )
+        stores = self._stores.setdefault(name, {})
+        store = stores.setdefault((columns, *inner.items()), RowStore(columns, inner))
         return ClassPlan(
             trace_index,
             name,
             store.rows.append,
             [(member.index, member.get) for member in from_common.values()],
             [(member.index, member.get) for member in from_specific.values()],
-            [(member.index, member.get) for member in from_payload.values()],
+            [(member.index, member.get) for member in (*from_payload.values(), *whole)],
         )
 
     def take(self, new_ids: Mapping[int, int]) -> Iterable[tuple[str, pa.RecordBatch]]:
@@ -117,6 +152,11 @@ class Planner:
             elif batches:
                 table = pa.Table.from_batches(batches).unify_dictionaries().sort_by("event_id")
                 yield name, table.combine_chunks().to_batches()[0]
+
+
+def _whole(name: str) -> str:
+    """Return a name for a field that is held for what is inside it."""
+    return f"whole {name}"
 
 
 def _distinct(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -24,6 +25,20 @@ class Field(Protocol):
 
 
 AnyField = TypeVar("AnyField", bound=Field)
+
+
+@dataclass(frozen=True)
+class InnerField:
+    """A field inside a structure or variant: names from the outermost on, and Arrow type."""
+
+    path: tuple[str, ...]
+    type: pa.DataType
+
+    @property
+    def name(self) -> str:
+        """The names with dots in between."""
+        return ".".join(self.path)
+
 
 ALIASES = b"aliases"
 """Key of a field's metadata: other names under which traces have it, comma separated."""
@@ -109,6 +124,49 @@ def matching(columns: Iterable[pa.Field], fields: Iterable[AnyField]) -> dict[st
                 found[column.name] = field
                 break
     return found
+
+
+def inner_matching(
+    columns: Iterable[pa.Field], fields: Iterable[Field]
+) -> dict[str, tuple[InnerField, ...]]:
+    """Return column to the fields inside others that fill it, for columns named by such.
+
+    The name of such a field has dots: those of the structures, variants and options around it come
+    before its own. Options of one variant may fill the same column, each in the events that have
+    it.
+    """
+    by_name = {field.name: field.type for field in fields}
+    found = {}
+    for column in columns:
+        inner = []
+        for name in names_of(column):
+            path = tuple(name.split("."))
+            declared = by_name.get(path[0]) if len(path) > 1 else None
+            for member in path[1:]:
+                declared = _member_type(declared, member)
+            if declared is not None and can_hold(column.type, declared):
+                inner.append(InnerField(path, declared))
+        if inner:
+            found[column.name] = tuple(inner)
+    return found
+
+
+def first_inner_value(fields: Any, paths: Iterable[Sequence[str]]) -> Any:
+    """Return what lies at the first of these paths of names that leads anywhere, else None."""
+    for path in paths:
+        value = fields
+        for name in path:
+            value = value.get(name) if isinstance(value, dict) else None
+        if value is not None:
+            return value
+    return None
+
+
+def _member_type(declared: pa.DataType | None, name: str) -> pa.DataType | None:
+    if declared is None or not pa.types.is_struct(declared):
+        return None
+    index = declared.get_field_index(name)
+    return None if index < 0 else declared.field(index).type
 
 
 def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:

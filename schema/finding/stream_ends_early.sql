@@ -34,5 +34,6 @@ SELECT
 FROM stream AS s
 JOIN trace_end AS e ON s.trace_id = e.trace_id
 JOIN main.trace AS t ON s.trace_id = t.trace_id
-WHERE e.end_ns - s.end_ns > greatest(0.05 * (e.end_ns - e.start_ns), 500_000_000)
+WHERE t.domain IS DISTINCT FROM 'kernel'
+    AND e.end_ns - s.end_ns > greatest(0.05 * (e.end_ns - e.start_ns), 500_000_000)
 GROUP BY t.run_id, t.trace_id, t.path

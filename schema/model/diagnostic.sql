@@ -7,7 +7,8 @@
 --     staging.left_out, staging.source, staging.publisher_known, staging.subscription_known,
 --     staging.client, staging.service, staging.client_event, staging.service_event,
 --     staging.client_gid, staging.request_pair,
---     staging.annotation, staging.annotation_object
+--     staging.annotation, staging.annotation_object, staging.trace, staging.clock,
+--     staging.network_packet, staging.single_packet, staging.link_packet
 WITH unmatched_end AS (
     SELECT trace_index
     FROM staging.callback_left_over
@@ -60,17 +61,35 @@ ambiguous_request AS (
         ON g.client_event_id = s.client_event_id AND t.sequence_number = s.sequence_number
     ANTI JOIN staging.request_pair AS p ON t.event_id = p.take_event_id
     WHERE t.is_request AND s.is_request
+),
+packet_use AS (
+    SELECT
+        count(*) AS number,
+        count(CASE WHEN p.is_sent THEN 1 END) AS sent,
+        count(CASE WHEN p.key IS NULL THEN 1 END) AS unknown,
+        count(CASE WHEN p.key IS NOT NULL AND s.event_id IS NULL THEN 1 END) AS repeated,
+        count(s.event_id) AS single,
+        string_agg(DISTINCT h.hostname, ' and ' ORDER BY h.hostname) AS hosts
+    FROM staging.network_packet AS p
+    JOIN staging.trace AS t ON p.trace_id = t.trace_id
+    JOIN staging.host AS h ON t.host_id = h.host_id
+    LEFT JOIN staging.single_packet AS s ON p.event_id = s.event_id
+    HAVING count(*) > 0 AND (SELECT count(*) FROM staging.clock) > 1
 )
 SELECT
-    trace_index + 1 AS trace_id,
+    e.trace_index + 1 AS trace_id,
     'unknown_event' AS name,
     'info' AS severity,
-    sum(event_count)::BIGINT AS count,
+    sum(e.event_count)::BIGINT AS count,
     'events that are not in the catalogue and were not loaded: '
-    || string_agg(printf('%s (%d)', name, event_count), ', ' ORDER BY name) AS detail
-FROM staging.event_count
-WHERE NOT is_known
-GROUP BY trace_index
+    || CASE
+        WHEN s.domain = 'kernel' THEN printf('kernel events of %d names', count(*))
+        ELSE string_agg(printf('%s (%d)', e.name, e.event_count), ', ' ORDER BY e.name)
+    END AS detail
+FROM staging.event_count AS e
+JOIN staging.source AS s ON e.trace_index = s.trace_index
+WHERE NOT e.is_known
+GROUP BY e.trace_index, s.domain
 UNION ALL
 SELECT
     trace_id,
@@ -213,3 +232,34 @@ JOIN staging.annotation_object AS o ON a.event_id = o.event_id
 JOIN process_label AS l ON a.process_id = l.process_id
 WHERE o.object_id IS NULL
 HAVING count(*) > 0
+UNION ALL
+SELECT
+    s.trace_index + 1,
+    'no_network_packets',
+    'info',
+    1,
+    'the kernel trace has no network packets, which would tell how far the clocks of the hosts are '
+    || 'apart: enable net_dev_queue and net_if_receive_skb on every host'
+FROM staging.source AS s
+ANTI JOIN staging.network_packet AS p ON s.trace_index + 1 = p.trace_id
+WHERE s.domain = 'kernel' AND (SELECT count(*) FROM staging.clock) > 1
+UNION ALL
+SELECT
+    NULL,
+    'network_packets_unused',
+    'info',
+    u.number - l.ends,
+    printf(
+        'of %d network packets sent and %d received on %s, %d were seen on both ends; not used: '
+        || '%d that nothing tells from others, %d whose like was seen less than 2 s before or '
+        || 'after or sent by several hosts, %d whose other end was not seen or cannot be told',
+        u.sent, u.number - u.sent, u.hosts, l.links, u.unknown, u.repeated, u.single - l.ends
+    )
+FROM packet_use AS u
+CROSS JOIN (
+    SELECT
+        count(*) AS links,
+        count(DISTINCT sent_event_id) + count(DISTINCT received_event_id) AS ends
+    FROM staging.link_packet
+) AS l
+WHERE u.number > l.ends

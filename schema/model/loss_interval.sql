@@ -3,10 +3,17 @@
 --     discard counter rose and that packet's end, on its CPU only. Lost packets lie between the
 --     packets around them. Tracing was paused where all streams of a trace are silent at once
 --     between packets: continuous packets begin where the previous one ended. What comes after the
---     last packet with events is no pause: stopping flushes an empty one into every stream.
+--     last packet with events is no pause: stopping flushes an empty one into every stream. Kernel
+--     traces are left out: what they lost is missing from no process.
 -- grain: one row per gap in a trace
--- needs: staging.packet
-WITH lost_event AS (
+-- needs: staging.packet, staging.source
+WITH packet AS (
+    SELECT p.*
+    FROM staging.packet AS p
+    JOIN staging.source AS s ON p.trace_index = s.trace_index
+    WHERE s.domain IS DISTINCT FROM 'kernel'
+),
+lost_event AS (
     SELECT
         trace_index + 1 AS trace_id,
         cpu_id AS cpu,
@@ -14,7 +21,7 @@ WITH lost_event AS (
         coalesce(last_event_ns, begin_ns) AS start_ns,
         coalesce(end_ns, last_event_ns, begin_ns) AS end_ns,
         discarded_event_count AS event_count
-    FROM staging.packet
+    FROM packet
     WHERE discarded_event_count IS DISTINCT FROM 0
 ),
 stream_packet AS (
@@ -26,7 +33,7 @@ stream_packet AS (
         lag(coalesce(end_ns, last_event_ns, begin_ns)) OVER (
             PARTITION BY trace_index, stream_index ORDER BY position
         ) AS previous_end_ns
-    FROM staging.packet
+    FROM packet
 ),
 lost_packet AS (
     SELECT
@@ -49,7 +56,7 @@ covered AS (
             PARTITION BY trace_index ORDER BY begin_ns, stream_index, position
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
         ) AS covered_until_ns
-    FROM staging.packet
+    FROM packet
 ),
 pause AS (
     SELECT

@@ -6,8 +6,8 @@
 -- column: created_at TIMESTAMP  When the run was ingested, UTC
 -- column: msgflow_version VARCHAR  Version of msgflow that ingested the run
 -- column: derivation_hash VARCHAR  SHA-256 of the SQL that derived the links
--- column: start_ns BIGINT [epoch ns]  First event of any trace
--- column: end_ns BIGINT [epoch ns]  Last event of any trace
+-- column: start_ns BIGINT [epoch ns]  First event of any trace but kernel traces
+-- column: end_ns BIGINT [epoch ns]  Last event of any trace but kernel traces
 -- column: event_count BIGINT  Events read
 -- needs: store.run, store.trace, main.trace
 WITH extent AS (
@@ -17,6 +17,7 @@ WITH extent AS (
         max(t.end_ns) - max(r.end_ns) AS end_shift_ns
     FROM main.trace AS t
     JOIN store.trace AS r ON t.trace_id = r.trace_id
+    WHERE t.domain IS DISTINCT FROM 'kernel'
     GROUP BY t.run_id
 )
 SELECT

@@ -1,16 +1,17 @@
 -- name: derive.clock_envelope
 -- kind: macro
--- description: The fastest messages between two clocks, of each direction, in 256 stretches of the
---     time, and which of them are corners of the convex hull: the lower envelope of the delays.
---     Leaving out other messages can only widen what they allow. So that a drift does not
---     hide which message was fastest, its rough size (the regression through the fastest messages
---     of each stretch as they are) is taken out for the choice. Times count from `base_ns`, and
---     differences from `base_bound_ns`, which keeps them exact as DOUBLE.
+-- description: The fastest messages and packets between two clocks, of each direction, in 256
+--     stretches of the time, and which of them are corners of the convex hull: the lower envelope
+--     of the delays. Leaving out others can only widen what they allow. So that a drift does not
+--     hide which was fastest, its rough size (the regression through the fastest of each stretch as
+--     they are) is taken out for the choice. Times count from `base_ns`, and differences from
+--     `base_bound_ns`, which keeps them exact as DOUBLE.
 -- grain: one row per pair of clocks, direction and stretch of the time
 -- needs: derive.clock_bound
 CREATE OR REPLACE MACRO derive.clock_envelope(of_run) AS TABLE
 WITH bound AS MATERIALIZED (
-    SELECT clock_id, other_clock_id, sense, at_ns, bound_ns FROM derive.clock_bound(of_run)
+    SELECT clock_id, other_clock_id, is_packet, sense, at_ns, bound_ns
+    FROM derive.clock_bound(of_run)
 ),
 base AS MATERIALIZED (
     SELECT
@@ -21,8 +22,10 @@ base AS MATERIALIZED (
         - greatest(min(CASE WHEN sense < 0 THEN at_ns END), min(CASE WHEN sense > 0 THEN at_ns END))
             AS overlap_ns,
         coalesce(max(CASE WHEN sense < 0 THEN bound_ns END), min(-bound_ns)) AS base_bound_ns,
-        count(CASE WHEN sense < 0 THEN 1 END) AS received_count,
-        count(CASE WHEN sense > 0 THEN 1 END) AS sent_count
+        count(CASE WHEN sense < 0 AND NOT is_packet THEN 1 END) AS received_count,
+        count(CASE WHEN sense > 0 AND NOT is_packet THEN 1 END) AS sent_count,
+        count(CASE WHEN sense < 0 AND is_packet THEN 1 END) AS received_packet_count,
+        count(CASE WHEN sense > 0 AND is_packet THEN 1 END) AS sent_packet_count
     FROM bound
     GROUP BY clock_id, other_clock_id
 ),
@@ -81,6 +84,7 @@ around AS (
 SELECT
     a.clock_id, a.other_clock_id, a.sense, a.moment, a.bound,
     coalesce(a.slope_before > a.slope_after, true) AS is_corner,
-    b.base_ns, b.base_bound_ns, b.overlap_ns, b.received_count, b.sent_count
+    b.base_ns, b.base_bound_ns, b.overlap_ns, b.received_count, b.sent_count,
+    b.received_packet_count, b.sent_packet_count
 FROM around AS a
 JOIN base AS b ON a.clock_id = b.clock_id AND a.other_clock_id = b.other_clock_id

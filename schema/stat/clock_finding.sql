@@ -1,7 +1,7 @@
 -- name: derive.clock_finding
 -- kind: macro
--- description: What messages cannot tell of the clocks: those that nothing connects with the
---     others, and why, and those that do not run evenly.
+-- description: What messages and packets cannot tell of the clocks: those that nothing connects
+--     with the others, and why, and those that do not run evenly.
 -- grain: one row per pair of clocks or clock
 -- needs: store.host, derive.clock_pair, derive.clock_sync
 CREATE OR REPLACE MACRO derive.clock_finding(of_run) AS TABLE
@@ -14,7 +14,8 @@ WITH clock_name AS (
 pair AS MATERIALIZED (
     SELECT
         p.clock_id, p.other_clock_id, c.name, o.name AS other_name, p.received_count,
-        p.sent_count, p.offset_ns, p.uncertainty_ns, p.is_even
+        p.sent_count, p.received_packet_count, p.sent_packet_count, p.offset_ns,
+        p.uncertainty_ns, p.is_even
     FROM derive.clock_pair(of_run) AS p
     JOIN clock_name AS c ON p.clock_id = c.clock_id
     JOIN clock_name AS o ON p.other_clock_id = o.clock_id
@@ -24,13 +25,22 @@ sync AS MATERIALIZED (
 )
 SELECT
     'clock_not_synchronised' AS name,
-    p.received_count + p.sent_count AS count,
-    printf(
-        'the clocks of %s and %s stay apart: %d messages one way, %d the other',
-        p.other_name, p.name, p.received_count, p.sent_count
-    )
+    p.received_count + p.sent_count + p.received_packet_count + p.sent_packet_count AS count,
+    CASE
+        WHEN p.received_packet_count + p.sent_packet_count > 0 THEN printf(
+            'the clocks of %s and %s stay apart: %d messages and %d network packets one way, %d '
+            || 'and %d the other',
+            p.other_name, p.name, p.received_count, p.received_packet_count, p.sent_count,
+            p.sent_packet_count
+        )
+        ELSE printf(
+            'the clocks of %s and %s stay apart: %d messages one way, %d the other',
+            p.other_name, p.name, p.received_count, p.sent_count
+        )
+    END
     || CASE
-        WHEN least(p.received_count, p.sent_count) > 0 THEN ', too few at the same time'
+        WHEN p.received_count + p.received_packet_count > 0
+            AND p.sent_count + p.sent_packet_count > 0 THEN ', too few at the same time'
         ELSE ', and only both together tell an offset'
     END AS detail
 FROM pair AS p

@@ -1,24 +1,25 @@
 -- name: derive.clock_pair
 -- kind: macro
--- description: How the times of one clock become those of another, from the messages between them
---     in both directions. Every line between the two envelopes is possible. Where these are nearest
---     to each other, which is the shortest round trip that was observed once the drift is taken
---     out, the middle between them is the offset and half the distance bounds its error; the line
---     there that keeps away from both most is the drift, and the steepest and the flattest line
---     bound its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar and Dagenais 2014).
---     With messages in a quarter of the stretches, the bound of the drift is narrowed: one way at
+-- description: How the times of one clock become those of another, from the messages and packets
+--     between them in both directions. Every line between the two envelopes is possible. Where
+--     these are nearest to each other, which is the shortest round trip that was observed once the
+--     drift is taken out, the middle between them is the offset and half the distance bounds its
+--     error; the line there that keeps away from both most is the drift, and the steepest and the
+--     flattest line bound its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar and
+--     Dagenais 2014).
+--     With some in a quarter of the stretches, the bound of the drift is narrowed: one way at
 --     one time and the other at another are supposed to take together at least three quarters of
 --     the shortest round trip.
 --     Where no line is possible, the clocks do not run evenly: the line that misses least is
---     given, and its error at any time is bounded by the fastest messages of each stretch.
---     Without messages in both directions at the same time, all is NULL.
--- grain: one row per pair of clocks with messages between them
+--     given, and its error at any time is bounded by the fastest of each stretch.
+--     Without any in both directions at the same time, all is NULL.
+-- grain: one row per pair of clocks with messages or packets between them
 -- needs: derive.clock_envelope
 CREATE OR REPLACE MACRO derive.clock_pair(of_run) AS TABLE
 WITH fastest AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, sense, moment, bound, is_corner, base_ns, base_bound_ns,
-        overlap_ns, received_count, sent_count
+        overlap_ns, received_count, sent_count, received_packet_count, sent_packet_count
     FROM derive.clock_envelope(of_run)
 ),
 corner AS MATERIALIZED (
@@ -33,6 +34,8 @@ pair AS (
         any_value(overlap_ns) AS overlap_ns,
         any_value(received_count) AS received_count,
         any_value(sent_count) AS sent_count,
+        any_value(received_packet_count) AS received_packet_count,
+        any_value(sent_packet_count) AS sent_packet_count,
         least(
             count(CASE WHEN sense < 0 THEN 1 END), count(CASE WHEN sense > 0 THEN 1 END)
         ) AS stretches
@@ -115,6 +118,8 @@ SELECT
     p.other_clock_id,
     p.received_count,
     p.sent_count,
+    p.received_packet_count,
+    p.sent_packet_count,
     p.base_ns + l.moment::BIGINT AS reference_ns,
     p.base_bound_ns + l.middle::BIGINT AS offset_ns,
     l.drift_ppb::BIGINT AS drift_ppb,

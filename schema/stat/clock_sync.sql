@@ -1,16 +1,17 @@
 -- name: derive.clock_sync
 -- kind: macro
 -- description: How the times of each clock become those of a reference: the first clock of those
---     that messages in both directions connect. A clock that exchanges none with the reference is
---     joined through others, along the chain with the smallest sum of uncertainties; the errors of
---     its steps add up.
+--     that messages or packets in both directions connect. A clock that exchanges none with the
+--     reference is joined through others, along the chain with the smallest sum of uncertainties;
+--     the errors of its steps add up.
 -- grain: one row per clock
 -- needs: store.clock, derive.clock_pair
 CREATE OR REPLACE MACRO derive.clock_sync(of_run) AS TABLE
 WITH RECURSIVE pair AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, reference_ns, offset_ns, drift_ppb / 1e9 AS drift,
-        uncertainty_ns, coalesce(drift_uncertainty_ppb, 0) / 1e9 AS drift_uncertainty, is_even
+        uncertainty_ns, coalesce(drift_uncertainty_ppb, 0) / 1e9 AS drift_uncertainty, is_even,
+        received_packet_count + sent_packet_count > 0 AS has_packets
     FROM derive.clock_pair(of_run)
     WHERE offset_ns IS NOT NULL
 ),
@@ -18,7 +19,7 @@ WITH RECURSIVE pair AS MATERIALIZED (
 step AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, reference_ns, offset_ns, drift, uncertainty_ns,
-        drift_uncertainty, is_even
+        drift_uncertainty, is_even, has_packets
     FROM pair
     UNION ALL
     SELECT
@@ -29,13 +30,16 @@ step AS MATERIALIZED (
         1 / (1 + drift) - 1,
         ceil(uncertainty_ns / (1 + drift - drift_uncertainty))::BIGINT,
         drift_uncertainty / ((1 + drift) * (1 + drift - drift_uncertainty)),
-        is_even
+        is_even,
+        has_packets
     FROM pair
 ),
 chain (
-    root_id, clock_id, reference_ns, offset_ns, drift, uncertainty_ns, drift_uncertainty, is_even
+    root_id, clock_id, reference_ns, offset_ns, drift, uncertainty_ns, drift_uncertainty, is_even,
+    has_packets
 ) USING KEY (root_id, clock_id) AS (
-    SELECT clock_id, clock_id, reference_ns, 0::BIGINT, 0::DOUBLE, 0::BIGINT, 0::DOUBLE, true
+    SELECT
+        clock_id, clock_id, reference_ns, 0::BIGINT, 0::DOUBLE, 0::BIGINT, 0::DOUBLE, true, false
     FROM store.clock
     WHERE run_id = of_run
     UNION
@@ -53,7 +57,8 @@ chain (
             )::BIGINT AS uncertainty_ns,
             s.drift_uncertainty * (1 + abs(c.drift) + c.drift_uncertainty)
             + c.drift_uncertainty * (1 + abs(s.drift)),
-            s.is_even AND c.is_even
+            s.is_even AND c.is_even,
+            s.has_packets OR c.has_packets
         FROM chain AS c
         JOIN step AS s ON c.clock_id = s.other_clock_id
         LEFT JOIN recurring.chain AS k ON c.root_id = k.root_id AND s.clock_id = k.clock_id
@@ -75,6 +80,7 @@ SELECT
     round(drift * 1e9)::BIGINT AS drift_ppb,
     uncertainty_ns,
     CASE WHEN is_even THEN ceil(drift_uncertainty * 1e9 + abs(drift * 1e9 - round(drift * 1e9)))
-        END::BIGINT AS drift_uncertainty_ppb
+        END::BIGINT AS drift_uncertainty_ppb,
+    has_packets
 FROM chain
 QUALIFY row_number() OVER (PARTITION BY clock_id ORDER BY root_id) = 1

@@ -17,7 +17,7 @@ WITH orphan AS MATERIALIZED (
 host_begin AS (
     SELECT host_id, min(start_ns) AS begin_ns
     FROM store.trace
-    WHERE run_id = of_run
+    WHERE run_id = of_run AND domain IS DISTINCT FROM 'kernel'
     GROUP BY host_id
 ),
 stampless AS (

@@ -96,6 +96,14 @@ def test_a_database_is_corrected_and_restored(
     assert min(shortest(database)) > 0
     shown = msgflow("clocks", "show", "--db", database, "--format", "json")
     assert [clock["hosts"] for clock in json.loads(shown.stdout)] == ["alpha", "beta"]
+    pairs = json.loads(msgflow("clocks", "pairs", "--db", database, "--format", "json").stdout)
+    assert [(pair["from_hosts"], pair["to_hosts"]) for pair in pairs] == [
+        ("alpha", "beta"),
+        ("beta", "alpha"),
+    ]
+    assert [pair["shortest_message_ns"] for pair in pairs] == shortest(database)
+    count = sum(pair["message_count"] for pair in pairs)
+    assert f"by {count:,} messages and 0 network packets" in result.stderr
 
     assert msgflow("clocks", "apply", "none", "--db", database).exit_code == 0
     assert contents(database) == recorded

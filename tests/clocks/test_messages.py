@@ -1,4 +1,4 @@
-"""Offsets and drifts of clocks from the messages between them."""
+"""Offsets and drifts of clocks from the messages and packets between them."""
 
 from __future__ import annotations
 
@@ -66,6 +66,7 @@ def require_truth(clocks: list[Clock], corrections: dict[int, tuple[object, ...]
     bases=st.tuples(st.integers(10, 5_000), st.integers(10, 5_000)),
     jitter=st.integers(0, 3_000),
     counts=st.tuples(st.integers(3, 400), st.integers(3, 400)),
+    packets=st.tuples(st.integers(0, 200), st.integers(0, 200)),
     seed=st.integers(0, 2**31),
 )
 def test_truth_lies_inside_what_is_stated(
@@ -75,6 +76,7 @@ def test_truth_lies_inside_what_is_stated(
     bases: tuple[int, int],
     jitter: int,
     counts: tuple[int, int],
+    packets: tuple[int, int],
     seed: int,
 ) -> None:
     clocks = [Clock(), Clock(offset_ns, drift_ppb)]
@@ -82,6 +84,9 @@ def test_truth_lies_inside_what_is_stated(
     ways = [
         Way(0, 1, [0, *times(seed, counts[0]), 20 * SECOND], there),
         Way(1, 0, [0, *times(seed + 1, counts[1]), 20 * SECOND], back),
+        # Slower, so that the shortest ways are those of messages.
+        Way(0, 1, times(seed + 2, packets[0]), lambda random: 6e6 + there(random), is_packet=True),
+        Way(1, 0, times(seed + 3, packets[1]), lambda random: 6e6 + back(random), is_packet=True),
     ]
     with synchronised(connection, clocks, ways, seed) as corrections:
         assert corrections[1][0] == 0
@@ -162,6 +167,41 @@ def test_one_way_is_said_and_nothing_invented(connection: duckdb.DuckDBPyConnect
                 "the clocks of host-1 and host-2 stay apart: 50 messages one way, 0 the other, and"
                 " only both together tell an offset",
             ),
+        ]
+
+
+def test_packets_narrow_the_bounds_of_messages(connection: duckdb.DuckDBPyConnection) -> None:
+    clocks = [Clock(), Clock(7_000_000, 20_000)]
+    messages = [
+        Way(0, 1, times(1, 500), delay(300_000, 90_000)),
+        Way(1, 0, times(2, 500), delay(500_000, 90_000)),
+    ]
+    packets = [
+        Way(0, 1, times(3, 500), delay(50_000, 9_000), is_packet=True),
+        Way(1, 0, times(4, 500), delay(70_000, 9_000), is_packet=True),
+    ]
+    with synchronised(connection, clocks, messages) as corrections:
+        require_truth(clocks, corrections)
+        assert connection.execute("SELECT method FROM main.clock").fetchall()[1] == ("messages",)
+        without = corrections[1]
+    with synchronised(connection, clocks, messages + packets) as corrections:
+        require_truth(clocks, corrections)
+        assert connection.execute("SELECT method FROM main.clock").fetchall()[1] == ("packets",)
+        assert corrections[1][4] < without[4] / 5  # type: ignore[operator]
+        assert corrections[1][5] < without[5] / 5  # type: ignore[operator]
+    # Either way may be of another kind.
+    with synchronised(connection, clocks, [messages[0], packets[1]]) as corrections:
+        require_truth(clocks, corrections)
+        assert without[4] > corrections[1][4] > 150_000  # type: ignore[operator]
+
+
+def test_packets_one_way_are_said(connection: duckdb.DuckDBPyConnection) -> None:
+    ways = [Way(0, 1, times(1, 20), delay(1e5, 1e4), is_packet=True)]
+    with synchronised(connection, [Clock(), Clock(7)], ways) as corrections:
+        assert corrections[1][0] is None
+        assert [detail for _, detail in finding(connection)] == [
+            "the clocks of host-1 and host-2 stay apart: 0 messages and 20 network packets one way,"
+            " 0 and 0 the other, and only both together tell an offset"
         ]
 
 

@@ -14,10 +14,11 @@ import pytest
 import msgflow.trace
 from msgflow.errors import TraceError
 from msgflow.ingest import catalogue
+from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, bt2_library
 
-TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]"}
+TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]", "INTEGER[]"}
 TRACEPOINT_KEYS = {
     "name",
     "description",
@@ -25,6 +26,7 @@ TRACEPOINT_KEYS = {
     "since",
     "until",
     "where",
+    "is_kernel",
     "label",
     "sequences",
     "predecessors",
@@ -47,8 +49,12 @@ def test_entries_are_well_formed(entries: list[dict[str, Any]]) -> None:
     for entry in entries:
         name = entry["name"]
         assert {"name", "description", "fields"} <= set(entry) <= TRACEPOINT_KEYS, name
-        assert re.fullmatch(r"[a-z0-9_]+:[a-z0-9_]+", name), name
-        assert name.partition(":")[0] in PROVIDERS, name
+        if entry.get("is_kernel"):
+            assert re.fullmatch(r"[a-z_]+", name), name
+            assert not {"sequences", "predecessors", "label"} & set(entry), name
+        else:
+            assert re.fullmatch(r"[a-z0-9_]+:[a-z0-9_]+", name), name
+            assert name.partition(":")[0] in PROVIDERS, name
         assert re.fullmatch(r"[A-Z][^\n]*[^.\s]", entry["description"]), name
         assert name.startswith("ros2:") >= ("since" in entry), name
         check_versions(entry, name)
@@ -122,7 +128,10 @@ def test_tables_take_the_readers_batches() -> None:
         schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
         row = {"event_id": 1, "ts_ns": 2, "trace_index": 0, "vpid": 3, "vtid": 4}
         batch = pa.RecordBatch.from_pylist([row], schema)
-        ((_, placed),) = sequences.place([(tracepoint.name, batch)]).batches
+        if tracepoint.is_kernel:
+            _, placed = without_thread(tracepoint, batch)
+        else:
+            ((_, placed),) = sequences.place([(tracepoint.name, batch)]).batches
         con.register("batch", placed)
         con.execute(f'INSERT INTO staging."{tracepoint.table}" SELECT * FROM batch')
         table = con.execute(f'DESCRIBE staging."{tracepoint.table}"').fetchall()

@@ -35,12 +35,13 @@ class Clock:
 
 @dataclass(frozen=True)
 class Way:
-    """Messages from one clock to another: numbers of the clocks, times of sending, delays [ns]."""
+    """Messages or packets between clocks: numbers of the clocks, times of sending, delays [ns]."""
 
     sender: int
     receiver: int
     times: Sequence[int]
     delay: Delay
+    is_packet: bool = False
 
 
 def fill_clocks(
@@ -61,6 +62,8 @@ def fill_clocks(
             f"VALUES ({number}, 1, {number}, 'host-{number}')",
             "INSERT INTO store.process (process_id, run_id, host_id, pid, life) "
             f"VALUES ({number}, 1, {number}, 7, 1)",
+            "INSERT INTO store.trace (trace_id, run_id, host_id, path) "
+            f"VALUES ({number}, 1, {number}, 'trace-{number}')",
         ):
             connection.execute(statement)
     rows = []
@@ -68,13 +71,19 @@ def fill_clocks(
         for time in way.times:
             sent = clocks[way.sender].shows(time)
             taken = clocks[way.receiver].shows(time + round(way.delay(random)))
-            rows.append((len(rows) + 1, way.sender + 1, way.receiver + 1, sent, taken))
-    names = ("id", "sender", "receiver", "sent_ns", "taken_ns")
-    message = pyarrow.table(
+            place = (len(rows) + 1, way.sender + 1, way.receiver + 1)
+            rows.append((*place, sent, taken, int(way.is_packet)))
+    names = ("id", "sender", "receiver", "sent_ns", "taken_ns", "is_packet")
+    passed = pyarrow.table(
         {name: pyarrow.array(list(column), "int64")
-         for name, column in zip(names, zip(*rows, strict=True) if rows else [()] * 5, strict=True)}
+         for name, column in zip(names, zip(*rows, strict=True) if rows else [()] * 6, strict=True)}
     )  # fmt: skip
-    connection.register("message", message)
+    connection.register("passed", passed)
+    connection.execute("CREATE TEMP VIEW message AS FROM passed WHERE is_packet = 0")
+    connection.execute(
+        "INSERT INTO store.link_packet SELECT 1, sender, receiver, sent_ns, taken_ns, 'udp', '', 1,"
+        " '', 1, id, NULL FROM passed WHERE is_packet = 1"
+    )
     for table, columns, values in (
         (
             "publication",
@@ -89,7 +98,8 @@ def fill_clocks(
         ),
     ):
         _insert(connection, table, columns, values)
-    connection.unregister("message")
+    connection.execute("DROP VIEW message")
+    connection.unregister("passed")
 
 
 def _insert(connection: duckdb.DuckDBPyConnection, table: str, columns: str, values: str) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pyarrow as pa
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 
@@ -24,6 +26,42 @@ def list_array(
         pa.array(offsets.astype(np.int32)),
         number_array(elements, data_type.value_type),
         type=data_type,
+    )
+
+
+def scattered_array(
+    found: Sequence[tuple[NDArray[np.int64], NDArray[Any]]], count: int, data_type: pa.DataType
+) -> pa.Array:
+    """Return a column of which only some rows have a value.
+
+    Args:
+        found: rows and their values, or a row of elements for each; no row twice.
+        count: of all rows.
+        data_type: of the column.
+    """
+    is_missing = np.ones(count, np.bool_)
+    is_list = pa.types.is_list(data_type)
+    element_type = data_type.value_type if is_list else data_type
+    sizes = np.zeros(count, np.int64)
+    for rows, values in found:
+        is_missing[rows] = False
+        sizes[rows] = values.shape[1] if is_list else 1
+    offsets = np.arange(count + 1)
+    if is_list:
+        np.cumsum(sizes, out=offsets[1:])
+    elements = np.zeros(offsets[-1], element_type.to_pandas_dtype())
+    for rows, values in found:
+        places = offsets[rows]
+        if is_list:
+            places = places[:, np.newaxis] + np.arange(values.shape[1])
+        elements[places] = _converted(values, element_type)
+    if not is_list:
+        return pa.array(elements, mask=is_missing)
+    return pa.ListArray.from_arrays(
+        pa.array(offsets.astype(np.int32)),
+        pa.array(elements),
+        type=data_type,
+        mask=pa.array(is_missing),
     )
 
 

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import to_array
-from msgflow.trace.ctf.arrays import list_array, number_array, text_array
+from msgflow.trace.columns import first_inner_value, to_array
+from msgflow.trace.ctf.arrays import list_array, number_array, scattered_array, text_array
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.gather import FieldRows
 from msgflow.trace.ctf.thread_names import ThreadNames, word_offsets
+from msgflow.trace.ctf.types import Scope
 from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -98,6 +99,8 @@ def build_batch(
             arrays.append(columns[field.name])
         elif source is not None:
             arrays.append(field_of.array(source, field.type))
+        elif not is_common and field.name in plan.inner:
+            arrays.append(field_of.inner_array(plan.inner[field.name], field.type))
         elif is_common and field.name in _WITHOUT_CONTEXT:
             arrays.append(pa.array(np.full(count, _WITHOUT_CONTEXT[field.name], np.int32)))
         else:
@@ -113,7 +116,9 @@ class _FastFields:
         sources = [*plan.contexts.values(), *plan.payload.values()]
         wanted = {source.number for source in sources if source.number is not None}
         self._fields = body.fields or ()
-        self._rows = FieldRows(body, memory, rows.bodies, sorted(wanted))
+        with_tail = bool(plan.inner)
+        self._rows = FieldRows(body, memory, rows.bodies, sorted(wanted), with_tail=with_tail)
+        self._count = rows.bodies.size
         self._names = names
 
     def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
@@ -127,6 +132,12 @@ class _FastFields:
         if pa.types.is_string(data_type):
             return text_array(*self._rows.text(number))
         return list_array(*self._rows.elements(number), data_type)
+
+    def inner_array(self, paths: Sequence[Sequence[str]], data_type: pa.DataType) -> pa.Array:
+        """Return a column of fields of the tail."""
+        found = [self._rows.in_tail(".".join(path)) for path in paths]
+        present = [values for values in found if values is not None]
+        return scattered_array(present, self._count, data_type)
 
     def _thread_names(self, number: int) -> pa.Array:
         field = self._fields[number]
@@ -157,3 +168,9 @@ class _SlowFields:
         if pa.types.is_dictionary(data_type):
             return self._names.array_of(values)
         return to_array(values, data_type)
+
+    def inner_array(self, paths: Sequence[Sequence[str]], data_type: pa.DataType) -> pa.Array:
+        """Return a column of fields inside others; of several the first that an event has."""
+        return to_array(
+            [first_inner_value(event[Scope.PAYLOAD], paths) for event in self._events], data_type
+        )

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from enum import Enum
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 from msgflow.trace.ctf.extent import DynamicError, is_dense, lay_out
+from msgflow.trace.ctf.tail import Tail, compile_tail, dtype_of, is_selector
 from msgflow.trace.ctf.types import (
     BYTE,
     Array,
@@ -18,6 +20,7 @@ from msgflow.trace.ctf.types import (
     String,
     Structure,
     Type,
+    Variant,
 )
 from msgflow.trace.ctf.walk import FieldError
 
@@ -52,7 +55,7 @@ class PlainField:
         width: bytes of the number or element.
         count: of the elements of an array, otherwise 1.
         length_at: for a sequence, the place in the list of the field with its length.
-        is_length: it is the length of a sequence.
+        is_length: it is the length of a sequence, or chooses the option of the tail.
         type: as declared.
         size: in bytes, None if it varies.
     """
@@ -84,11 +87,44 @@ class EventBody:
         fields: its fields in order; None if they must be read one by one.
         sizes: of the whole in bytes, by residue of its position; None if that varies.
         offsets: of each field, by residue; None if the sizes are.
+        tail: the variant behind the fields, None if there is none.
+        tail_name: its name in the payload.
+        selector: place in the list of the field that chooses its option.
     """
 
     fields: tuple[PlainField, ...] | None
     sizes: tuple[int, ...] | None
     offsets: tuple[tuple[int, ...], ...] | None
+    tail: Tail | None = None
+    tail_name: str = ""
+    selector: int = -1
+
+    @cached_property
+    def _orders(self) -> tuple[Literal["big", "little"], ...]:
+        """Byte orders of the fields."""
+        return tuple("big" if field.dtype[0] == ">" else "little" for field in self.fields or ())
+
+    @cached_property
+    def _steps(self) -> tuple[tuple[int, int, Kind, int], ...]:
+        """What leads from the begin of a body to its end, as few steps as possible.
+
+        Alignment, and what follows: NOTHING goes on by so many bytes, NUMBER is a length or
+        selector of so many bytes, STRING is a text, and of SEQUENCE there are as many elements of
+        so many bytes as the field of that number says.
+        """
+        steps: list[tuple[int, int, Kind, int]] = []
+        for number, field in enumerate(self.fields or ()):
+            if field.kind is Kind.STRING:
+                steps.append((field.align, 0, Kind.STRING, number))
+            elif field.size is None:
+                steps.append((field.align, field.width, Kind.SEQUENCE, field.length_at))
+            elif field.is_length:
+                steps.append((field.align, field.size, Kind.NUMBER, number))
+            elif steps and steps[-1][2] is Kind.NOTHING and field.align == 1:
+                steps[-1] = (steps[-1][0], steps[-1][1] + field.size, Kind.NOTHING, number)
+            else:
+                steps.append((field.align, field.size, Kind.NOTHING, number))
+        return tuple(steps)
 
     def end(self, data: bytearray, position: int, limit: int) -> int:
         """Return the byte at which the body that begins at `position` ends.
@@ -96,27 +132,26 @@ class EventBody:
         Raises:
             FieldError: it does not fit in front of the byte `limit`.
         """
-        assert self.fields is not None
         lengths: dict[int, int] = {}
-        for number, field in enumerate(self.fields):
-            position = (position + field.align - 1) & -field.align
-            size = field.size
-            if size is None:
-                if field.kind is Kind.STRING:
-                    size = data.find(0, position, limit) + 1 - position
-                    if size <= 0:
-                        raise FieldError("a text does not end within the packet")
-                else:
-                    size = lengths[field.length_at] * field.width
-            elif field.is_length:
-                order = "big" if field.dtype[0] == ">" else "little"
-                lengths[number] = int.from_bytes(
-                    data[position : position + size],
-                    order,  # type: ignore[arg-type]
-                )
-            position += size
+        for align, size, kind, number in self._steps:
+            if align > 1:
+                position = (position + align - 1) & -align
+            if kind is Kind.NOTHING:
+                position += size
+            elif kind is Kind.STRING:
+                position = data.find(0, position, limit) + 1
+                if position == 0:
+                    raise FieldError("a text does not end within the packet")
+            elif kind is Kind.NUMBER:
+                content = data[position : position + size]
+                lengths[number] = int.from_bytes(content, self._orders[number])
+                position += size
+            else:
+                position += lengths[number] * size
             if position > limit:
                 raise FieldError("a field goes beyond the end of the packet")
+        if self.tail is not None:
+            return self.tail.end(data, position, lengths[self.selector], limit)
         return position
 
 
@@ -133,15 +168,38 @@ def compile_body(stream: StreamClass, event: EventClass, residues: int) -> Event
         Scope.SPECIFIC_CONTEXT: event.specific_context,
         Scope.PAYLOAD: event.payload,
     }
+    sizes = _sizes(list(structures.values()), residues)
+    last = event.payload.members[-1] if event.payload.members else None
+    variant = last.type if last is not None and isinstance(last.type, Variant) else None
+    if variant is not None:
+        before = Structure(event.payload.members[:-1], event.payload.align)
+        structures[Scope.PAYLOAD] = before
     fields: list[PlainField] | None = []
     for scope, structure in structures.items():
         if fields is not None:
             fields = _add_fields(fields, scope, structure)
-    sizes = _sizes(list(structures.values()), residues)
+    if fields is not None and variant is not None and last is not None:
+        return _with_tail(fields, variant, last.name)
     offsets = None
     if fields is not None and sizes is not None:
         offsets = tuple(zip(*(_offsets(fields, r) for r in range(residues)), strict=True))
     return EventBody(None if fields is None else tuple(fields), sizes, offsets)
+
+
+def _with_tail(fields: list[PlainField], variant: Variant, name: str) -> EventBody:
+    reference, tail = variant.selector, compile_tail(variant)
+    for number, field in enumerate(fields):
+        if (
+            tail is not None
+            and reference.path == (field.name,)
+            and field.scope is Scope.PAYLOAD
+            and reference.scope in {None, Scope.PAYLOAD}
+            and field.type is not None
+            and is_selector(field.type)
+        ):
+            fields[number] = replace(field, is_length=True)
+            return EventBody(tuple(fields), None, None, tail, name, number)
+    return EventBody(None, None, None)
 
 
 def _sizes(structures: list[Structure], residues: int) -> tuple[int, ...] | None:
@@ -199,7 +257,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
                 name,
                 Kind.NUMBER,
                 align,
-                _dtype(declared),
+                dtype_of(declared),
                 declared.size // BYTE,
                 type=declared,
             )
@@ -212,7 +270,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
                 name,
                 kind,
                 align,
-                _dtype(element),
+                dtype_of(element),
                 element.size // BYTE,
                 declared.length,
                 type=declared,
@@ -229,7 +287,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
                 name,
                 kind,
                 align,
-                _dtype(element),
+                dtype_of(element),
                 element.size // BYTE,
                 length_at=length_at,
                 type=declared,
@@ -240,11 +298,6 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
 
 def _is_plain_element(element: Type) -> bool:
     return isinstance(element, Integer | Real) and element.size in _WIDTHS and is_dense(element)
-
-
-def _dtype(number: Integer | Real) -> str:
-    kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
-    return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"
 
 
 def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) -> int | None:

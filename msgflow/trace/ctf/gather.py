@@ -9,11 +9,12 @@ import numpy as np
 from msgflow.trace.ctf.event_body import EventBody, Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.memory import Memory
+    from msgflow.trace.ctf.tail import Block, Part, Tail
 
 _WIDEST_ROW = 256
 _WORD = 8
@@ -25,11 +26,21 @@ class FieldRows:
     """The plain fields of events of one class."""
 
     def __init__(
-        self, body: EventBody, memory: Memory, bodies: NDArray[np.int64], wanted: Iterable[int]
+        self,
+        body: EventBody,
+        memory: Memory,
+        bodies: NDArray[np.int64],
+        wanted: Iterable[int],
+        *,
+        with_tail: bool = False,
     ) -> None:
-        """Look at the bodies that begin at `bodies`; `wanted` are the fields that will be read."""
+        """Look at the bodies that begin at `bodies`; `wanted` are the fields that will be read.
+
+        `with_tail`: fields of the variant at the end will be read as well.
+        """
         assert body.fields is not None
         self._fields = body.fields
+        self._blocks: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], Block]] = {}
         self._memory = memory
         self._bodies = bodies
         self._positions: dict[int, NDArray[np.int64]] = {}
@@ -37,7 +48,13 @@ class FieldRows:
         self._rows: NDArray[Any] | None = None
         self._first = 0
         self._offsets: tuple[int, ...] | None = None
-        if body.offsets is None:
+        if body.tail is not None and with_tail:
+            tail_at = self._walk(len(self._fields) - 1)
+            everywhere = np.arange(bodies.size)
+            values = self.numbers(body.selector)
+            for name, rows, at, block in _blocks(body.tail, memory, everywhere, tail_at, values):
+                self._blocks[f"{body.tail_name}.{name}"] = (rows, at, block)
+        elif body.offsets is None:
             self._walk(max(wanted, default=-1))
         elif len({tuple(offset) for offset in zip(*body.offsets, strict=True)}) <= 1:
             self._offsets = tuple(offset[0] for offset in body.offsets)
@@ -89,6 +106,20 @@ class FieldRows:
         cut, at = _flat(offsets[:-1], lengths, 1)
         return cut, content[at]
 
+    def in_tail(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+        """Return the rows that have a field of the tail, and its values; None if no row has.
+
+        Of an array, the values have a column per element. The name has dots between the names of
+        the variants, their options and the structures around the field.
+        """
+        words = name.split(".")
+        for depth in range(len(words) - 1, 0, -1):
+            rows, at, block = self._blocks.get(".".join(words[:depth]), (None, None, None))
+            part = None if block is None else block.parts.get(".".join(words[depth:]))
+            if rows is not None and at is not None and part is not None:
+                return rows, _values(self._memory, at, part)
+        return None
+
     def _position(self, number: int) -> NDArray[np.int64]:
         if self._offsets is not None:
             return self._bodies + self._offsets[number]
@@ -109,8 +140,8 @@ class FieldRows:
             width = max(last - first, 1)
             self._rows = self._memory.view(f"V{width}")[self._bodies + first]
 
-    def _walk(self, last: int) -> None:
-        """Find where fields begin whose place varies, up to the field `last`."""
+    def _walk(self, last: int) -> NDArray[np.int64]:
+        """Find where fields begin whose place varies, up to the field `last`; return its end."""
         at = self._bodies
         for number, field in enumerate(self._fields[: last + 1]):
             if field.align > 1:
@@ -125,6 +156,39 @@ class FieldRows:
                 count = self.numbers(field.length_at).astype(np.int64)
                 self._counts[number] = count
                 at = at + count * field.width
+        return at
+
+
+def _blocks(
+    tail: Tail,
+    memory: Memory,
+    rows: NDArray[np.int64],
+    due: NDArray[np.int64],
+    values: NDArray[Any],
+) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64], Block]]:
+    """Yield name, rows that have it, where it begins there, and block, of all chosen options."""
+    present = np.unique(values).tolist()
+    for choice, block in tail.options:
+        choosing = [value for value in present if tail.block(value) is block]
+        if not choosing:
+            continue
+        is_chosen = np.isin(values, choosing)
+        chosen = rows[is_chosen]
+        at = (due[is_chosen] + (block.align - 1)) & -block.align
+        yield choice.name, chosen, at, block
+        if block.tail is not None:
+            selected = _values(memory, at, block.parts[block.selector])
+            inner = _blocks(block.tail, memory, chosen, at + block.size, selected)
+            for name, found, found_at, inner_block in inner:
+                yield f"{choice.name}.{block.name}.{name}", found, found_at, inner_block
+
+
+def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:
+    places = at + part.offset
+    if part.count is not None:
+        places = places[:, np.newaxis] + np.arange(part.count) * part.width
+    values: NDArray[Any] = memory.view(part.dtype)[places]
+    return values
 
 
 def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -100,6 +100,8 @@ class StreamLayout:
         )
         self.residues = min(align // BYTE, _MOST_RESIDUES)
         self.header: EventHeader | None = None
+        # From selector * `residues` + residue to what follows such a header, and its size.
+        self._short_forms: dict[int, tuple[EventBody, int]] = {}
         if align // BYTE <= _MOST_RESIDUES:
             self.header = compile_header(stream.event_header, self.residues)
         self.classes = {
@@ -198,13 +200,21 @@ class StreamLayout:
         assert header is not None
         residue = position % self.residues
         selector = header.selector.read(data, position, residue)
-        form = self.form_of(selector)
-        event_id = form.id.read(data, position, residue) if form.id else self.only_id
-        body_at = position + form.sizes[residue]
-        layout = self.classes.get(event_id)
-        if layout is None or body_at > span.limit:
-            raise FieldError(f"there is no event class {event_id}")
-        body = layout.body
+        key = selector * self.residues + residue
+        found = self._short_forms.get(key)
+        if found is None:
+            form = self.form_of(selector)
+            event_id = form.id.read(data, position, residue) if form.id else self.only_id
+            layout = self.classes.get(event_id)
+            if layout is None:
+                raise FieldError(f"there is no event class {event_id}")
+            found = layout.body, form.sizes[residue]
+            if form.id is None or form.id == header.selector:
+                self._short_forms[key] = found
+        body, header_size = found
+        body_at = position + header_size
+        if body_at > span.limit:
+            raise FieldError("an event goes beyond the end of the packet")
         if body.sizes is not None:
             end = body_at + body.sizes[body_at % self.residues]
         elif body.fields is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from msgflow.trace.columns import matching
+from msgflow.trace.columns import inner_matching, matching
 from msgflow.trace.ctf.arrow_types import declared_schema
 from msgflow.trace.ctf.types import Scope, Structure, Type
 from msgflow.trace.schemas import COMMON_SCHEMA
@@ -40,6 +40,7 @@ class ClassPlan:
         schema: of the batches, the common columns first.
         contexts: common column to field, where there is one.
         payload: payload column to field, where there is one.
+        inner: payload column to the names of the fields inside others that fill it.
     """
 
     layout: ClassLayout
@@ -47,11 +48,20 @@ class ClassPlan:
     schema: pa.Schema
     contexts: Mapping[str, Source]
     payload: Mapping[str, Source]
+    inner: Mapping[str, tuple[tuple[str, ...], ...]]
 
     @property
     def is_slow(self) -> bool:
         """Its events are read field by field."""
-        return self.stream.header is None or self.layout.body.fields is None
+        body = self.layout.body
+        if self.stream.header is None or body.fields is None:
+            return True
+        sources = [*self.contexts.values(), *self.payload.values()]
+        paths = [path for paths in self.inner.values() for path in paths]
+        return any(source.number is None for source in sources) or not all(
+            body.tail is not None and path[0] == body.tail_name and body.tail.has(path[1:])
+            for path in paths
+        )
 
 
 def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> ClassPlan:
@@ -62,7 +72,14 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
     specific = layout.event.specific_context
     contexts |= _sources(layout, Scope.SPECIFIC_CONTEXT, specific, missing)
     payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, wanted)
-    return ClassPlan(layout, stream, pa.schema([*COMMON_SCHEMA, *wanted]), contexts, payload)
+    declared = declared_schema(layout.event.payload)
+    inner = {
+        column: tuple(field.path for field in fields)
+        for column, fields in inner_matching(wanted, declared).items()
+        if column not in payload
+    }
+    schema = pa.schema([*COMMON_SCHEMA, *wanted])
+    return ClassPlan(layout, stream, schema, contexts, payload, inner)
 
 
 def _sources(

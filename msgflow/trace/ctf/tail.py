@@ -1,0 +1,184 @@
+"""A variant at the end of an event whose options are structures of fixed size.
+
+Headers of network packets in kernel traces are such: what follows depends on a field before, and
+an option may itself end in such a variant. Where all this lies can be told for many events at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.extent import DynamicError, Leaf, is_dense, lay_out
+from msgflow.trace.ctf.types import BYTE, Array, Integer, Real, Structure, Variant
+from msgflow.trace.ctf.walk import FieldError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from msgflow.trace.ctf.types import Choice, Type
+
+_WIDTHS = {8, 16, 32, 64}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A number, or an array of numbers, on whole bytes.
+
+    Attributes:
+        offset: in bytes from the begin of its block.
+        dtype: of the number or element, as numpy calls it.
+        width: bytes of the number or element.
+        count: of the elements of an array, None for a number.
+    """
+
+    offset: int
+    dtype: str
+    width: int
+    count: int | None
+
+
+@dataclass(frozen=True)
+class Block:
+    """A structure of fixed size, and the variant that it may end in.
+
+    Attributes:
+        align: in bytes.
+        size: of the fixed part, in bytes.
+        parts: name, with dots inside nested structures, to where it is.
+        selector: name of the part that chooses the option of `tail`.
+        tail: the variant.
+        name: of the variant.
+    """
+
+    align: int
+    size: int
+    parts: Mapping[str, Part]
+    selector: str = ""
+    tail: Tail | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Tail:
+    """The options of a variant.
+
+    Attributes:
+        options: of each the declaration and the block.
+    """
+
+    options: tuple[tuple[Choice, Block], ...]
+    _chosen: dict[int, Block] = field(default_factory=dict, compare=False, repr=False)
+
+    def block(self, value: int) -> Block:
+        """Return the option that this value of the selector chooses.
+
+        Raises:
+            FieldError: there is none.
+        """
+        chosen = self._chosen.get(value)
+        if chosen is None:
+            for choice, block in self.options:
+                if choice.holds(value):
+                    self._chosen[value] = block
+                    return block
+            raise FieldError(f"a variant has no option for the value {value}")
+        return chosen
+
+    def has(self, path: Sequence[str]) -> bool:
+        """Tell whether a field can be read that is named by its option and what is around it."""
+        for choice, block in self.options:
+            if choice.name == path[0]:
+                is_inner = block.tail is not None and block.name == path[1]
+                return ".".join(path[1:]) in block.parts or (
+                    is_inner and block.tail is not None and block.tail.has(path[2:])
+                )
+        return False
+
+    def end(self, data: bytearray, position: int, value: int, limit: int) -> int:
+        """Return the byte at which the variant that is due at `position` ends.
+
+        Raises:
+            FieldError: it does not fit in front of the byte `limit`.
+        """
+        block = self.block(value)
+        while True:
+            begin = (position + block.align - 1) & -block.align
+            position = begin + block.size
+            if position > limit:
+                raise FieldError("a field goes beyond the end of the packet")
+            if block.tail is None:
+                return position
+            part = block.parts[block.selector]
+            at = begin + part.offset
+            order = "big" if part.dtype[0] == ">" else "little"
+            block = block.tail.block(
+                int.from_bytes(data[at : at + part.width], order)  # type: ignore[arg-type]
+            )
+
+
+def compile_tail(variant: Variant) -> Tail | None:
+    """Return how to read a variant; None if an option is no structure of fixed size."""
+    options = []
+    for choice in variant.choices:
+        if not isinstance(choice.type, Structure):
+            return None
+        block = _compile_block(choice.type)
+        if block is None:
+            return None
+        options.append((choice, block))
+    return Tail(tuple(options))
+
+
+def is_selector(declared: Type) -> bool:
+    """Tell whether a field can choose an option of a tail."""
+    return isinstance(declared, Integer) and not declared.signed and _is_whole(declared)
+
+
+def _compile_block(structure: Structure) -> Block | None:
+    members = structure.members
+    last = members[-1] if members else None
+    variant = last.type if last is not None and isinstance(last.type, Variant) else None
+    fixed = members if variant is None else members[:-1]
+    leaves: list[Leaf] = []
+    try:
+        end = lay_out(Structure(fixed, structure.align), 0, leaves)
+    except DynamicError:
+        return None
+    align, size = max(structure.align // BYTE, 1), -(-end // BYTE)
+    parts = {".".join(leaf.path): part for leaf in leaves if (part := _part(leaf)) is not None}
+    if variant is None or last is None:
+        return Block(align, size, parts)
+    reference, tail = variant.selector, compile_tail(variant)
+    selector = reference.path[0] if len(reference.path) == 1 and reference.scope is None else None
+    declared = next((member.type for member in fixed if member.name == selector), None)
+    if tail is None or selector is None or declared is None or end % BYTE:
+        return None
+    if not is_selector(declared) or selector not in parts:
+        return None
+    return Block(align, size, parts, selector, tail, last.name)
+
+
+def _part(leaf: Leaf) -> Part | None:
+    """Return where a number or array lies; None if that is not on whole bytes."""
+    if leaf.position % BYTE:
+        return None
+    element: Type = leaf.type
+    count: int | None = None
+    if isinstance(leaf.type, Array):
+        if leaf.type.is_text or not is_dense(leaf.type.element):
+            return None
+        element, count = leaf.type.element, leaf.type.length
+    if not isinstance(element, Integer | Real) or not _is_whole(element):
+        return None
+    return Part(leaf.position // BYTE, dtype_of(element), element.size // BYTE, count)
+
+
+def _is_whole(number: Integer | Real) -> bool:
+    return number.size in _WIDTHS
+
+
+def dtype_of(number: Integer | Real) -> str:
+    """Return what numpy calls a number of whole bytes."""
+    kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
+    return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"

@@ -1,0 +1,33 @@
+-- name: clock-pairs
+-- title: What tells how far clocks are apart
+-- description: Messages and network packets between hosts of two clocks, of each direction, and the
+--     shortest way of each as the clocks are corrected now. Both directions are needed; the shorter
+--     both ways, the surer the correction.
+-- grain: one row per pair of clocks and direction with messages or packets
+-- column: run_id BIGINT                       Run
+-- column: from_hosts VARCHAR                  Hosts of the clock that sent
+-- column: to_hosts VARCHAR                    Hosts of the clock that received
+-- column: message_count BIGINT                Messages of ROS, matched by their stamps alone
+-- column: packet_count BIGINT                 Network packets that kernel traces saw on both ends
+-- column: shortest_message_ns BIGINT [ns]     Shortest way of a message, as corrected
+-- column: shortest_packet_ns BIGINT [ns]      Shortest way of a packet, as corrected
+-- needs: main.clock_pair, main.host
+WITH named AS (
+    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
+    FROM main.host
+    GROUP BY clock_id
+)
+SELECT
+    p.run_id,
+    f.hosts AS from_hosts,
+    t.hosts AS to_hosts,
+    p.message_count,
+    p.packet_count,
+    p.shortest_message_ns,
+    p.shortest_packet_ns
+FROM main.clock_pair AS p
+LEFT JOIN named AS f ON p.from_clock_id = f.clock_id
+LEFT JOIN named AS t ON p.to_clock_id = t.clock_id
+WHERE list_contains($runs, p.run_id)
+ORDER BY p.run_id, least(p.from_clock_id, p.to_clock_id), greatest(p.from_clock_id, p.to_clock_id),
+    p.from_clock_id

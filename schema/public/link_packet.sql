@@ -1,0 +1,48 @@
+-- name: main.link_packet
+-- description: Network packets that kernel traces saw on both ends of their way, between hosts of
+--     two clocks. A negative latency means that the clocks are apart.
+-- grain: one row per network packet and clock that received it from another
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: sent_trace_id BIGINT  Trace of its sender
+-- column: received_trace_id BIGINT  Trace of its receiver
+-- column: sent_ns BIGINT [epoch ns]  Handed to the network device
+-- column: received_ns BIGINT [epoch ns]  Came from the network device
+-- column: latency_ns BIGINT [ns]  From one to the other
+-- column: protocol VARCHAR  'tcp' or 'udp'
+-- column: source_address VARCHAR  IP address that it was sent from
+-- column: source_port INTEGER  Port that it was sent from
+-- column: destination_address VARCHAR  IP address that it was sent to
+-- column: destination_port INTEGER  Port that it was sent to
+-- column: identification INTEGER  Identification of the datagram; NULL: IPv6 has none
+-- column: sequence_number BIGINT  Sequence number of its first byte; NULL: not TCP
+-- needs: store.link_packet, store.trace, store.host, store.clock, derive.corrected_ns
+WITH trace_clock AS (
+    SELECT t.trace_id, c.offset_ns, c.drift_ppb, c.reference_ns
+    FROM store.trace AS t
+    JOIN store.host AS h ON t.host_id = h.host_id
+    JOIN store.clock AS c ON h.clock_id = c.clock_id
+),
+corrected AS (
+    SELECT
+        self.*,
+        derive.corrected_ns(self.sent_ns, s.offset_ns, s.drift_ppb, s.reference_ns) AS from_ns,
+        derive.corrected_ns(self.received_ns, r.offset_ns, r.drift_ppb, r.reference_ns) AS to_ns
+    FROM store.link_packet AS self
+    JOIN trace_clock AS s ON self.sent_trace_id = s.trace_id
+    JOIN trace_clock AS r ON self.received_trace_id = r.trace_id
+)
+SELECT
+    run_id,
+    sent_trace_id,
+    received_trace_id,
+    from_ns AS sent_ns,
+    to_ns AS received_ns,
+    to_ns - from_ns AS latency_ns,
+    protocol,
+    source_address,
+    source_port,
+    destination_address,
+    destination_port,
+    identification,
+    sequence_number
+FROM corrected
