@@ -46,12 +46,14 @@ service AS (
 SELECT
     process_id, callback_handle, callback_event_id, kind, handle,
     coalesce(owner_event_id, start_event_id) AS owner_event_id,
-    owner_event_id IS NULL AS is_inferred
+    owner_event_id IS NULL AS is_inferred,
+    owner_event_id IS NULL AS is_eliminated
 FROM decided
 WHERE kind IS NOT NULL
 UNION ALL
 SELECT
-    k.process_id, k.callback_handle, k.event_id, 'service', k.service_handle, s.event_id, true
+    k.process_id, k.callback_handle, k.event_id, 'service', k.service_handle, s.event_id, true,
+    false
 FROM staging.callback_known AS k
 JOIN service AS s ON k.process_id = s.process_id AND k.service_handle = s.service_handle
 ANTI JOIN asked AS q ON k.event_id = q.callback_event_id

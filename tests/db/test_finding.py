@@ -85,6 +85,13 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             )
         ],
     ),
+    "uncertain_owner": (
+        {
+            "diagnostic": "name,severity,count,detail\n"
+            "eliminated_owner,warning,2,timers\ninferred_timer,warning,2,none\n"
+        },
+        [("the input", 2, "timers")],
+    ),
     "process_without_ros": (
         {
             "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n"
