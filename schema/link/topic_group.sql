@@ -1,9 +1,10 @@
 -- name: derive.topic_group
 -- description: Which publishers and subscriptions whose topic is not known are on one topic, as far
 --     as messages tell. A stamp that one publication of the run has belongs to one message: its
---     publisher and those who took it are on one topic, and so is whatever else such messages join
---     to any of them. So do messages that went through ring buffers. The name is that of the members that have one; members of several names teach
---     nothing. Pairs that next to none of the messages of both sides speak for are chance.
+--     publisher and those who took it are on one topic, and so are those of a message that went
+--     through a ring buffer, and whatever else such messages join to any of them. The name is that
+--     of the members that have one; members of several names teach nothing. Pairs that next to none
+--     of the messages of both sides speak for are chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
 -- needs: store.publication, store.publisher, store.take, store.subscription,
 --     store.ring_buffer_event

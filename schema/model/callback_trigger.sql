@@ -1,8 +1,8 @@
 -- name: staging.callback_trigger
--- description: What the executor said directly before runs of callbacks that nothing tells the owner
---     of: of callbacks whose creation was not traced, and that no message or request was ever seen
---     to be for. It names the handle of what it executes, if that is a timer or a subscription;
---     else it only looks for what is ready. Where something else comes in between, it is neither.
+-- description: What the executor said directly before runs of callbacks without a known owner:
+--     their creation was not traced, and no message or request was ever seen to be for them. It
+--     names the handle of what it executes, if that is a timer or a subscription; else it only
+--     looks for what is ready. Where something else comes in between, it is neither.
 -- grain: one row per such run in the trace of which an executor event precedes it
 -- needs: staging.callback_binding, staging.callback_pair, staging.request_callback, raw
 WITH unowned AS (

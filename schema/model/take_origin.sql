@@ -1,7 +1,7 @@
 -- name: staging.take_origin
 -- description: Every take with its subscription: by rmw handle or ring buffer, else by the callback
---     that it led to, known or not. A subscription callback that ran without any take traced was handed its
---     message all the same.
+--     that it led to, known or not. A subscription callback that ran without any take traced was
+--     handed its message all the same.
 -- grain: one row per message handed over to a subscription
 -- needs: staging.take_chain, staging.take_subscription, staging.take_inferred,
 --     staging.callback_binding, staging.callback_run

@@ -6,7 +6,7 @@
 --     it has one thread.
 -- grain: one row per such process
 -- needs: staging.callback_announced, staging.callback_trigger, staging.callback_binding,
---     staging.callback_pair, staging.callback_run, staging.located, raw
+--     staging.callback_run, staging.located, raw
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
     FROM staging.callback_trigger AS t

@@ -43,9 +43,7 @@ def receive(system: RosSystem, handle: int, callback: int, thread: Thread = MAIN
 
 def dequeue(system: RosSystem, buffer: int, callback: int | None, slot: int = 0) -> int:
     """A message is taken out of a ring buffer."""
-    at = system.add(
-        "ros2:rclcpp_ring_buffer_dequeue", MAIN, buffer=buffer, index=slot, size=0
-    )
+    at = system.add("ros2:rclcpp_ring_buffer_dequeue", MAIN, buffer=buffer, index=slot, size=0)
     if callback is not None:
         run(system, callback, intra=True)
     return at
