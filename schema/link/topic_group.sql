@@ -37,14 +37,23 @@ unknown_buffer AS (
     SELECT r.run_id, r.process_id, r.buffer_handle
     FROM store.ring_buffer_event AS r
     JOIN store.take AS t ON r.take_id = t.take_id
-    JOIN endpoint AS e ON -t.subscription_id = e.vertex
-    WHERE e.topic_name IS NULL AND t.method = 'ring_buffer'
+    WHERE t.subscription_id IN (
+        SELECT subscription_id
+        FROM store.subscription
+        WHERE is_inferred
+            AND rmw_handle IS NULL
+            AND (topic_name IS NULL OR coalesce(is_topic_learned, false))
+    )
     UNION
     SELECT r.run_id, r.process_id, r.buffer_handle
     FROM store.ring_buffer_event AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
-    JOIN endpoint AS e ON b.publisher_id = e.vertex
-    WHERE e.topic_name IS NULL AND b.intra_ns IS NOT NULL
+    WHERE b.intra_ns IS NOT NULL
+        AND b.publisher_id IN (
+            SELECT publisher_id
+            FROM store.publisher
+            WHERE is_inferred AND (topic_name IS NULL OR coalesce(is_topic_learned, false))
+        )
 ),
 slot_use AS (
     SELECT

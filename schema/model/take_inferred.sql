@@ -12,7 +12,7 @@ WITH dequeue AS (
     ANTI JOIN staging.take_subscription AS s ON t.start_event_id = s.start_event_id
     JOIN staging.buffer_owner AS o
         ON t.process_id = o.process_id AND t.buffer_handle = o.buffer_handle
-    WHERE o.subscription_event_id IS NOT NULL
+    WHERE t.method = 'ring_buffer' AND o.subscription_event_id IS NOT NULL
 ),
 lonely AS (
     SELECT start_event_id, process_id, callback_handle, callback_event_id
