@@ -1,35 +1,24 @@
 -- name: staging.callback_owner
 -- description: What callbacks belong to whose creation was not traced, and that no message or
 --     request was seen to be for, as far as the executor tells. The handle that it names may be
---     known. Else a timer or a subscription is all that it names, and where takes are traced, what
+--     known. Else a timer or a subscription is all that it names, and where takes were enabled, what
 --     runs without one is a timer. A callback that runs without being named belongs to a service,
---     where the requests that services take are not traced. Where this was decided by elimination,
+--     where the requests that services take were not enabled. Where this was decided by elimination,
 --     or the service was not seen to be initialised, the owner is a placeholder.
 -- grain: one row per callback whose owner is decided
--- needs: staging.callback_announced, staging.untraced_take, staging.event_count,
---     staging.callback_known, staging.request_callback, staging.callback_binding
-WITH layout AS (
-    SELECT
-        trace_index,
-        bool_or(name IN ('ros2:rmw_take', 'ros2:rcl_take')) AS has_takes,
-        bool_or(name = 'ros2:rclcpp_executor_execute') AS has_executions,
-        bool_or(name = 'ros2:rmw_take_request') AS has_requests
-    FROM staging.event_count
-    WHERE event_count > 0
-    GROUP BY trace_index
-),
-decided AS (
+-- needs: staging.callback_announced, staging.untraced_take, staging.callback_known,
+--     staging.request_callback, staging.callback_binding
+WITH decided AS (
     SELECT
         a.process_id, a.callback_handle, a.callback_event_id, a.start_event_id, a.handle,
         a.owner_event_id,
         CASE
             WHEN a.is_disputed THEN NULL
             WHEN a.kind IS NOT NULL THEN a.kind
-            WHEN a.handle IS NULL AND l.has_executions AND NOT l.has_requests THEN 'service'
-            WHEN a.handle IS NOT NULL AND l.has_takes AND u.process_id IS NULL THEN 'timer'
+            WHEN a.handle IS NULL AND a.has_executions AND NOT a.has_requests THEN 'service'
+            WHEN a.handle IS NOT NULL AND a.has_takes AND u.process_id IS NULL THEN 'timer'
         END AS kind
     FROM staging.callback_announced AS a
-    JOIN layout AS l ON a.trace_index = l.trace_index
     LEFT JOIN staging.untraced_take AS u ON a.process_id = u.process_id
 ),
 asked AS (

@@ -173,6 +173,7 @@ class StagedEvents:
                 con.execute(
                     "INSERT INTO staging.event_count VALUES (?, ?, true, ?)", [trace, name, count]
                 )
+                con.execute("INSERT INTO staging.declared VALUES (?, ?)", [trace, name])
         packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
         self._read(con, batches, packets)
         corrections = reconciled.find(con)

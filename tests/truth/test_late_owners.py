@@ -18,8 +18,7 @@ CASES = {
     ("multi_threaded", "jazzy"): set(),
     ("nested", "jazzy"): set(),
     ("services", "rolling"): set(),
-    # The trace of one host has services alone: nothing says that executors name what they execute.
-    ("services", "jazzy"): {"service"},
+    ("services", "jazzy"): set(),
     # Loaned messages.
     ("layers", "rolling"): {"subscription"},
     # Executors have no events, and takes neither.
@@ -33,7 +32,7 @@ def test_owners(system: str, layout: str, tmp_path: Path) -> None:
     simulation = simulate(
         system,
         tmp_path / "trace",
-        factor=0.02 if system == "multi_threaded" else 0.15,
+        factor=0.15,
         layout=layout,
         recording=Recording(start_ns=150 * MILLISECOND),
     )
