@@ -32,17 +32,17 @@ WITH object AS (
     UNION ALL
     SELECT
         run_id, process_id, node_id, 'timer', printf('%.10g ms', period_ns / 1e6), NULL,
-        created_ns, timer_id, false, false
+        created_ns, timer_id, is_inferred, false
     FROM main.timer
     UNION ALL
     SELECT
-        run_id, process_id, node_id, 'service', service_name, NULL, created_ns, service_id, false,
-        is_internal
+        run_id, process_id, node_id, 'service', service_name, NULL, created_ns, service_id,
+        is_inferred, is_internal
     FROM main.service
     UNION ALL
     SELECT
-        run_id, process_id, node_id, 'client', service_name, NULL, created_ns, client_id, false,
-        is_internal
+        run_id, process_id, node_id, 'client', service_name, NULL, created_ns, client_id,
+        is_inferred, is_internal
     FROM main.client
 ),
 symbol AS (

@@ -132,6 +132,11 @@ def load_traces(
             "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",
             [trace_index, name, name in catalogue.tracepoints, count],
         )
+    for trace in traces.traces:
+        con.execute(
+            "INSERT INTO staging.declared SELECT ?, unnest(?::VARCHAR[])",
+            [trace.index, [name for name in trace.event_names if name in wanted]],
+        )
     for damage in traces.damages:
         con.execute(
             "INSERT INTO staging.damage VALUES (?, ?, ?, ?, ?)",

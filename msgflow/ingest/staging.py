@@ -2,10 +2,11 @@
 
 `raw` is a temporary database file with one table per tracepoint, the packets, and the threads, all
 as read. `staging` is a database in memory, which spills to the temporary directory:
-`staging.source` (one row per trace), `staging.event_count`, `staging.left_out` (events that
-another trace holds as well), `staging.event` (all events of known
-tracepoints but those of the kernel, without payload), `staging.predecessor` (the pointers from
-event to event), and the objects of `schema/model`.
+`staging.source` (one row per trace), `staging.event_count`, `staging.declared` (tracepoints that
+were enabled in a trace, also if they never occurred), `staging.left_out` (events that another trace
+holds as well), `staging.event` (all events of known tracepoints but those of the kernel, without
+payload), `staging.predecessor` (the pointers from event to event), and the objects of
+`schema/model`.
 """
 
 from __future__ import annotations
@@ -53,6 +54,10 @@ CREATE TABLE staging.event_count (
 )
 """
 
+_DECLARED_TABLE = """
+CREATE TABLE staging.declared (trace_index INTEGER, name VARCHAR)
+"""
+
 _LEFT_OUT_TABLE = """
 CREATE TABLE staging.left_out (
     trace_index INTEGER, used_index INTEGER, event_count BIGINT, thread_count BIGINT,
@@ -81,6 +86,7 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         _THREAD_TABLES,
         _SOURCE_TABLE,
         _EVENT_COUNT_TABLE,
+        _DECLARED_TABLE,
         _LEFT_OUT_TABLE,
         _DAMAGE_TABLE,
     ):

@@ -8,7 +8,8 @@
 --     record initialisation into a snapshot session that runs all the time, and ingest both.
 -- grain: one row per process
 -- severity: warning
--- needs: main.node, main.publisher, main.subscription, main.callback, main.process, main.host
+-- needs: main.node, main.publisher, main.subscription, main.timer, main.service, main.client,
+--     main.callback, main.process, main.host
 WITH object AS (
     SELECT process_id, 'nodes' AS kind, is_inferred FROM main.node
     UNION ALL
@@ -16,7 +17,13 @@ WITH object AS (
     UNION ALL
     SELECT process_id, 'subscriptions', is_inferred FROM main.subscription
     UNION ALL
-    SELECT process_id, 'callbacks', kind = 'unknown' FROM main.callback
+    SELECT process_id, 'timers', is_inferred FROM main.timer
+    UNION ALL
+    SELECT process_id, 'services', is_inferred FROM main.service
+    UNION ALL
+    SELECT process_id, 'clients', is_inferred FROM main.client
+    UNION ALL
+    SELECT process_id, 'callbacks', created_ns IS NULL FROM main.callback
 ),
 counted AS (
     SELECT process_id, kind, sum(is_inferred::BIGINT)::BIGINT AS inferred, count(*) AS number

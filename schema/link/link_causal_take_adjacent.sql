@@ -1,10 +1,11 @@
 -- name: derive.link_causal_take_adjacent
 -- description: Publications that a thread makes after taking a message by hand (rclpy, rclc, wait
---     sets), until its next take, as far as no callback is seen to begin, no executor to go on and
---     no gap in between. What is published inside a run of a callback has that for its cause.
+--     sets), until its next take, also of a request or a response, as far as no callback is seen to
+--     begin, no executor to go on and no gap in between. What is published inside a run of a
+--     callback has that for its cause.
 -- grain: one row per publication made after a take without a callback
--- needs: derive.link_causal_direct, store.publication, store.take, store.callback_instance,
---     store.executor_state, store.loss_interval
+-- needs: derive.link_causal_direct, store.publication, store.take, store.request, store.response,
+--     store.callback_instance, store.executor_state, store.loss_interval
 WITH handled AS (
     SELECT take_id FROM store.callback_instance WHERE take_id IS NOT NULL
 ),
@@ -35,7 +36,8 @@ alone AS (
     ANTI JOIN derive.link_causal_direct AS d ON b.publication_id = d.publication_id
 ),
 adjacent AS (
-    SELECT a.run_id, t.take_id, a.publication_id, a.trace_id, a.start_ns, t.taken_ns
+    SELECT
+        a.run_id, a.thread_id, t.take_id, a.publication_id, a.trace_id, a.start_ns, t.taken_ns
     FROM alone AS a
     ASOF JOIN turn AS t
         ON a.run_id = t.run_id
@@ -48,7 +50,25 @@ behind_gap AS (
     FROM adjacent AS a
     ASOF JOIN store.loss_interval AS l ON a.trace_id = l.trace_id AND a.start_ns > l.start_ns
     WHERE l.start_ns >= a.taken_ns
+),
+-- Requests and responses that the thread took; of them the times are stored, not the events.
+called AS (
+    SELECT q.run_id, q.receiver_thread_id AS thread_id, q.taken_ns
+    FROM store.request AS q
+    SEMI JOIN busy AS w ON q.run_id = w.run_id AND q.receiver_thread_id = w.thread_id
+    UNION ALL
+    SELECT r.run_id, r.receiver_thread_id, r.taken_ns
+    FROM store.response AS r
+    SEMI JOIN busy AS w ON r.run_id = w.run_id AND r.receiver_thread_id = w.thread_id
+),
+behind_call AS (
+    SELECT a.publication_id
+    FROM adjacent AS a
+    ASOF JOIN called AS c
+        ON a.run_id = c.run_id AND a.thread_id = c.thread_id AND a.start_ns >= c.taken_ns
+    WHERE c.taken_ns >= a.taken_ns
 )
 SELECT a.run_id, a.take_id, a.publication_id
 FROM adjacent AS a
 ANTI JOIN behind_gap AS g ON a.publication_id = g.publication_id
+ANTI JOIN behind_call AS c ON a.publication_id = c.publication_id

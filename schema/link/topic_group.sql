@@ -1,11 +1,13 @@
 -- name: derive.topic_group
 -- description: Which publishers and subscriptions whose topic is not known are on one topic, as far
 --     as messages tell. A stamp that one publication of the run has belongs to one message: its
---     publisher and those who took it are on one topic, and so is whatever else such messages join
---     to any of them. The name is that of the members that have one; members of several names teach
---     nothing. Pairs that next to none of the messages of both sides speak for are chance.
+--     publisher and those who took it are on one topic, and so are those of a message that went
+--     through a ring buffer, and whatever else such messages join to any of them. The name is that
+--     of the members that have one; members of several names teach nothing. Pairs that next to none
+--     of the messages of both sides speak for are chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
--- needs: store.publication, store.publisher, store.take, store.subscription
+-- needs: store.publication, store.publisher, store.take, store.subscription,
+--     store.ring_buffer_event
 WITH RECURSIVE endpoint AS (
     SELECT
         run_id, publisher_id AS vertex,
@@ -30,6 +32,43 @@ published AS (
     GROUP BY b.run_id, b.source_timestamp_ns
     HAVING count(*) = 1
 ),
+-- Ring buffers that objects without a topic used, with all that went through them.
+unknown_buffer AS (
+    SELECT r.run_id, r.process_id, r.buffer_handle
+    FROM store.ring_buffer_event AS r
+    JOIN store.take AS t ON r.take_id = t.take_id
+    WHERE t.subscription_id IN (
+        SELECT subscription_id
+        FROM store.subscription
+        WHERE is_inferred
+            AND rmw_handle IS NULL
+            AND (topic_name IS NULL OR coalesce(is_topic_learned, false))
+    )
+    UNION
+    SELECT r.run_id, r.process_id, r.buffer_handle
+    FROM store.ring_buffer_event AS r
+    JOIN store.publication AS b ON r.publication_id = b.publication_id
+    WHERE b.intra_ns IS NOT NULL
+        AND b.publisher_id IN (
+            SELECT publisher_id
+            FROM store.publisher
+            WHERE is_inferred AND (topic_name IS NULL OR coalesce(is_topic_learned, false))
+        )
+),
+slot_use AS (
+    SELECT
+        r.kind, r.take_id,
+        lag(r.kind) OVER in_slot AS previous_kind,
+        lag(r.publication_id) OVER in_slot AS publication_id
+    FROM store.ring_buffer_event AS r
+    SEMI JOIN unknown_buffer AS u
+        ON r.run_id = u.run_id
+        AND r.process_id = u.process_id
+        AND r.buffer_handle = u.buffer_handle
+    WINDOW in_slot AS (
+        PARTITION BY r.run_id, r.process_id, r.buffer_handle, r.slot ORDER BY r.event_id
+    )
+),
 pair AS (
     SELECT p.publisher_id, t.subscription_id, count(*) AS message_count
     FROM published AS p
@@ -37,6 +76,16 @@ pair AS (
         ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
     WHERE p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
     GROUP BY p.publisher_id, t.subscription_id
+    UNION ALL
+    SELECT b.publisher_id, t.subscription_id, count(*)
+    FROM slot_use AS s
+    JOIN store.publication AS b ON s.publication_id = b.publication_id
+    JOIN store.take AS t ON s.take_id = t.take_id
+    WHERE s.kind = 'dequeue'
+        AND s.previous_kind = 'enqueue'
+        AND b.publisher_id IS NOT NULL
+        AND t.subscription_id IS NOT NULL
+    GROUP BY b.publisher_id, t.subscription_id
 ),
 likely AS (
     SELECT publisher_id, -subscription_id AS subscription_vertex

@@ -1,10 +1,11 @@
 -- name: staging.callback
 -- description: Callback objects. One that ran but whose creation was not traced gets a row, and
 --     learns its subscription or service from the messages that it was called with (the most
---     frequent).
+--     frequent), else what it belongs to from the executor.
 -- grain: one row per callback object
--- needs: staging.callback_known, staging.callback_binding, staging.subscription, staging.take,
---     staging.service, staging.service_event, staging.request_callback
+-- needs: staging.callback_known, staging.callback_binding, staging.callback_owner,
+--     staging.subscription, staging.take, staging.timer, staging.service, staging.service_event,
+--     staging.request_callback
 WITH learned AS (
     SELECT
         b.process_id,
@@ -36,36 +37,54 @@ never_added AS (
 ),
 every_callback AS (
     SELECT
-        k.event_id, k.event_id AS callback_event_id, k.process_id, k.kind, k.timer_id,
-        k.service_id, k.node_id, k.callback_handle, k.symbol, k.created_ns, s.subscription_id
-    FROM staging.callback_known AS k
-    LEFT JOIN staging.subscription AS s ON k.subscription_event_id = s.event_id
+        event_id, event_id AS callback_event_id, process_id, kind, subscription_event_id,
+        timer_event_id, service_event_id, callback_handle, symbol, created_ns
+    FROM staging.callback_known
     UNION ALL
     SELECT
-        event_id, NULL, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL, NULL, NULL
+        event_id, NULL, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL, NULL
     FROM never_added
+),
+owned AS (
+    SELECT
+        c.event_id, c.callback_event_id, c.process_id, c.callback_handle, c.symbol, c.created_ns,
+        CASE WHEN c.kind = 'unknown' THEN coalesce(o.kind, c.kind) ELSE c.kind END AS kind,
+        CASE WHEN o.kind = 'subscription' THEN o.owner_event_id ELSE c.subscription_event_id END
+            AS subscription_event_id,
+        CASE WHEN o.kind = 'timer' THEN o.owner_event_id ELSE c.timer_event_id END
+            AS timer_event_id,
+        CASE WHEN o.kind = 'service' THEN o.owner_event_id ELSE c.service_event_id END
+            AS service_event_id
+    FROM every_callback AS c
+    LEFT JOIN staging.callback_owner AS o
+        ON c.process_id = o.process_id
+        AND c.callback_handle = o.callback_handle
+        AND c.callback_event_id IS NOT DISTINCT FROM o.callback_event_id
 ),
 complete AS (
     SELECT
-        c.event_id, c.process_id, c.timer_id, c.callback_handle, c.symbol, c.created_ns,
-        coalesce(c.subscription_id, l.subscription_id) AS subscription_id,
-        coalesce(c.service_id, v.service_id) AS service_id,
+        c.event_id, c.process_id, t.timer_id, c.callback_handle, c.symbol, c.created_ns,
+        coalesce(s.subscription_id, l.subscription_id) AS subscription_id,
+        coalesce(e.service_id, v.service_id) AS service_id,
         CASE
             WHEN c.kind <> 'unknown' THEN c.kind
             WHEN l.subscription_id IS NOT NULL THEN 'subscription'
             WHEN v.service_id IS NOT NULL THEN 'service'
             ELSE c.kind
         END AS kind,
-        c.node_id
-    FROM every_callback AS c
+        t.node_id
+    FROM owned AS c
+    LEFT JOIN staging.subscription AS s ON c.subscription_event_id = s.event_id
+    LEFT JOIN staging.timer AS t ON c.timer_event_id = t.event_id
+    LEFT JOIN staging.service AS e ON c.service_event_id = e.event_id
     LEFT JOIN learned AS l
-        ON c.subscription_id IS NULL
+        ON s.subscription_id IS NULL
         AND c.kind IN ('unknown', 'subscription')
         AND c.process_id = l.process_id
         AND c.callback_handle = l.callback_handle
         AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
     LEFT JOIN learned_service AS v
-        ON c.service_id IS NULL
+        ON e.service_id IS NULL
         AND c.kind IN ('unknown', 'service')
         AND c.process_id = v.process_id
         AND c.callback_handle = v.callback_handle
@@ -74,7 +93,7 @@ complete AS (
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS callback_id,
     c.process_id,
-    coalesce(c.node_id, s.node_id) AS node_id,
+    coalesce(c.node_id, s.node_id, v.node_id) AS node_id,
     c.kind,
     c.subscription_id,
     c.timer_id,
@@ -85,3 +104,4 @@ SELECT
     c.event_id
 FROM complete AS c
 LEFT JOIN staging.subscription AS s ON c.subscription_id = s.subscription_id
+LEFT JOIN staging.service AS v ON c.service_id = v.service_id

@@ -1,29 +1,27 @@
 -- name: staging.callback_known
--- description: Callback objects whose creation was traced, with what they belong to. A callback
---     that was only registered has a symbol but no owner.
+-- description: Callback objects whose creation was traced, with what they belong to, each by the
+--     event that initialised it. A callback that was only registered has a symbol but no owner; a
+--     service that was not seen to be initialised is known by its handle.
 -- grain: one row per callback object
--- needs: staging.located, staging.subscription_object, staging.timer, staging.service
+-- needs: staging.located, staging.subscription_object, staging.timer_use, staging.service_known
 WITH added AS (
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'subscription' AS kind,
-        o.subscription_event_id, NULL::BIGINT AS timer_id, NULL::BIGINT AS service_id,
-        NULL::BIGINT AS node_id
+        o.subscription_event_id, NULL::BIGINT AS timer_event_id,
+        NULL::BIGINT AS service_event_id, NULL::UBIGINT AS service_handle
     FROM staging.located('ros2_rclcpp_subscription_callback_added') AS a
     LEFT JOIN staging.subscription_object AS o ON a.event_id = o.event_id
     UNION ALL
     SELECT
-        a.event_id, a.ts_ns, a.process_id, a.callback, 'timer', NULL, t.timer_id, NULL, t.node_id
+        a.event_id, a.ts_ns, a.process_id, a.callback, 'timer', NULL, u.timer_event_id, NULL, NULL
     FROM staging.located('ros2_rclcpp_timer_callback_added') AS a
-    ASOF LEFT JOIN staging.timer AS t
-        ON a.process_id = t.process_id
-        AND a.timer_handle = t.timer_handle
-        AND a.event_id >= t.event_id
+    JOIN staging.timer_use AS u ON a.event_id = u.event_id
     UNION ALL
     SELECT
-        a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL, s.service_id,
-        s.node_id
+        a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL, s.event_id,
+        a.service_handle
     FROM staging.located('ros2_rclcpp_service_callback_added') AS a
-    ASOF LEFT JOIN staging.service AS s
+    ASOF LEFT JOIN staging.service_known AS s
         ON a.process_id = s.process_id
         AND a.service_handle = s.service_handle
         AND a.event_id >= s.event_id
@@ -50,7 +48,7 @@ symbol_of AS (
 )
 SELECT
     a.event_id, a.ts_ns AS created_ns, a.process_id, a.callback AS callback_handle, a.kind,
-    a.subscription_event_id, a.timer_id, a.service_id, a.node_id, s.symbol
+    a.subscription_event_id, a.timer_event_id, a.service_event_id, a.service_handle, s.symbol
 FROM added AS a
 LEFT JOIN symbol_of AS s ON a.event_id = s.added_event_id
 UNION ALL

@@ -7,8 +7,9 @@
 --     staging.left_out, staging.source, staging.publisher_known, staging.subscription_known,
 --     staging.client, staging.service, staging.client_event, staging.service_event,
 --     staging.client_gid, staging.request_pair,
---     staging.annotation, staging.annotation_object, staging.trace, staging.clock,
---     staging.network_packet, staging.single_packet, staging.link_packet
+--     staging.annotation, staging.annotation_object, staging.timer, staging.callback_owner,
+--     staging.buffer_owner, staging.trace, staging.clock, staging.network_packet,
+--     staging.single_packet, staging.link_packet
 WITH unmatched_end AS (
     SELECT trace_index
     FROM staging.callback_left_over
@@ -47,11 +48,30 @@ inferred AS (
     UNION ALL
     SELECT 'subscription', process_id FROM staging.subscription WHERE is_inferred
     UNION ALL
+    SELECT 'timer', process_id FROM staging.timer WHERE created_ns IS NULL
+    UNION ALL
     SELECT 'callback', process_id FROM staging.callback WHERE created_ns IS NULL
     UNION ALL
     SELECT 'client', process_id FROM staging.client WHERE created_ns IS NULL
     UNION ALL
     SELECT 'service', process_id FROM staging.service WHERE created_ns IS NULL
+),
+-- Of what callbacks that ran belong to.
+owner AS (
+    SELECT 'eliminated_owner' AS name, process_id FROM staging.callback_owner WHERE is_eliminated
+    UNION ALL
+    SELECT 'unknown_owner', c.process_id
+    FROM staging.callback AS c
+    WHERE c.kind = 'unknown'
+        AND c.callback_id IN (
+            SELECT callback_id
+            FROM staging.callback_instance
+            WHERE callback_id IN (SELECT callback_id FROM staging.callback WHERE kind = 'unknown')
+        )
+    UNION ALL
+    SELECT 'ambiguous_buffer', process_id
+    FROM staging.buffer_owner
+    WHERE subscription_event_id IS NULL
 ),
 ambiguous_request AS (
     SELECT DISTINCT t.event_id
@@ -171,6 +191,27 @@ SELECT
 FROM inferred AS i
 JOIN process_label AS l ON i.process_id = l.process_id
 GROUP BY i.kind
+UNION ALL
+SELECT
+    NULL,
+    o.name,
+    'warning',
+    count(*),
+    CASE o.name
+        WHEN 'eliminated_owner' THEN
+            'callbacks that were told to be of timers or services since executors ran them without '
+            || 'a take, not seeing either initialised; subscriptions of loaned messages would look '
+            || 'like timers, in '
+        WHEN 'unknown_owner' THEN
+            'callbacks that ran of which the trace does not tell what they belong to (no executor '
+            || 'events, takes that were not recorded, or loaned messages), in '
+        ELSE
+            'ring buffers whose messages several callbacks were handed, or one those of several: '
+            || 'not seen to be made, and without a subscription, in '
+    END || string_agg(DISTINCT l.label, ', ' ORDER BY l.label)
+FROM owner AS o
+JOIN process_label AS l ON o.process_id = l.process_id
+GROUP BY o.name
 UNION ALL
 SELECT
     o.trace_index + 1,

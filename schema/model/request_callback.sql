@@ -4,15 +4,14 @@
 --     where both are known.
 -- grain: one row per request that was taken and led to a run of a callback
 -- needs: staging.service_event, staging.callback_run, staging.callback_binding,
---     staging.callback_known, staging.service
+--     staging.callback_known
 SELECT e.event_id AS take_event_id, r.start_event_id
 FROM staging.service_event AS e
 JOIN staging.callback_run AS r ON e.event_id = r.previous_event_id
 JOIN staging.callback_binding AS b ON r.start_event_id = b.start_event_id
 LEFT JOIN staging.callback_known AS k ON b.callback_event_id = k.event_id
-LEFT JOIN staging.service AS s ON k.service_id = s.service_id
 WHERE e.is_request
     AND coalesce(r.executor_event_id < e.event_id, true)
     AND NOT r.is_intra_process
     AND coalesce(b.kind IN ('service', 'unknown'), true)
-    AND coalesce(s.event_id = e.service_event_id, true)
+    AND coalesce(k.service_event_id = e.service_event_id, true)

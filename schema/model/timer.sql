@@ -1,27 +1,30 @@
 -- name: staging.timer
--- description: Timers. The node is linked after the timer was made (since Galactic).
+-- description: Timers. The node is linked after the timer was made (since Galactic). One that was
+--     used but never initialised in the trace gets a row without period.
 -- grain: one row per timer
--- needs: staging.located, staging.object_node
-WITH link AS (
-    SELECT l.event_id, l.process_id, l.timer_handle, n.node_id
-    FROM staging.located('ros2_rclcpp_timer_link_node') AS l
-    LEFT JOIN staging.object_node AS n ON l.event_id = n.event_id
-),
-initialised AS (
-    SELECT event_id, process_id, timer_handle, period AS period_ns, ts_ns AS created_ns
+-- needs: staging.located, staging.timer_use, staging.object_node, staging.callback_owner
+WITH every_timer AS (
+    SELECT event_id, process_id, period AS period_ns, timer_handle, ts_ns AS created_ns
     FROM staging.located('ros2_rcl_timer_init')
+    UNION ALL
+    SELECT timer_event_id, process_id, NULL, any_value(timer_handle), NULL
+    FROM (
+        SELECT timer_event_id, process_id, timer_handle FROM staging.timer_use WHERE is_inferred
+        UNION ALL
+        SELECT owner_event_id, process_id, handle
+        FROM staging.callback_owner
+        WHERE kind = 'timer' AND is_inferred
+    )
+    GROUP BY timer_event_id, process_id
 ),
 linked AS (
-    SELECT i.event_id, min(l.node_id) AS node_id
-    FROM link AS l
-    ASOF JOIN initialised AS i
-        ON l.process_id = i.process_id
-        AND l.timer_handle = i.timer_handle
-        AND l.event_id >= i.event_id
-    GROUP BY i.event_id
+    SELECT u.timer_event_id, min(n.node_id) AS node_id
+    FROM staging.timer_use AS u
+    JOIN staging.object_node AS n ON u.event_id = n.event_id
+    GROUP BY u.timer_event_id
 )
 SELECT
-    row_number() OVER (ORDER BY i.event_id) AS timer_id,
-    i.process_id, l.node_id, i.period_ns, i.timer_handle, i.created_ns, i.event_id
-FROM initialised AS i
-LEFT JOIN linked AS l ON i.event_id = l.event_id
+    row_number() OVER (ORDER BY t.event_id) AS timer_id,
+    t.process_id, l.node_id, t.period_ns, t.timer_handle, t.created_ns, t.event_id
+FROM every_timer AS t
+LEFT JOIN linked AS l ON t.event_id = l.timer_event_id

@@ -1,6 +1,7 @@
 -- name: main.callback_label
 -- description: What people call a callback: what triggers it, such as Timer(5 ms) or
---     Subscription(/scan), in the node that it belongs to.
+--     Subscription(/scan), in the node that it belongs to. A timer of unknown period is told from
+--     others by its handle.
 -- grain: one row per callback object
 -- column: callback_id BIGINT  Identity of the callback
 -- column: run_id BIGINT  Run that the row belongs to
@@ -14,7 +15,11 @@ SELECT
     c.run_id,
     derive.node_label(n.full_name, p.name, p.pid) AS node,
     CASE c.kind
-        WHEN 'timer' THEN coalesce(printf('Timer(%.10g ms)', t.period_ns / 1e6), 'Timer(?)')
+        WHEN 'timer' THEN coalesce(
+            printf('Timer(%.10g ms)', t.period_ns / 1e6),
+            printf('Timer(0x%x)', t.timer_handle),
+            'Timer(?)'
+        )
         WHEN 'subscription' THEN printf('Subscription(%s)', coalesce(s.topic_name, '?'))
         WHEN 'service' THEN printf('Service(%s)', coalesce(v.service_name, '?'))
         ELSE printf('Callback(0x%x)', c.callback_handle)

@@ -11,6 +11,7 @@
 -- column: gid BLOB  Identifier that servers see, 16 bytes; NULL: none
 -- column: created_ns BIGINT [epoch ns]  rcl_client_init
 -- column: is_internal BOOLEAN  Infrastructure of ROS (parameter and lifecycle services)
+-- column: is_inferred BOOLEAN  Its initialisation was not traced
 -- needs: store.client, derive.corrected_ns, derive.process_clock
 SELECT
     self.client_id,
@@ -22,6 +23,7 @@ SELECT
     self.rmw_handle,
     self.gid,
     derive.corrected_ns(self.created_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS created_ns,
-    self.is_internal
+    self.is_internal,
+    self.created_ns IS NULL AS is_inferred
 FROM store.client AS self
 JOIN derive.process_clock AS c ON self.process_id = c.process_id

@@ -1,7 +1,8 @@
 -- name: main.stat_delivery
 -- description: What became of every message at every subscription of its topic. Whether a message
 --     was overwritten in the queue or lost on the way is told by the depth of the queue alone;
---     incompatible QoS, lifespan and best effort do not show in a trace.
+--     incompatible QoS, lifespan and best effort do not show in a trace. Of a ring buffer whose
+--     subscription was not traced there is only what was taken from it.
 -- grain: one row per publication and subscription of its topic
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: publication_id BIGINT  The message

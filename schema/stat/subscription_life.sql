@@ -1,7 +1,9 @@
 -- name: derive.subscription_life
 -- description: How long each subscription could take messages, on the clock of its host: from its
 --     creation to the last event of the threads that read it, or until its handle was used again.
--- grain: one row per subscription
+--     A placeholder for the reader of a ring buffer is left out: it may be one with that for what
+--     comes through the middleware, and nobody can tell what it should have got.
+-- grain: one row per subscription with a handle
 -- needs: store.subscription, store.process, store.host, store.thread, derive.subscription_reader
 WITH host_end AS (
     SELECT host_id, max(last_seen_ns) AS end_ns
@@ -46,3 +48,4 @@ JOIN store.host AS h ON p.host_id = h.host_id
 LEFT JOIN host_end AS e ON p.host_id = e.host_id
 LEFT JOIN reader AS r ON s.subscription_id = r.subscription_id
 LEFT JOIN successor AS x ON s.subscription_id = x.subscription_id
+WHERE NOT coalesce(s.is_inferred AND s.rmw_handle IS NULL, false)

@@ -85,6 +85,13 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             )
         ],
     ),
+    "uncertain_owner": (
+        {
+            "diagnostic": "name,severity,count,detail\n"
+            "eliminated_owner,warning,2,timers\ninferred_timer,warning,2,none\n"
+        },
+        [("the input", 2, "timers")],
+    ),
     "process_without_ros": (
         {
             "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n"
@@ -212,7 +219,7 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_pat
             "subscription": "subscription_id,topic_name\n1,/a\n",
             "publication": PUBLISHED + "1,1,1,10,11,10\n",
             "take": TAKEN + "1,1,1,20,10,rmw\n",
-            "callback": "callback_id,kind\n1,subscription\n",
+            "callback": "callback_id,kind,created_ns\n1,subscription,1\n",
             "callback_instance": "callback_instance_id,take_id,start_ns,end_ns\n1,1,21,22\n",
             "executor_state": "state,start_ns\nwait,1\n",
             "packet": "begin_ns,end_ns,event_count\n0,100,9\n",

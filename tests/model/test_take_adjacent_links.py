@@ -99,3 +99,20 @@ def test_flows_pass_through(relay: RosSystem, analyse: Analyse) -> None:
         (3, "take", "transport", True, None),
         (4, "callback_instance", "callback", True, None),
     ]
+
+
+def test_until_the_next_take_of_a_request_or_response(relay: RosSystem, analyse: Analyse) -> None:
+    """A service of rclpy shows no callback either; what it publishes is not due to the message."""
+    relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
+    relay.publish(PYTHON, 0x11, 1, layers="rcl rmw")
+    relay.take_request(Thread(200, 201), 0x40, 1, gid=7)
+    relay.publish(PYTHON, 0x11, 2, layers="rcl rmw")
+    relay.take_request(PYTHON, 0x40, 2, gid=7, taken=0)
+    relay.publish(PYTHON, 0x11, 3, layers="rcl rmw")
+    relay.take_request(PYTHON, 0x40, 2, gid=7)
+    relay.publish(PYTHON, 0x11, 4, layers="rcl rmw")
+    relay.take(PYTHON, 0x20, 12, layers="rmw rcl")
+    relay.publish(PYTHON, 0x11, 5, layers="rcl rmw")
+    relay.take_response(PYTHON, 0x50, 1)
+    relay.publish(PYTHON, 0x11, 6, layers="rcl rmw")
+    assert [row[:2] for row in analyse(relay).rows(LINKS)] == [(1, 11), (2, 11), (3, 11), (5, 12)]

@@ -10,7 +10,7 @@ rest of an ingest on them.
 from __future__ import annotations
 
 import shutil
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,6 +169,11 @@ class StagedEvents:
         for name, events in rows.items():
             schema = pa.schema([*COMMON_SCHEMA, *load().tracepoints[name].arrow_schema()])
             batches.append((name, pa.RecordBatch.from_pylist(events, schema=schema)))
+            for trace, count in Counter(event["trace_index"] for event in events).items():
+                con.execute(
+                    "INSERT INTO staging.event_count VALUES (?, ?, true, ?)", [trace, name, count]
+                )
+                con.execute("INSERT INTO staging.declared VALUES (?, ?)", [trace, name])
         packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
         self._read(con, batches, packets)
         corrections = reconciled.find(con)
