@@ -1,23 +1,28 @@
 -- name: derive.topic_group
+-- kind: macro
 -- description: Which publishers and subscriptions whose topic is not known are on one topic, as far
 --     as messages tell. A stamp that one publication of the run has belongs to one message: its
 --     publisher and those who took it are on one topic, and so is whatever else such messages join
 --     to any of them. The name is that of the members that have one; members of several names teach
 --     nothing. Pairs that next to none of the messages of both sides speak for are chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
+-- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.publisher, store.take, store.subscription
+CREATE OR REPLACE MACRO derive.topic_group(only_run) AS TABLE
 WITH RECURSIVE endpoint AS (
     SELECT
         run_id, publisher_id AS vertex,
         CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END AS topic_name,
         is_internal
     FROM store.publisher
+    WHERE run_id = only_run
     UNION ALL
     SELECT
         run_id, -subscription_id,
         CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END,
         is_internal
     FROM store.subscription
+    WHERE run_id = only_run
 ),
 concerned AS (
     SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL
@@ -26,7 +31,7 @@ published AS (
     SELECT b.run_id, b.source_timestamp_ns, any_value(b.publisher_id) AS publisher_id
     FROM store.publication AS b
     SEMI JOIN concerned AS c ON b.run_id = c.run_id
-    WHERE b.source_timestamp_ns <> 0
+    WHERE b.run_id = only_run AND b.source_timestamp_ns <> 0
     GROUP BY b.run_id, b.source_timestamp_ns
     HAVING count(*) = 1
 ),
@@ -35,7 +40,7 @@ pair AS (
     FROM published AS p
     JOIN store.take AS t
         ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
-    WHERE p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
+    WHERE t.run_id = only_run AND p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
     GROUP BY p.publisher_id, t.subscription_id
 ),
 likely AS (
