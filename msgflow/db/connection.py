@@ -59,6 +59,9 @@ def open_file(
         con = duckdb.connect(str(path), read_only=read_only, config=config)
         # stdout is for data: DuckDB would draw its bar there when a statement takes long.
         con.execute("SET enable_progress_bar = false")
+        # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with
+        # all on the right. Behind filters it expects few where there are thousands.
+        con.execute("SET asof_loop_join_threshold = 0")
         return con
     except duckdb.IOException as error:
         text = str(error)
