@@ -74,20 +74,23 @@ def open_file(
         config["storage_compatibility_version"] = STORAGE_VERSION
     with _opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
-        _hide_progress(con)
+        _prepare(con)
         return con
 
 
 def open_memory() -> duckdb.DuckDBPyConnection:
     """Open a new database in memory."""
     con = duckdb.connect(":memory:")
-    _hide_progress(con)
+    _prepare(con)
     return con
 
 
-def _hide_progress(con: duckdb.DuckDBPyConnection) -> None:
-    """Keep stdout for data: DuckDB would draw its bar there when a statement takes long."""
+def _prepare(con: duckdb.DuckDBPyConnection) -> None:
+    # stdout is for data: DuckDB would draw its bar there when a statement takes long.
     con.execute("SET enable_progress_bar = false")
+    # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with
+    # all on the right. Behind filters it expects few where there are thousands.
+    con.execute("SET asof_loop_join_threshold = 0")
 
 
 @contextlib.contextmanager

@@ -115,9 +115,9 @@ def _learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         con.execute(
             f"UPDATE store.{kind} SET topic_name = learned.topic_name, "
             "is_internal = learned.is_internal, is_topic_learned = true "
-            "FROM derive.topic_learned AS learned "
+            "FROM derive.topic_learned(?) AS learned "
             f"WHERE learned.kind = '{kind}' AND {kind}.{kind}_id = learned.id "
-            f"AND {kind}.run_id = ? AND learned.run_id = ?",
+            f"AND {kind}.run_id = ?",
             [run_id, run_id],
         )
 

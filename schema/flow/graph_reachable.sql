@@ -8,12 +8,18 @@
 CREATE OR REPLACE MACRO derive.graph_reachable(
     edges, start_kind, start_id, max_depth := NULL
 ) AS TABLE
+-- The edges must not be looked for again at every step. What is used twice is computed once; the
+-- word MATERIALIZED alone gets lost where a file of this storage version is opened again.
 WITH RECURSIVE edge AS MATERIALIZED (
     SELECT from_kind, from_id, to_kind, to_id FROM query_table(edges)
 ),
+known AS (
+    SELECT count(*) AS edge_count FROM edge
+),
 reached (kind, id) AS (
     SELECT start_kind::VARCHAR, start_id::BIGINT
-    WHERE max_depth IS NULL
+    FROM known
+    WHERE max_depth IS NULL AND edge_count >= 0
     UNION
     SELECT e.to_kind, e.to_id
     FROM reached AS r
@@ -21,7 +27,8 @@ reached (kind, id) AS (
 ),
 near (kind, id, depth) USING KEY (kind, id) AS (
     SELECT start_kind::VARCHAR, start_id::BIGINT, 0
-    WHERE max_depth IS NOT NULL
+    FROM known
+    WHERE max_depth IS NOT NULL AND edge_count >= 0
     UNION
     SELECT e.to_kind, e.to_id, min(n.depth) + 1
     FROM near AS n

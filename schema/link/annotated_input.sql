@@ -6,16 +6,22 @@
 --     publishes is none of these. Runs that were under way at the cut, on other threads, could
 --     have been it as well. Nothing is linked across a gap in the record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
+-- param: only_run BIGINT  Run to look at
 -- param: wanted_kind VARCHAR  Kind of the annotations
 -- needs: derive.annotated_publication, derive.annotated_run, store.annotation_input,
 --     store.callback_instance, store.thread_break, store.loss_interval
-CREATE OR REPLACE MACRO derive.annotated_input(wanted_kind) AS TABLE
-WITH demand AS MATERIALIZED (
+CREATE OR REPLACE MACRO derive.annotated_input(only_run, wanted_kind) AS TABLE
+WITH nesting AS (
+    SELECT DISTINCT parent_id
+    FROM store.callback_instance
+    WHERE run_id = only_run AND parent_id IS NOT NULL
+),
+demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.publication_id, b.callback_instance_id AS publishing_id,
         b.trace_id, b.thread_id, b.start_ns, b.start_event_id, b.cut_event_id,
         i.subscription_id
-    FROM derive.annotated_publication AS b
+    FROM derive.annotated_publication(only_run) AS b
     JOIN store.annotation_input AS i ON b.annotation_id = i.annotation_id
     WHERE b.kind = wanted_kind AND b.subscription_id IS DISTINCT FROM i.subscription_id
 ),
@@ -23,7 +29,7 @@ run AS MATERIALIZED (
     SELECT
         run_id, subscription_id, callback_instance_id, thread_id, start_event_id,
         effective_end_event_id
-    FROM derive.annotated_run
+    FROM derive.annotated_run(only_run)
 ),
 -- Runs that end together (in a gap) are one moment: the last to begin stands for it.
 ended AS (
@@ -46,7 +52,7 @@ nested AS (
     FROM (
         SELECT * FROM demand
         WHERE publishing_id IN (
-            SELECT parent_id FROM store.callback_instance WHERE parent_id IS NOT NULL
+            SELECT parent_id FROM nesting
         )
     ) AS d
     ASOF JOIN ended_on_thread AS e
@@ -69,7 +75,7 @@ alone AS (
     HAVING min(thread_id) = max(thread_id)
         AND NOT bool_or(
             callback_instance_id IN (
-                SELECT parent_id FROM store.callback_instance WHERE parent_id IS NOT NULL
+                SELECT parent_id FROM nesting
             )
         )
 ),
@@ -149,7 +155,8 @@ found AS MATERIALIZED (
         i.start_event_id AS input_start_event_id,
         i.effective_end_event_id AS input_end_event_id
     FROM cached AS c
-    JOIN store.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
+    JOIN store.callback_instance AS i
+        ON c.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
 ),
 -- Only traces with gaps need a closer look.
 gap AS (
@@ -159,6 +166,7 @@ gap AS (
             PARTITION BY trace_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
         ) AS covered_until_ns
     FROM store.loss_interval
+    WHERE run_id = only_run
 ),
 exposed AS MATERIALIZED (
     SELECT
@@ -174,17 +182,20 @@ exposed AS MATERIALIZED (
     ASOF JOIN gap AS g ON f.exposed_trace_id = g.trace_id AND f.start_ns > g.start_ns
     WHERE g.covered_until_ns >= f.input_start_ns
 ),
+break AS (
+    SELECT thread_id, resumed_event_id FROM store.thread_break WHERE run_id = only_run
+),
 crossing AS (
     SELECT e.annotation_id, e.publication_id, e.callback_instance_id
     FROM exposed AS e
-    ASOF JOIN store.thread_break AS k
+    ASOF JOIN break AS k
         ON e.thread_id = k.thread_id AND e.input_start_event_id < k.resumed_event_id
     WHERE k.resumed_event_id <= e.start_event_id
     UNION
     -- The input's thread may be heard of again only after the publication.
     SELECT e.annotation_id, e.publication_id, e.callback_instance_id
     FROM exposed AS e
-    ASOF JOIN store.thread_break AS k
+    ASOF JOIN break AS k
         ON e.input_thread_id = k.thread_id AND e.input_start_event_id < k.resumed_event_id
     WHERE k.resumed_event_id <= e.start_event_id OR e.begins_between
 )

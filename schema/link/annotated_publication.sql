@@ -1,10 +1,13 @@
 -- name: derive.annotated_publication
+-- kind: macro
 -- description: Publications by the outputs of annotations, with the run of a callback that they
 --     were made in and its subscription. The cut, before which an input has to be there, is the
 --     start of that run, else that of the publication itself.
 -- grain: one row per annotation and publication by one of its outputs
+-- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, derive.annotated_run, store.annotation,
 --     store.annotation_output, store.publication, store.callback_instance
+CREATE OR REPLACE MACRO derive.annotated_publication(only_run) AS TABLE
 SELECT
     a.run_id,
     a.annotation_id,
@@ -20,6 +23,7 @@ SELECT
 FROM store.annotation AS a
 JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
 JOIN store.publication AS b ON o.publisher_id = b.publisher_id
-LEFT JOIN derive.link_causal_direct AS d ON b.publication_id = d.publication_id
+LEFT JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
 LEFT JOIN store.callback_instance AS i ON d.callback_instance_id = i.callback_instance_id
-LEFT JOIN derive.annotated_run AS s ON d.callback_instance_id = s.callback_instance_id
+LEFT JOIN derive.annotated_run(only_run) AS s ON d.callback_instance_id = s.callback_instance_id
+WHERE a.run_id = only_run AND b.run_id = only_run

@@ -1,7 +1,10 @@
 -- name: derive.annotated_run
+-- kind: macro
 -- description: Runs of the callbacks of subscriptions that are inputs of annotations.
 -- grain: one row per run of such a callback
+-- param: only_run BIGINT  Run to look at
 -- needs: store.annotation_input, store.callback_instance, store.callback, store.take
+CREATE OR REPLACE MACRO derive.annotated_run(only_run) AS TABLE
 SELECT
     i.run_id,
     coalesce(c.subscription_id, t.subscription_id) AS subscription_id,
@@ -15,6 +18,7 @@ FROM store.callback_instance AS i
 JOIN store.callback AS c ON i.callback_id = c.callback_id
 LEFT JOIN store.take AS t
     ON c.subscription_id IS NULL AND i.take_id = t.take_id AND i.run_id = t.run_id
-WHERE coalesce(c.subscription_id, t.subscription_id) IN (
-    SELECT subscription_id FROM store.annotation_input
-)
+WHERE i.run_id = only_run
+    AND coalesce(c.subscription_id, t.subscription_id) IN (
+        SELECT subscription_id FROM store.annotation_input WHERE run_id = only_run
+    )

@@ -1,34 +1,38 @@
 -- name: derive.link_causal
+-- kind: macro
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
 --     events where a gap touches its run of a callback, or its take, or its publication.
 -- grain: one row per run of a callback, or take outside of any, and publication that it led to, and
 --     annotation of an indirect link
+-- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, derive.link_causal_take_adjacent,
 --     derive.link_causal_periodic_async, derive.link_causal_partial_sync,
 --     store.callback_instance, store.take, store.publication
+CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
 WITH indirect AS (
     SELECT
         run_id, callback_instance_id, publication_id, 'periodic_async' AS kind, annotation_id,
         candidate_count, is_loss_affected
-    FROM derive.link_causal_periodic_async
+    FROM derive.link_causal_periodic_async(only_run)
     UNION ALL
     SELECT
         run_id, callback_instance_id, publication_id, 'partial_sync', annotation_id,
         candidate_count, is_loss_affected
-    FROM derive.link_causal_partial_sync
+    FROM derive.link_causal_partial_sync(only_run)
 ),
 link AS (
     SELECT
         run_id, callback_instance_id, take_id, publication_id, publisher_id, 'direct' AS kind,
         NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, is_loss_affected
-    FROM derive.link_causal_direct
+    FROM derive.link_causal_direct(only_run)
     UNION ALL
     SELECT
         a.run_id, NULL, a.take_id, a.publication_id, b.publisher_id, 'take_adjacent', NULL, 1,
         t.is_loss_affected OR b.is_loss_affected
-    FROM derive.link_causal_take_adjacent AS a
+    FROM derive.link_causal_take_adjacent(only_run) AS a
     JOIN store.take AS t ON a.take_id = t.take_id
     JOIN store.publication AS b ON a.publication_id = b.publication_id
+    WHERE t.run_id = only_run AND b.run_id = only_run
     UNION ALL
     SELECT
         x.run_id, x.callback_instance_id, i.take_id, x.publication_id, b.publisher_id, x.kind,
@@ -37,6 +41,7 @@ link AS (
     FROM indirect AS x
     JOIN store.callback_instance AS i ON x.callback_instance_id = i.callback_instance_id
     JOIN store.publication AS b ON x.publication_id = b.publication_id
+    WHERE i.run_id = only_run AND b.run_id = only_run
 )
 SELECT
     l.run_id,
@@ -50,4 +55,4 @@ SELECT
     l.candidate_count,
     coalesce(l.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
-LEFT JOIN store.take AS t ON l.take_id = t.take_id
+LEFT JOIN store.take AS t ON l.take_id = t.take_id AND t.run_id = only_run

@@ -1,22 +1,27 @@
 -- name: derive.link_causal_direct
+-- kind: macro
 -- description: Publications inside a run of a callback on its thread, from its start to its
 --     effective end; of nested runs the innermost. Order decides, not time. The last begin or end
 --     of a callback before the publication tells which run that is: the one that began, unless it
 --     was over, else the nearest run around it that was not.
 -- grain: one row per publication made inside a run of a callback
+-- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.callback_instance
+CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE
 WITH RECURSIVE around AS (
     SELECT b.run_id, b.publication_id, b.start_event_id AS event_id, i.parent_id
     FROM store.publication AS b
     JOIN store.callback_instance AS i
         ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
-    WHERE i.parent_id IS NOT NULL AND b.start_event_id >= i.effective_end_event_id
+    WHERE b.run_id = only_run
+        AND i.parent_id IS NOT NULL
+        AND b.start_event_id >= i.effective_end_event_id
     UNION ALL
     SELECT b.run_id, b.publication_id, b.start_event_id, i.parent_id
     FROM store.publication AS b
     JOIN store.callback_instance AS i
         ON b.run_id = i.run_id AND b.callback_event_id = i.end_event_id
-    WHERE i.parent_id IS NOT NULL
+    WHERE b.run_id = only_run AND i.parent_id IS NOT NULL
     UNION ALL
     SELECT a.run_id, a.publication_id, a.event_id, i.parent_id
     FROM around AS a
@@ -29,7 +34,7 @@ SELECT
 FROM store.publication AS b
 JOIN store.callback_instance AS i
     ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
-WHERE b.start_event_id < i.effective_end_event_id
+WHERE b.run_id = only_run AND b.start_event_id < i.effective_end_event_id
 UNION ALL
 SELECT
     a.run_id, i.callback_instance_id, a.publication_id, i.take_id, b.publisher_id,

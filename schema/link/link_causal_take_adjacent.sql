@@ -1,18 +1,24 @@
 -- name: derive.link_causal_take_adjacent
+-- kind: macro
 -- description: Publications that a thread makes after taking a message by hand (rclpy, rclc, wait
 --     sets), until its next take, also of a request or a response, as far as no callback is seen to
 --     begin, no executor to go on and no gap in between. What is published inside a run of a
 --     callback has that for its cause.
 -- grain: one row per publication made after a take without a callback
+-- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, store.publication, store.take, store.request, store.response,
 --     store.callback_instance, store.executor_state, store.loss_interval
+CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH handled AS (
-    SELECT take_id FROM store.callback_instance WHERE take_id IS NOT NULL
+    SELECT take_id
+    FROM store.callback_instance
+    WHERE run_id = only_run AND take_id IS NOT NULL
 ),
 by_hand AS (
     SELECT t.run_id, t.thread_id, t.start_event_id AS event_id, t.take_id, t.taken_ns
     FROM store.take AS t
     ANTI JOIN handled AS h ON t.take_id = h.take_id
+    WHERE t.run_id = only_run
 ),
 busy AS (
     SELECT DISTINCT run_id, thread_id FROM by_hand
@@ -24,16 +30,19 @@ turn AS (
     SELECT i.run_id, i.thread_id, i.start_event_id, NULL, NULL
     FROM store.callback_instance AS i
     SEMI JOIN busy AS w ON i.run_id = w.run_id AND i.thread_id = w.thread_id
+    WHERE i.run_id = only_run
     UNION ALL
     SELECT e.run_id, e.thread_id, e.start_event_id, NULL, NULL
     FROM store.executor_state AS e
     SEMI JOIN busy AS w ON e.run_id = w.run_id AND e.thread_id = w.thread_id
+    WHERE e.run_id = only_run
 ),
 alone AS (
     SELECT b.run_id, b.thread_id, b.trace_id, b.publication_id, b.start_event_id, b.start_ns
     FROM store.publication AS b
     SEMI JOIN busy AS w ON b.run_id = w.run_id AND b.thread_id = w.thread_id
-    ANTI JOIN derive.link_causal_direct AS d ON b.publication_id = d.publication_id
+    ANTI JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
+    WHERE b.run_id = only_run
 ),
 adjacent AS (
     SELECT
@@ -56,10 +65,12 @@ called AS (
     SELECT q.run_id, q.receiver_thread_id AS thread_id, q.taken_ns
     FROM store.request AS q
     SEMI JOIN busy AS w ON q.run_id = w.run_id AND q.receiver_thread_id = w.thread_id
+    WHERE q.run_id = only_run
     UNION ALL
     SELECT r.run_id, r.receiver_thread_id, r.taken_ns
     FROM store.response AS r
     SEMI JOIN busy AS w ON r.run_id = w.run_id AND r.receiver_thread_id = w.thread_id
+    WHERE r.run_id = only_run
 ),
 behind_call AS (
     SELECT a.publication_id

@@ -1,4 +1,5 @@
 -- name: derive.link_transport
+-- kind: macro
 -- description: Messages from publication to take, by every method. A node that takes its own
 --     transform, or whose process's transform listener does, is a self loop: no flow passes
 --     through it. A link by equal stamps and topics with one candidate cannot be spoilt by lost
@@ -6,24 +7,26 @@
 --     take (on hosts with different clocks: within the publication), or a gap of the receiver's
 --     trace likewise, the better candidate may be in it.
 -- grain: one row per take whose publication is known
+-- param: only_run BIGINT  Run to look at
 -- needs: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.trace_gap, store.publication, store.publisher,
 --     store.take, store.subscription, store.node, store.process, store.host
+CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
 WITH link AS (
     SELECT
         run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
         false AS is_loss_affected
-    FROM derive.link_transport_exact
+    FROM derive.link_transport_exact(only_run)
     UNION ALL
     SELECT
         run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
         is_loss_affected
-    FROM derive.link_transport_nearest
+    FROM derive.link_transport_nearest(only_run)
     UNION ALL
     SELECT
         run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
         is_loss_affected
-    FROM derive.link_transport_ring_buffer
+    FROM derive.link_transport_ring_buffer(only_run)
 ),
 guess AS (
     SELECT
@@ -41,7 +44,9 @@ guess AS (
     JOIN store.take AS t ON l.take_id = t.take_id
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id
-    WHERE l.method <> 'exact' OR l.candidate_count > 1
+    WHERE (l.method <> 'exact' OR l.candidate_count > 1)
+        AND b.run_id = only_run
+        AND t.run_id = only_run
 ),
 exposed AS (
     SELECT u.run_id, u.take_id

@@ -1,4 +1,5 @@
 -- name: derive.link_transport_exact
+-- kind: macro
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
 --     known, whether from their own initialisation or from other messages of the two (then
 --     `exact_stamp`). A topic unknown on a side counts only where the stamp alone has a single
@@ -6,10 +7,12 @@
 --     with equal topic and stamp the k-th belongs to the k-th such take of a subscription, so that
 --     none is received twice. Equal values need no clocks: a take may seem to precede.
 -- grain: one row per take whose publication is known by its stamp
+-- param: only_run BIGINT  Run to look at
 -- needs: derive.topic_group, store.publication, store.publisher, store.take, store.subscription
+CREATE OR REPLACE MACRO derive.link_transport_exact(only_run) AS TABLE
 WITH unnamed AS (
     SELECT run_id, kind, id, 'group ' || group_id AS topic_name
-    FROM derive.topic_group
+    FROM derive.topic_group(only_run)
     WHERE topic_name IS NULL
 ),
 published AS (
@@ -22,7 +25,7 @@ published AS (
         ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
     LEFT JOIN unnamed AS g
         ON b.publisher_id = g.id AND b.run_id = g.run_id AND g.kind = 'publisher'
-    WHERE b.source_timestamp_ns <> 0
+    WHERE b.run_id = only_run AND b.source_timestamp_ns <> 0
 ),
 received AS (
     SELECT
@@ -34,7 +37,7 @@ received AS (
         ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
     LEFT JOIN unnamed AS g
         ON t.subscription_id = g.id AND t.run_id = g.run_id AND g.kind = 'subscription'
-    WHERE t.source_timestamp_ns <> 0
+    WHERE t.run_id = only_run AND t.source_timestamp_ns <> 0
 ),
 repeated_publication AS (
     SELECT run_id, source_timestamp_ns

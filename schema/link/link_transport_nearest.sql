@@ -1,9 +1,12 @@
 -- name: derive.link_transport_nearest
+-- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
 --     message once. What may be lost around the moment of publishing makes the link doubtful.
 -- grain: one row per take whose publication is known by time
+-- param: only_run BIGINT  Run to look at
 -- needs: store.nearest_message, store.take, store.subscription, store.publication,
 --     store.loss_interval
+CREATE OR REPLACE MACRO derive.link_transport_nearest(only_run) AS TABLE
 WITH received AS (
     SELECT
         t.run_id, t.take_id, t.subscription_id, m.publication_id, m.candidate_count
@@ -12,7 +15,7 @@ WITH received AS (
     JOIN store.take AS t
         ON s.subscription_id = t.subscription_id
         AND m.source_timestamp_ns = t.source_timestamp_ns
-    WHERE m.publication_id IS NOT NULL
+    WHERE m.run_id = only_run AND t.run_id = only_run AND m.publication_id IS NOT NULL
     QUALIFY row_number() OVER (
         PARTITION BY t.subscription_id, t.source_timestamp_ns ORDER BY t.take_id
     ) = 1
@@ -24,6 +27,7 @@ sent AS (
         coalesce(b.next_event_ns, b.end_ns + 5000000) AS until_ns
     FROM received AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
+    WHERE b.run_id = only_run
 ),
 affected AS (
     SELECT s.take_id

@@ -1,9 +1,12 @@
 -- name: derive.link_transport_ring_buffer
+-- kind: macro
 -- description: Messages between nodes of one process, by the slot of the ring buffer: what is taken
 --     out was put in last, unless the buffer was cleared or made anew meanwhile, or a gap of the
 --     trace may hide that it was used again.
 -- grain: one row per dequeue whose publication is known
+-- param: only_run BIGINT  Run to look at
 -- needs: store.ring_buffer_event, store.loss_interval, store.publication, store.take
+CREATE OR REPLACE MACRO derive.link_transport_ring_buffer(only_run) AS TABLE
 WITH slot_use AS (
     SELECT
         run_id, trace_id, process_id, buffer_handle, kind, at_ns, take_id, event_id,
@@ -12,7 +15,7 @@ WITH slot_use AS (
         lag(at_ns) OVER in_slot AS previous_ns,
         lag(publication_id) OVER in_slot AS publication_id
     FROM store.ring_buffer_event
-    WHERE kind <> 'clear'
+    WHERE run_id = only_run AND kind <> 'clear'
     WINDOW in_slot AS (
         PARTITION BY run_id, process_id, buffer_handle, slot ORDER BY event_id
     )
@@ -20,7 +23,9 @@ WITH slot_use AS (
 cleared AS (
     SELECT s.run_id, s.take_id
     FROM slot_use AS s
-    ASOF JOIN (SELECT * FROM store.ring_buffer_event WHERE kind = 'clear') AS c
+    ASOF JOIN (
+        SELECT * FROM store.ring_buffer_event WHERE run_id = only_run AND kind = 'clear'
+    ) AS c
         ON s.run_id = c.run_id
         AND s.process_id = c.process_id
         AND s.buffer_handle = c.buffer_handle
@@ -47,5 +52,7 @@ JOIN store.publication AS b ON s.publication_id = b.publication_id
 JOIN store.take AS t ON s.take_id = t.take_id
 ANTI JOIN cleared AS c ON s.take_id = c.take_id
 ANTI JOIN behind_gap AS g ON s.take_id = g.take_id
-WHERE s.kind = 'dequeue'
+WHERE b.run_id = only_run
+    AND t.run_id = only_run
+    AND s.kind = 'dequeue'
     AND s.previous_kind = 'enqueue'

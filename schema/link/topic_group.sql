@@ -1,4 +1,5 @@
 -- name: derive.topic_group
+-- kind: macro
 -- description: Which publishers and subscriptions whose topic is not known are on one topic, as far
 --     as messages tell. A stamp that one publication of the run has belongs to one message: its
 --     publisher and those who took it are on one topic, and so are those of a message that went
@@ -6,20 +7,24 @@
 --     of the members that have one; members of several names teach nothing. Pairs that next to none
 --     of the messages of both sides speak for are chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
+-- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.publisher, store.take, store.subscription,
 --     store.ring_buffer_event
+CREATE OR REPLACE MACRO derive.topic_group(only_run) AS TABLE
 WITH RECURSIVE endpoint AS (
     SELECT
         run_id, publisher_id AS vertex,
         CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END AS topic_name,
         is_internal
     FROM store.publisher
+    WHERE run_id = only_run
     UNION ALL
     SELECT
         run_id, -subscription_id,
         CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END,
         is_internal
     FROM store.subscription
+    WHERE run_id = only_run
 ),
 concerned AS (
     SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL
@@ -28,7 +33,7 @@ published AS (
     SELECT b.run_id, b.source_timestamp_ns, any_value(b.publisher_id) AS publisher_id
     FROM store.publication AS b
     SEMI JOIN concerned AS c ON b.run_id = c.run_id
-    WHERE b.source_timestamp_ns <> 0
+    WHERE b.run_id = only_run AND b.source_timestamp_ns <> 0
     GROUP BY b.run_id, b.source_timestamp_ns
     HAVING count(*) = 1
 ),
@@ -37,7 +42,7 @@ unknown_buffer AS (
     SELECT r.run_id, r.process_id, r.buffer_handle
     FROM store.ring_buffer_event AS r
     JOIN store.take AS t ON r.take_id = t.take_id
-    WHERE t.subscription_id IN (
+    WHERE r.run_id = only_run AND t.subscription_id IN (
         SELECT subscription_id
         FROM store.subscription
         WHERE is_inferred
@@ -48,7 +53,8 @@ unknown_buffer AS (
     SELECT r.run_id, r.process_id, r.buffer_handle
     FROM store.ring_buffer_event AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
-    WHERE b.intra_ns IS NOT NULL
+    WHERE r.run_id = only_run
+        AND b.intra_ns IS NOT NULL
         AND b.publisher_id IN (
             SELECT publisher_id
             FROM store.publisher
@@ -65,6 +71,7 @@ slot_use AS (
         ON r.run_id = u.run_id
         AND r.process_id = u.process_id
         AND r.buffer_handle = u.buffer_handle
+    WHERE r.run_id = only_run
     WINDOW in_slot AS (
         PARTITION BY r.run_id, r.process_id, r.buffer_handle, r.slot ORDER BY r.event_id
     )
@@ -74,7 +81,7 @@ pair AS (
     FROM published AS p
     JOIN store.take AS t
         ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
-    WHERE p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
+    WHERE t.run_id = only_run AND p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
     GROUP BY p.publisher_id, t.subscription_id
     UNION ALL
     SELECT b.publisher_id, t.subscription_id, count(*)

@@ -4,7 +4,7 @@
 --     use of the handle.
 -- grain: one row per rmw_send_request or successful rmw_take_response
 -- needs: staging.context, staging.client_known, raw
-WITH event AS (
+WITH event AS NOT MATERIALIZED (
     SELECT
         event_id, ts_ns, thread_index, true AS is_request, rmw_client_handle AS rmw_handle,
         sequence_number, NULL::BIGINT AS source_timestamp_ns
@@ -16,19 +16,45 @@ WITH event AS (
     FROM raw.ros2_rmw_take_response
     WHERE taken IS DISTINCT FROM 0
 ),
-resolved AS (
+placed AS NOT MATERIALIZED (
     SELECT
         e.event_id, e.ts_ns, c.thread_id, c.process_id, e.is_request, e.rmw_handle,
-        e.sequence_number, e.source_timestamp_ns, k.event_id AS known_event_id
+        e.sequence_number, e.source_timestamp_ns
     FROM event AS e
     JOIN staging.context AS c
         ON e.thread_index = c.thread_index
         AND e.event_id >= c.from_event_id
         AND e.event_id < c.until_event_id
-    ASOF LEFT JOIN staging.client_known AS k
-        ON c.process_id = k.process_id
-        AND e.rmw_handle = k.rmw_handle
-        AND e.event_id >= k.event_id
+),
+known AS (
+    SELECT event_id, process_id, rmw_handle FROM staging.client_known
+),
+repeated AS (
+    SELECT process_id, rmw_handle
+    FROM known
+    GROUP BY process_id, rmw_handle
+    HAVING count(*) > 1
+),
+-- Nearly every handle is used once: only the others need an order.
+resolved AS NOT MATERIALIZED (
+    SELECT p.*, k.event_id AS known_event_id
+    FROM placed AS p
+    LEFT JOIN known AS k
+        ON p.process_id = k.process_id
+        AND p.rmw_handle = k.rmw_handle
+        AND p.event_id >= k.event_id
+    ANTI JOIN repeated AS r ON p.process_id = r.process_id AND p.rmw_handle = r.rmw_handle
+    UNION ALL
+    SELECT p.*, k.event_id
+    FROM (
+        SELECT * FROM placed
+        SEMI JOIN repeated AS r
+            ON placed.process_id = r.process_id AND placed.rmw_handle = r.rmw_handle
+    ) AS p
+    ASOF LEFT JOIN known AS k
+        ON p.process_id = k.process_id
+        AND p.rmw_handle = k.rmw_handle
+        AND p.event_id >= k.event_id
 ),
 first_use AS (
     SELECT process_id, rmw_handle, min(event_id) AS event_id

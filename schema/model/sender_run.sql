@@ -14,11 +14,18 @@ run AS (
     FROM staging.callback_instance AS i
     SEMI JOIN send AS s ON i.thread_id = s.thread_id
 ),
+nesting AS (
+    SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL
+),
 -- Whose run goes on after each event; where runs end at the begin of another, that one.
 edge AS (
-    SELECT thread_id, start_event_id AS event_id, callback_instance_id, 0 AS rank FROM run
+    SELECT run.thread_id, start_event_id AS event_id, callback_instance_id, 0 AS rank
+    FROM run
+    SEMI JOIN nesting AS n ON run.thread_id = n.thread_id
     UNION ALL
-    SELECT thread_id, effective_end_event_id, parent_id, depth FROM run
+    SELECT run.thread_id, effective_end_event_id, parent_id, depth
+    FROM run
+    SEMI JOIN nesting AS n ON run.thread_id = n.thread_id
 ),
 change AS (
     SELECT
@@ -27,6 +34,12 @@ change AS (
     FROM edge
     GROUP BY thread_id, event_id
 )
+SELECT s.event_id, r.callback_instance_id
+FROM send AS s
+ASOF JOIN run AS r ON s.thread_id = r.thread_id AND s.event_id >= r.start_event_id
+ANTI JOIN nesting AS n ON s.thread_id = n.thread_id
+WHERE s.event_id < r.effective_end_event_id
+UNION ALL
 SELECT s.event_id, c.callback_instance_id
 FROM send AS s
 ASOF JOIN change AS c ON s.thread_id = c.thread_id AND s.event_id >= c.event_id

@@ -86,7 +86,7 @@ SELECT
         WHEN j.has_gap THEN 'publisher_gap'
         WHEN j.has_none_left THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
-            SELECT take_id FROM derive.take_candidate WHERE run_id = of_run
+            SELECT take_id FROM derive.take_candidate(of_run)
         ) OR (o.topic_name, o.stamp_ns) IN (
             SELECT (topic_name, source_timestamp_ns)
             FROM store.nearest_message
