@@ -13,8 +13,8 @@ true, recall the share of the decided links that were found; both must be 1.000.
 version of msgflow has no rule for are counted apart.
 
 Then, for each message that a subscription did not take, the true reason beside the one given, and
-where the trace does not decide it why not. The exit code is 1 if a figure that must be 1.000 is not,
-or a reason is wrong that the trace decides.
+where the trace does not decide it why not. The exit code is 1 if a figure that must be 1.000 is
+not, or a reason is wrong that the trace decides.
 """
 
 from __future__ import annotations

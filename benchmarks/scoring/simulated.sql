@@ -268,15 +268,19 @@ LEFT JOIN whole_callback AS w ON q.callback_instance_id::VARCHAR = w.id;
 CREATE OR REPLACE TEMP TABLE truth_drop AS
 WITH life AS (
     SELECT
-        s.subscription_id, s.host, s.pid, s.subscription_handle, s.created_ns,
-        bool_or(o.ended_ns IS NULL OR o.ended_ns > s.ended_ns) AS is_outlived,
+        subscription_id, host, pid, subscription_handle, created_ns,
         row_number() OVER (
-            PARTITION BY s.host, s.pid, s.subscription_handle ORDER BY s.created_ns
+            PARTITION BY host, pid, subscription_handle ORDER BY created_ns
         ) AS life
+    FROM simulated_subscription
+),
+-- Subscriptions that ended before others of their process.
+outlived AS (
+    SELECT DISTINCT s.subscription_id
     FROM simulated_subscription AS s
-    LEFT JOIN simulated_subscription AS o
+    JOIN simulated_subscription AS o
         ON s.host = o.host AND s.pid = o.pid AND o.created_ns <= s.ended_ns
-    GROUP BY ALL
+        AND (o.ended_ns IS NULL OR o.ended_ns > s.ended_ns)
 ),
 -- What was taken, as far as the trace tells which message it was.
 taken AS (
@@ -354,7 +358,8 @@ SELECT
         WHEN u.reason = 'expired' THEN 'no event of expiry'
         -- That its process ends shows.
         WHEN u.reason = 'subscription_ended' THEN CASE
-            WHEN s.is_outlived THEN 'no event of destruction'
+            WHEN s.subscription_id IN (FROM outlived)
+                THEN 'no event of destruction'
         END
         ELSE 'trace ends'
     END AS undecided

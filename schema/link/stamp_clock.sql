@@ -9,7 +9,10 @@
 --     taken on the clock of the publisher is looked for among the publications right before its
 --     take, others among those around the stamp; a few messages per stretch are enough. Where
 --     nearly as many allow a lesser difference, by which the messages would be those of later
---     publications, the clock may have jumped by a period: no message agrees then.
+--     publications, the clock may have jumped by a period: no message agrees then. Where messages
+--     were taken on other clocks only, of several differences that many allow the sharpest counts:
+--     of the right one the delays from write to stamp vary least. A drift that is too steep for
+--     this to be exact tells nothing: nor does a message agree then.
 -- grain: one row per clock and stretch of time with messages that agree
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message
@@ -213,7 +216,8 @@ ballot AS MATERIALIZED (
 ),
 -- A difference that few agree with, several times in a row, is given up for that of the latest
 -- publications that many agree with: a message is taken soon after it was published. Where no
--- message was taken on this clock the nearest such difference is as good.
+-- message was taken on this clock it is given up for the sharpest that many agree with, if no other
+-- is nearly as sharp; also where it is far from the sharpest itself, as after a jump by a period.
 followed (
     clock_id, number, stretch, difference_ns, vote_count, miss_count, is_ambiguous
 ) AS (
@@ -432,6 +436,7 @@ near_vote AS (
         AND (
             NOT r.is_fitted
             OR abs(v.residue_ns - x.fine_slack_ns) <= 4000 + x.stretch_ns // 125000
+                + greatest(abs(r.slope) - 50000, 0) * x.stretch_ns / 2e9
         )
     WINDOW in_stretch AS (PARTITION BY v.clock_id, v.stretch)
 ),
@@ -452,7 +457,8 @@ SELECT
     x.start_ns + (r.stretch + 1) * x.stretch_ns AS end_ns,
     r.difference_ns + coalesce(f.residue_ns, 0) AS difference_ns,
     r.slope::BIGINT AS drift_ppb,
-    coalesce(f.vote_count, r.vote_count)::BIGINT AS message_count
+    CASE WHEN abs(r.slope) <= 175000 THEN coalesce(f.vote_count, r.vote_count) ELSE 0 END::BIGINT
+        AS message_count
 FROM rough AS r
 JOIN extent AS x ON r.clock_id = x.clock_id
 LEFT JOIN fine AS f ON r.clock_id = f.clock_id AND r.stretch = f.stretch

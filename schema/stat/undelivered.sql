@@ -5,7 +5,8 @@
 --     message in the queue would have ended it. A wait tells only where a single thread reads, and
 --     only if it lasted ten times as long as messages usually need, at least a millisecond.
 --     `overwritten` and `lost_in_transport` are told apart by the depth of the queue alone. Where
---     the subscription took a message in that time that could not be identified, nothing is said.
+--     the subscription took a message in that time that could not be identified, nothing is said;
+--     nor that messages were overwritten where it took none of the publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 -- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap,
 --     store.link_transport, store.take, derive.vain_take, store.executor_state
