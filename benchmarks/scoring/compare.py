@@ -57,12 +57,13 @@ class Score:
 class Drop:
     """Messages that a subscription did not take: the true reason and the one that was given.
 
-    `is_decided`: the trace decides it, so that the one given must be right.
+    `undecided`: why the trace does not decide it; None where it does, so that the one given must be
+    right.
     """
 
     truth: str
     reason: str
-    is_decided: bool
+    undecided: str | None
     messages: int
     is_right: bool
 

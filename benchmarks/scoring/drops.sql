@@ -39,7 +39,7 @@ publication AS (
 SELECT
     d.reason AS truth,
     coalesce(v.reason, v.status, 'no row') AS reason,
-    d.is_decided,
+    d.undecided,
     count(*) AS messages,
     coalesce(bool_or(a.reason IS NOT NULL), false) AS is_right
 FROM truth_drop AS d

@@ -261,54 +261,117 @@ JOIN recorded AS t ON t.kind = 'request_taken' AND q.request_id::VARCHAR = t.id
 LEFT JOIN whole_callback AS w ON q.callback_instance_id::VARCHAR = w.id;
 
 -- Messages that a subscription did not take, where the publication is in the trace. An address may
--- have been that of several subscriptions: `life` says the how manieth had it. Why a message did not
--- arrive can be told as a rule only if a later one did.
+-- have been that of several subscriptions: `life` says the how manieth had it. `undecided` says why
+-- the trace does not decide the reason, NULL where it does. A trace shows what was taken, and of
+-- everything else only what follows from that: when the two were connected shows by the first
+-- message that was taken, that a message is not merely late by one after it.
 CREATE OR REPLACE TEMP TABLE truth_drop AS
 WITH life AS (
     SELECT
-        subscription_id, host, pid, subscription_handle,
+        subscription_id, host, pid, subscription_handle, created_ns,
         row_number() OVER (
             PARTITION BY host, pid, subscription_handle ORDER BY created_ns
         ) AS life
     FROM simulated_subscription
 ),
+-- Subscriptions that ended before others of their process.
+outlived AS (
+    SELECT DISTINCT s.subscription_id
+    FROM simulated_subscription AS s
+    JOIN simulated_subscription AS o
+        ON s.host = o.host AND s.pid = o.pid AND o.created_ns <= s.ended_ns
+        AND (o.ended_ns IS NULL OR o.ended_ns > s.ended_ns)
+),
+-- What was taken, as far as the trace tells which message it was.
 taken AS (
     SELECT
-        t.subscription_id, p.host, p.pid, p.publisher_handle, t.method,
+        t.subscription_id, p.host, p.pid, p.publisher_handle,
+        min(p.source_timestamp_ns) AS first_stamp_ns,
         max(p.source_timestamp_ns) AS last_stamp_ns
-    FROM simulated_take AS t
-    JOIN simulated_publication AS p ON t.publication_id = p.publication_id
+    FROM truth_link AS l
+    JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
+    JOIN simulated_publication AS p ON l.from_id = p.publication_id::VARCHAR
+    WHERE l.kind = 'transport' AND l.is_decided
     GROUP BY ALL
 ),
-last_of_publisher AS (
-    SELECT subscription_id, host, pid, publisher_handle, max(last_stamp_ns) AS last_stamp_ns
-    FROM taken
-    GROUP BY ALL
-),
-last_of_any AS (
+of_publisher AS (
     SELECT
-        subscription_id, max(last_stamp_ns) AS last_stamp_ns,
-        bool_or(method = 'ring_buffer') AS is_buffered
+        subscription_id, host, pid, publisher_handle,
+        min(first_stamp_ns) AS first_stamp_ns, max(last_stamp_ns) AS last_stamp_ns
     FROM taken
     GROUP BY ALL
+),
+of_any AS (
+    SELECT subscription_id, max(last_stamp_ns) AS last_stamp_ns FROM taken GROUP BY ALL
+),
+equal_stamp AS (
+    SELECT topic_name, source_timestamp_ns
+    FROM simulated_publication
+    GROUP BY ALL
+    HAVING count(*) > 1
+),
+-- How the clocks of two hosts are apart, and how long messages are on their way, where the trace
+-- tells it.
+way AS (
+    SELECT
+        t.publication_host, t.take_host,
+        median(t.take_rmw_ns - t.publication_rmw_ns - t.latency_ns) AS apart_ns,
+        max(t.latency_ns) AS longest_ns
+    FROM truth_link AS l
+    JOIN simulated_transport AS t
+        ON l.from_id = t.publication_id::VARCHAR AND l.to_id = t.take_id::VARCHAR
+    WHERE l.kind = 'transport' AND l.is_decided
+    GROUP BY ALL
+),
+lost AS (
+    SELECT DISTINCT host FROM simulated_unrecorded WHERE cause <> 'late start'
+),
+unnamed AS (
+    SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
 )
 SELECT
     u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
     u.reason, u.is_internal,
     CASE
-        WHEN a.is_buffered AND 'derive.link_transport_ring_buffer' NOT IN (FROM built) THEN false
-        WHEN u.reason = 'before_subscription' THEN true
-        WHEN u.reason = 'overwritten' THEN a.last_stamp_ns > p.source_timestamp_ns
-        WHEN u.reason IN ('before_discovery', 'lost_in_transport', 'take_failed')
-            THEN b.last_stamp_ns > p.source_timestamp_ns
-        ELSE false
-    END IS TRUE AS is_decided
+        WHEN p.host IN (FROM lost) OR s.host IN (FROM lost) THEN 'events are missing'
+        WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
+            OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
+            THEN 'initialisation is missing'
+        WHEN q.topic_name IS NOT NULL THEN 'another message has its stamp'
+        WHEN u.reason = 'before_subscription' THEN CASE
+            WHEN p.host <> s.host AND w.apart_ns IS NULL THEN 'clocks are apart'
+            WHEN p.host <> s.host
+                AND coalesce(p.rmw_ns, p.rcl_ns) + w.apart_ns + w.longest_ns >= s.created_ns
+                THEN 'clocks are apart'
+        END
+        WHEN u.reason = 'overwritten' THEN CASE
+            WHEN a.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
+            WHEN b.first_stamp_ns < p.source_timestamp_ns IS NOT TRUE THEN 'nothing earlier taken'
+        END
+        WHEN u.reason IN ('lost_in_transport', 'take_failed') THEN CASE
+            WHEN b.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
+            WHEN b.first_stamp_ns < p.source_timestamp_ns IS NOT TRUE THEN 'nothing earlier taken'
+        END
+        WHEN u.reason = 'before_discovery' THEN CASE
+            WHEN b.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
+        END
+        WHEN u.reason = 'expired' THEN 'no event of expiry'
+        -- That its process ends shows.
+        WHEN u.reason = 'subscription_ended' THEN CASE
+            WHEN s.subscription_id IN (FROM outlived)
+                THEN 'no event of destruction'
+        END
+        ELSE 'trace ends'
+    END AS undecided
 FROM simulated_undelivered AS u
 JOIN simulated_publication AS p ON u.publication_id = p.publication_id
 JOIN life AS s ON u.subscription_id = s.subscription_id
 JOIN truth_link AS l ON l.kind = 'publication' AND u.publication_id::VARCHAR = l.from_id
-LEFT JOIN last_of_publisher AS b
+LEFT JOIN of_publisher AS b
     ON u.subscription_id = b.subscription_id AND p.host = b.host AND p.pid = b.pid
-    AND p.publisher_handle = b.publisher_handle
-LEFT JOIN last_of_any AS a ON u.subscription_id = a.subscription_id
+    AND p.publisher_handle IS NOT DISTINCT FROM b.publisher_handle
+LEFT JOIN of_any AS a ON u.subscription_id = a.subscription_id
+LEFT JOIN way AS w ON p.host = w.publication_host AND s.host = w.take_host
+LEFT JOIN equal_stamp AS q
+    ON p.topic_name = q.topic_name AND p.source_timestamp_ns = q.source_timestamp_ns
 WHERE l.is_decided;

@@ -9,7 +9,10 @@
 --     taken on the clock of the publisher is looked for among the publications right before its
 --     take, others among those around the stamp; a few messages per stretch are enough. Where
 --     nearly as many allow a lesser difference, by which the messages would be those of later
---     publications, the clock may have jumped by a period: no message agrees then.
+--     publications, the clock may have jumped by a period: no message agrees then. Where messages
+--     were taken on other clocks only, of several differences that many allow the sharpest counts:
+--     of the right one the delays from write to stamp vary least. A drift that is too steep for
+--     this to be exact tells nothing: nor does a message agree then.
 -- grain: one row per clock and stretch of time with messages that agree
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message
@@ -30,7 +33,8 @@ publisher AS (
     FROM published
     GROUP BY run_id, clock_id, topic_name, publisher_id
 ),
--- Stretches of half a second, longer where messages are few or the recording is very long.
+-- Stretches of half a second, longer where messages are few or the recording is very long, shorter
+-- where it is so short that a few of them would not tell the drift.
 extent AS (
     SELECT
         run_id, clock_id, start_ns, stretch_ns, 1750 + stretch_ns // 2000000 AS fine_slack_ns
@@ -41,7 +45,7 @@ extent AS (
             min(p.written_ns) AS start_ns,
             max(p.written_ns) - min(p.written_ns) AS length_ns,
             greatest(
-                5e8,
+                least(5e8, length_ns / 8),
                 length_ns / 600,
                 least(30e9, length_ns * 8 / greatest(any_value(m.message_count), 1))
             )::BIGINT AS stretch_ns
@@ -100,6 +104,7 @@ wanted AS (
 paired AS (
     SELECT
         w.clock_id,
+        w.publisher_id,
         (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
         w.is_taken_here,
         p.written_ns,
@@ -151,29 +156,68 @@ origin AS (
     FROM allowed
     GROUP BY clock_id, stretch
 ),
+-- Messages of a timer agree with differences one period apart. Of these the true one is sharpest:
+-- what passes from a write to its stamp varies less than that and the time between two writes.
+-- From one message to the next, drift is nothing.
+sharp AS (
+    SELECT clock_id, stretch, bucket, median(abs(step_ns)) AS spread_ns
+    FROM (
+        SELECT
+            e.clock_id, e.stretch, e.bucket,
+            a.greatest_ns - lag(a.greatest_ns) OVER (
+                PARTITION BY e.clock_id, e.stretch, e.bucket, a.publisher_id
+                ORDER BY a.written_ns, a.greatest_ns
+            ) AS step_ns
+        FROM (
+            SELECT
+                p.clock_id, p.stretch, p.difference_ns, p.difference_ns // 200000 AS bucket,
+                p.difference_ns // 200000 + unnest([-1, 0, 1]) AS near_bucket
+            FROM peak AS p
+            JOIN origin AS o
+                ON p.clock_id = o.clock_id AND p.stretch = o.stretch AND NOT o.is_taken_here
+            QUALIFY row_number() OVER (
+                PARTITION BY p.clock_id, p.stretch, p.difference_ns // 200000
+                ORDER BY p.vote_count DESC, p.difference_ns
+            ) = 1
+        ) AS e
+        JOIN paired AS a
+            ON e.clock_id = a.clock_id
+            AND e.stretch = a.stretch
+            AND e.near_bucket = a.greatest_ns // 200000
+            AND abs(a.greatest_ns - e.difference_ns) <= 200000
+    )
+    GROUP BY clock_id, stretch, bucket
+    HAVING count(step_ns) >= 8
+),
 ballot AS MATERIALIZED (
     SELECT
         p.clock_id,
         p.stretch,
         row_number() OVER (PARTITION BY p.clock_id ORDER BY p.stretch) AS number,
-        least(3, count(*) OVER (PARTITION BY p.clock_id)) AS patience,
+        least(3, sum((max(p.vote_count) >= 8)::BIGINT) OVER (PARTITION BY p.clock_id)) AS patience,
         x.stretch_ns,
         any_value(o.is_taken_here) AS is_taken_here,
         max(p.vote_count) AS most,
         list(
             struct_pack(
                 vote_count := p.vote_count,
-                difference_ns := p.difference_ns - x.stretch_ns // 25000
+                difference_ns := p.difference_ns - x.stretch_ns // 25000,
+                spread_ns := h.spread_ns
             )
         ) AS peaks
     FROM peak AS p
     JOIN extent AS x ON p.clock_id = x.clock_id
     JOIN origin AS o ON p.clock_id = o.clock_id AND p.stretch = o.stretch
+    LEFT JOIN sharp AS h
+        ON p.clock_id = h.clock_id
+        AND p.stretch = h.stretch
+        AND p.difference_ns // 200000 = h.bucket
     GROUP BY p.clock_id, p.stretch, x.stretch_ns
 ),
 -- A difference that few agree with, several times in a row, is given up for that of the latest
 -- publications that many agree with: a message is taken soon after it was published. Where no
--- message was taken on this clock the nearest such difference is as good.
+-- message was taken on this clock it is given up for the sharpest that many agree with, if no other
+-- is nearly as sharp; also where it is far from the sharpest itself, as after a jump by a period.
 followed (
     clock_id, number, stretch, difference_ns, vote_count, miss_count, is_ambiguous
 ) AS (
@@ -199,26 +243,22 @@ followed (
         is_rivalled AND NOT has_jumped
     FROM (
         SELECT
-            clock_id, number, stretch, previous_stretch, previous_ns, miss_count,
-            list_min(list_transform(
-                list_filter(close_peaks, lambda p: p.vote_count >= 0.85 * most_close),
-                lambda p: struct_pack(
-                    distance := abs(p.difference_ns - previous_ns),
-                    difference_ns := p.difference_ns,
-                    vote_count := p.vote_count
-                )
-            )) AS near,
-            list_min(list_transform(
-                list_filter(peaks, lambda p: p.vote_count >= 0.8 * most),
-                lambda p: struct_pack(
-                    distance := CASE WHEN is_taken_here THEN p.difference_ns
-                        ELSE abs(p.difference_ns - previous_ns) END,
-                    difference_ns := p.difference_ns,
-                    vote_count := p.vote_count
-                )
-            )) AS jump,
-            near IS NULL OR (most >= 8 AND most_close < 0.6 * most) AS is_missed,
-            is_missed AND most >= 8 AND miss_count + 1 >= patience AS has_jumped,
+            clock_id, number, stretch, previous_stretch, previous_ns, miss_count, near, jump,
+            near IS NULL
+                OR (most >= 8 AND most_close < 0.6 * most)
+                OR (
+                    most >= 8 AND len(list_filter(
+                        high_peaks,
+                        lambda p: 3 * p.spread_ns < near.spread_ns
+                            AND abs(p.difference_ns - near.difference_ns) > 500000
+                    )) > 0
+                ) AS is_missed,
+            is_taken_here OR len(list_filter(
+                high_peaks,
+                lambda p: abs(p.difference_ns - jump.difference_ns) > 500000
+                    AND coalesce(p.spread_ns < 1.5 * jump.spread_ns, true)
+            )) = 0 AS is_told,
+            is_missed AND is_told AND most >= 8 AND miss_count + 1 >= patience AS has_jumped,
             NOT is_missed AND is_taken_here AND most_close >= 8 AND coalesce(
                 list_max(list_transform(
                     list_filter(peaks, lambda p: p.difference_ns < previous_ns - 500000),
@@ -228,16 +268,41 @@ followed (
             ) AS is_rivalled
         FROM (
             SELECT
-                b.clock_id, b.number, b.stretch, b.most, b.patience, b.peaks, b.is_taken_here,
-                f.stretch AS previous_stretch, f.difference_ns AS previous_ns, f.miss_count,
-                list_filter(
-                    b.peaks,
-                    lambda p: abs(p.difference_ns - f.difference_ns)
-                        <= 50000 + (b.stretch + 1 - f.stretch) * b.stretch_ns // 10000
-                ) AS close_peaks,
-                list_max(list_transform(close_peaks, lambda p: p.vote_count)) AS most_close
-            FROM followed AS f
-            JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number + 1 = b.number
+                *,
+                list_min(list_transform(
+                    list_filter(close_peaks, lambda p: p.vote_count >= 0.85 * most_close),
+                    lambda p: struct_pack(
+                        distance := abs(p.difference_ns - previous_ns),
+                        difference_ns := p.difference_ns,
+                        vote_count := p.vote_count,
+                        spread_ns := p.spread_ns
+                    )
+                )) AS near,
+                list_min(list_transform(
+                    high_peaks,
+                    lambda p: struct_pack(
+                        place := CASE WHEN is_taken_here THEN p.difference_ns
+                            ELSE p.spread_ns END,
+                        distance := abs(p.difference_ns - previous_ns),
+                        difference_ns := p.difference_ns,
+                        vote_count := p.vote_count,
+                        spread_ns := p.spread_ns
+                    )
+                )) AS jump
+            FROM (
+                SELECT
+                    b.clock_id, b.number, b.stretch, b.most, b.patience, b.peaks, b.is_taken_here,
+                    f.stretch AS previous_stretch, f.difference_ns AS previous_ns, f.miss_count,
+                    list_filter(b.peaks, lambda p: p.vote_count >= 0.8 * b.most) AS high_peaks,
+                    list_filter(
+                        b.peaks,
+                        lambda p: abs(p.difference_ns - f.difference_ns)
+                            <= 50000 + (b.stretch + 1 - f.stretch) * b.stretch_ns // 10000
+                    ) AS close_peaks,
+                    list_max(list_transform(close_peaks, lambda p: p.vote_count)) AS most_close
+                FROM followed AS f
+                JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number + 1 = b.number
+            )
         )
     )
 ),
@@ -371,6 +436,7 @@ near_vote AS (
         AND (
             NOT r.is_fitted
             OR abs(v.residue_ns - x.fine_slack_ns) <= 4000 + x.stretch_ns // 125000
+                + greatest(abs(r.slope) - 50000, 0) * x.stretch_ns / 2e9
         )
     WINDOW in_stretch AS (PARTITION BY v.clock_id, v.stretch)
 ),
@@ -391,7 +457,8 @@ SELECT
     x.start_ns + (r.stretch + 1) * x.stretch_ns AS end_ns,
     r.difference_ns + coalesce(f.residue_ns, 0) AS difference_ns,
     r.slope::BIGINT AS drift_ppb,
-    coalesce(f.vote_count, r.vote_count)::BIGINT AS message_count
+    CASE WHEN abs(r.slope) <= 175000 THEN coalesce(f.vote_count, r.vote_count) ELSE 0 END::BIGINT
+        AS message_count
 FROM rough AS r
 JOIN extent AS x ON r.clock_id = x.clock_id
 LEFT JOIN fine AS f ON r.clock_id = f.clock_id AND r.stretch = f.stretch

@@ -1,6 +1,7 @@
 -- name: staging.publisher_known
 -- description: Publishers whose rcl initialisation was traced, with their rmw handle, their GID
---     (first 16 bytes; all zeros: none) and, where DDS is instrumented, their writer.
+--     (first 16 bytes; all zeros: none) and, where DDS is instrumented, their writer: by GID, or
+--     where one of the two has none, by topic. A writer is that of one publisher.
 -- grain: one row per rcl_publisher_init
 -- needs: staging.located, staging.object_node, staging.gid_bytes,
 --     staging.is_internal_topic
@@ -32,8 +33,8 @@ with_writer AS (
     SELECT
         p.event_id, p.ts_ns, p.process_id, p.publisher_handle, p.topic_name, p.queue_depth,
         p.rmw_handle, p.gid, p.rmw_created_ns,
-        coalesce(g.writer, t.writer) AS writer,
-        coalesce(g.ts_ns, t.ts_ns) AS writer_created_ns
+        coalesce(g.writer, t.writer, o.writer) AS writer,
+        coalesce(g.ts_ns, t.ts_ns, o.ts_ns) AS writer_created_ns
     FROM with_rmw AS p
     ASOF LEFT JOIN writer_init AS g
         ON p.process_id = g.process_id AND p.gid = g.gid AND p.event_id >= g.event_id
@@ -41,6 +42,16 @@ with_writer AS (
         ON p.process_id = t.process_id
         AND 'rt' || p.topic_name = t.topic_name
         AND p.event_id >= t.event_id
+    LEFT JOIN (
+        SELECT p.event_id, w.writer, w.ts_ns
+        FROM (SELECT * FROM with_rmw WHERE gid IS NULL) AS p
+        ASOF JOIN writer_init AS w
+            ON p.process_id = w.process_id
+            AND 'rt' || p.topic_name = w.topic_name
+            AND p.event_id >= w.event_id
+        QUALIFY row_number() OVER (PARTITION BY w.event_id ORDER BY p.event_id) = 1
+    ) AS o
+        ON p.event_id = o.event_id
 )
 SELECT
     p.event_id,

@@ -5,10 +5,11 @@
 --     message in the queue would have ended it. A wait tells only where a single thread reads, and
 --     only if it lasted ten times as long as messages usually need, at least a millisecond.
 --     `overwritten` and `lost_in_transport` are told apart by the depth of the queue alone. Where
---     the subscription took a message in that time that could not be identified, nothing is said.
+--     the subscription took a message in that time that could not be identified, nothing is said;
+--     nor that messages were overwritten where it took none of the publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 -- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap,
---     store.link_transport, store.take, store.failed_take, store.executor_state
+--     store.link_transport, store.take, derive.vain_take, store.executor_state
 CREATE OR REPLACE MACRO derive.undelivered(of_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
@@ -106,7 +107,8 @@ known AS (
         coalesce(c.patience_ns, 10_000_000) AS patience_ns,
         p.taken_ns AS publisher_taken_ns,
         n.taken_ns AS any_taken_ns,
-        e.arrival_ns > m.arrival_ns AS is_before_first
+        e.arrival_ns > m.arrival_ns AS is_before_first,
+        e.arrival_ns IS NOT NULL AS is_connected
     FROM missing AS m
     JOIN life AS s ON m.subscription_id = s.subscription_id
     LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
@@ -157,7 +159,7 @@ facts AS (
     FROM bounded AS b
     ASOF LEFT JOIN (SELECT * FROM derive.process_gap WHERE run_id = of_run) AS g
         ON b.process_id = g.process_id AND b.until_ns >= g.start_ns
-    ASOF LEFT JOIN (SELECT * FROM store.failed_take WHERE run_id = of_run) AS f
+    ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = of_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
         SELECT subscription_id, taken_ns, false AS for_no_stamp
@@ -191,7 +193,8 @@ SELECT
         WHEN has_unidentified_take THEN 'unknown'
         WHEN is_before_first THEN 'before_discovery'
         WHEN waited_ns IS NOT NULL THEN 'not_delivered'
-        WHEN newer_count >= queue_depth THEN 'overwritten'
+        WHEN newer_count >= queue_depth AND (is_connected OR any_taken_ns IS NOT NULL)
+            THEN 'overwritten'
         WHEN any_taken_ns IS NOT NULL AND newer_count < queue_depth THEN 'lost_in_transport'
         WHEN any_taken_ns IS NULL AND (newer_count < queue_depth OR newer_count = 0)
             THEN 'pending_at_end'

@@ -169,6 +169,30 @@ def test_an_attempt_that_took_nothing(pair: Pair, analyse: Analyse) -> None:
     assert model.value("SELECT count(*) FROM failed_take") == 1
 
 
+def test_a_callback_that_looks_for_a_message_and_finds_none(pair: Pair, analyse: Analyse) -> None:
+    """It was told of none: the two were not connected yet."""
+    pair.create()
+    pair.send(1)
+    pair.start(LISTENER, 0xC9)
+    pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
+    pair.end(LISTENER, 0xC9)
+    pair.send(2)
+    pair.hear(2)
+    assert reasons(analyse(pair)) == {1: "before_discovery", 2: None}
+
+
+def test_where_nothing_was_ever_taken_nothing_was_overwritten(pair: Pair, analyse: Analyse) -> None:
+    pair.create(depth=2)
+    pair.send(1, 2, 3, 4)
+    pair.go_on()
+    assert reasons(analyse(pair)) == {
+        1: "unknown",
+        2: "unknown",
+        3: "pending_at_end",
+        4: "pending_at_end",
+    }
+
+
 def test_a_queue_that_was_full(pair: Pair, analyse: Analyse) -> None:
     """Of five messages the newest two fit; nobody can tell whether fewer were overwritten."""
     pair.create(depth=2)

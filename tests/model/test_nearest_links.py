@@ -26,11 +26,15 @@ class Unstamped:
     Attributes:
         system: the events.
         truth: (time of rcl_publish, stamp) of each message that was published in the trace.
+        listener: who takes the messages.
+        lateness: of a timer, less than this.
     """
 
     system: RosSystem
     random: Random = field(default_factory=lambda: Random(7))
     truth: list[tuple[int, int]] = field(default_factory=list)
+    listener: Thread = LISTENER
+    lateness: int = 80_000
 
     def difference(self, _time: int) -> int:
         return 0
@@ -47,7 +51,7 @@ class Unstamped:
         is_taken: bool = True,
     ) -> int:
         """Publish inside a timer callback and take 200 µs later; returns the stamp."""
-        time += self.random.randrange(80_000)
+        time += self.random.randrange(self.lateness)
         add = self.system.add
         add("ros2:callback_start", thread, ts=time, callback=0xC1, is_intra_process=0)
         if is_traced:
@@ -60,14 +64,16 @@ class Unstamped:
         if is_taken:
             self.system.add(
                 "ros2:rmw_take",
-                LISTENER,
+                self.listener,
                 ts=made + 200_000 + self.random.randrange(50_000),
                 rmw_subscription_handle=reader + 0x1000,
                 message=0xB,
                 source_timestamp=stamp,
                 taken=1,
             )
-            self.system.add("ros2:rcl_take", LISTENER, ts=self.system._now + 1_000, message=0xB)
+            self.system.add(
+                "ros2:rcl_take", self.listener, ts=self.system._now + 1_000, message=0xB
+            )
         if is_traced and is_taken:
             self.truth.append((time + 6_000, stamp))
         return stamp
@@ -239,3 +245,59 @@ def test_a_clock_that_fits_by_chance_tells_nothing(
     assert links <= set(unstamped.truth)
     assert len(links) >= share * len(unstamped.truth)
     assert "ambiguous" in model.column("SELECT DISTINCT reason FROM store.orphan_take")
+
+
+@dataclass
+class Remote(Unstamped):
+    """Only a host of another clock takes the messages: they may be those of any period.
+
+    Attributes:
+        offset: how far the clock of ROS is ahead.
+        jump: how far it goes ahead after four seconds.
+    """
+
+    offset: int = 0
+    jump: int = 0
+
+    def __post_init__(self) -> None:
+        self.listener = Thread(200, trace=1)
+        self.system.add_source(1, "beta", "boot-b")
+        self.system.wait(_EPOCH - 10_000_000)
+        self.system.publisher(TALKER, 0x10, "/a")
+        self.system.subscription(self.listener, 0x20, "/a")
+
+    def difference(self, time: int) -> int:
+        return self.offset + (self.jump if time - _EPOCH > 4_000_000_000 else 0)
+
+
+@pytest.mark.parametrize("offset", [300_000, -200_000, 7_000_000, -10_000_000, 40_000_000])
+@pytest.mark.parametrize("count", [100, 800])
+def test_a_clock_is_told_from_others_a_period_away(
+    system: RosSystem, analyse: Analyse, offset: int, count: int
+) -> None:
+    """A timer is late by more than what passes from a write to its stamp varies."""
+    remote = Remote(system, offset=offset)
+    for n in range(count):
+        remote.message(_EPOCH + n * 10_000_000)
+    assert analyse(system).rows(LINKS) == expected(remote.truth)
+
+
+@pytest.mark.parametrize("offset", [0, 4_000_000, 13_000_000])
+def test_a_timer_that_is_never_late_does_not_tell_its_periods_apart(
+    system: RosSystem, analyse: Analyse, offset: int
+) -> None:
+    remote = Remote(system, offset=offset, lateness=1)
+    for n in range(300):
+        remote.message(_EPOCH + n * 10_000_000)
+    links = {(published, stamp) for published, stamp, _ in analyse(system).rows(LINKS)}
+    assert links == (set(remote.truth) if offset == 0 else set())
+
+
+@pytest.mark.parametrize("jump", [-10_000_000, 10_000_000])
+def test_a_jump_by_a_period_is_followed(system: RosSystem, analyse: Analyse, jump: int) -> None:
+    remote = Remote(system, jump=jump)
+    for n in range(800):
+        remote.message(_EPOCH + n * 10_000_000)
+    links = {(published, stamp) for published, stamp, _ in analyse(system).rows(LINKS)}
+    assert links <= set(remote.truth)
+    assert len(links) >= 0.9 * len(remote.truth)

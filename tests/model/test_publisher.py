@@ -153,6 +153,37 @@ def test_dds_writer_by_its_gid(system: RosSystem, analyse: Analyse) -> None:
     ) == [0x12, 0x11]
 
 
+def test_dds_writer_by_its_topic_where_the_publisher_has_no_gid(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Foxy: a writer belongs to the publisher that is initialised next, and to no other."""
+    for number, topic in ((1, "/a"), (2, "/a"), (3, "/b")):
+        if number != 2:
+            system.add(
+                "dds:create_writer",
+                MAIN,
+                writer=0x70 + number,
+                topic_name=f"rt{topic}",
+                gid_prefix=[number] * 12,
+                gid_entity=[number] * 4,
+            )
+        system.add(
+            "ros2:rcl_publisher_init",
+            MAIN,
+            publisher_handle=0x10 + number,
+            node_handle=0x1,
+            rmw_publisher_handle=0x20 + number,
+            topic_name=topic,
+            queue_depth=1,
+        )
+    for stamp, writer in enumerate((0x73, 0x71)):
+        system.publish_dds(MAIN, 0xFF, stamp, writer=writer, layers="write_pre write")
+    assert analyse(system).column(
+        "SELECT publisher_handle FROM publication JOIN publisher USING (publisher_id) "
+        "ORDER BY publication_id"
+    ) == [0x13, 0x11]
+
+
 def test_rosout_by_being_the_only_one_of_its_process(system: RosSystem, analyse: Analyse) -> None:
     """Humble without DDS events; what passed rclcpp is not from a logger."""
     system.publisher(MAIN, 0x10, "/rosout")

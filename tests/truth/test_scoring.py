@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -116,6 +117,38 @@ def test_a_row_twice_is_repeated(simulation, database):
     )
     score = _scores(simulation, database)["transport"]
     assert (score.repeated, score.wrong, score.missing) == (5, 0, 0)
+
+
+@pytest.fixture(scope="module")
+def losses(tmp_path_factory):
+    require_reader()
+    directory = tmp_path_factory.mktemp("losses")
+    simulation = simulate("losses", directory / "trace", factor=0.3)
+    path = directory / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    return simulation, path
+
+
+def test_reasons_are_judged_where_the_trace_decides_them(losses):
+    simulation, path = losses
+    _, drops = compare_simulated(path, simulation.truth)
+    judged = {drop.truth for drop in drops if not drop.undecided}
+    assert {"before_subscription", "before_discovery", "lost_in_transport"} <= judged
+    assert all(drop.is_right for drop in drops if not drop.undecided)
+    assert {drop.undecided for drop in drops if not drop.is_right} <= {
+        "nothing later taken", "nothing earlier taken", "no event of expiry",
+        "no event of destruction",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("truth", ["before_subscription", "before_discovery", "lost_in_transport"])
+def test_a_wrong_reason_is_found(losses, tmp_path, truth):
+    simulation, path = losses
+    changed = tmp_path / "changed.duckdb"
+    shutil.copyfile(path, changed)
+    _change(changed, "UPDATE store.undelivered SET reason = 'overwritten'")
+    _, drops = compare_simulated(changed, simulation.truth)
+    assert any(drop.truth == truth and not drop.undecided and not drop.is_right for drop in drops)
 
 
 @pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_jazzy", "pingpong", "services"])
