@@ -66,11 +66,15 @@ def test_another_file_replaces_the_former(database: Path) -> None:
 
 
 def test_patterns(database: Path) -> None:
-    """Of nodes and topics; ROS's own topics are none of them, and nodes without are left out."""
+    """Of nodes and topics; ROS's own topics are none of them, and nodes without are left out.
+
+    Whether a name means several nodes is asked only of those that have the topics.
+    """
     text = BOTH.replace("/fusion", "'/*u*'").replace("[/a, /b]", "'*'").replace("[/c, /d]", "/[cd]")
-    with Database(database) as opened:
-        opened.apply_links(write(database, text))
-    assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
+    for written in (text, BOTH.replace("/fusion", "'*'")):
+        with Database(database) as opened:
+            opened.apply_links(write(database, written))
+        assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
 
 
 def test_equal_entries_are_one(database: Path) -> None:
@@ -101,7 +105,20 @@ def test_a_name_that_occurs_twice_with_its_process(database: Path) -> None:
         ("/fusion", "/ns/twin", 4, "2 nodes have this name — /ns/twin", "process right 400"),
         ("/b]", "/bb]", 5, "/fusion does not subscribe to such a topic — /bb", "/a, /b"),
         ("/d]", "'/z*']", 6, "/fusion does not publish on such a topic — /z*", "/c, /d"),
-        ("/fusion", "'/*'", 3, "2 nodes", None),
+        (
+            "/fusion\n    inputs: [/a, /b]\n    outputs: [/c, /d]",
+            "'/n*'\n    inputs: /x\n    outputs: /y",
+            4,
+            "2 nodes have this name — /ns/twin",
+            "process right 400",
+        ),
+        (
+            "/fusion\n    inputs: [/a, /b]",
+            "'/[fr]*'\n    inputs:\n      - /a\n      - '/z[a-c]'",
+            7,
+            "no node that matches /[fr]* subscribes to such a topic — /z[a-c]",
+            "the topics are /a, /b, /c",
+        ),
         ("periodic_async", "periodic", 3, "no such kind of link — periodic", "partial_sync"),
         ("/fusion", "/fusion\n    host: beta", 5, "no such node on this host — beta", "alpha"),
         ("/fusion", "/fusion\n    process: 7", 5, "in this process — 7", "fusion 100"),
@@ -133,7 +150,8 @@ ENTRY = "  - {{kind: partial_sync, node: {}, inputs: [{}], outputs: [{}]}}\n"
             3,
             "the links form a cycle — /a → /c → /a",
         ),
-        ([("'/[fr]*'", "'*'", "/nowhere")], 2, "no node that matches /[fr]* has all"),
+        ([("'/[fr]*'", "'*'", "/z")], 2, "no node that matches /[fr]* publishes on such a topic"),
+        ([("'/[fr]*'", "/b", "/a")], 2, "no node that matches /[fr]* has all"),
     ],
 )
 def test_links_that_lead_back_change_nothing(
