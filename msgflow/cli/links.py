@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     OutputOption,
     RunOption,
 )
+from msgflow.errors import UsageError
 
 app = typer.Typer(help="Declare how nodes use the messages that they keep.")
 
@@ -56,6 +57,11 @@ def suggest(
     from msgflow.database import Database
     from msgflow.links import suggest_links
 
+    if run == "all":
+        raise UsageError(
+            "suggestions are a file for one run, which does not fit others — all",
+            "msgflow links suggest --run NAME for each of them; msgflow query info-runs names them",
+        )
     with Database(database) as opened:
         result = opened.query("link-suggestions", run=run)
     print_runs(result.runs)
