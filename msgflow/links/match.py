@@ -81,7 +81,7 @@ def match_links(
 
     Raises:
         UsageError: a node or topic that the run does not have, a name that means several nodes, an
-            input that is an output too, or links that form a cycle.
+            input that is an output too, a partial_sync of one input, or links that form a cycle.
     """
     nodes = _read_nodes(con, run_id)
     matched = tuple(found for link in file.links for found in _match(file, link, nodes))
@@ -139,6 +139,12 @@ def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterat
                 link.line,
                 f"a topic is input and output of the same link — {sorted(both)[0]}",
                 "leave it out on one side; narrow a pattern that matches it on both",
+            )
+        if link.kind == "partial_sync" and len(inputs) == 1:
+            file.fail(
+                link.line,
+                f"a partial_sync of one input waits for nothing — {inputs[0].topic} of {node.name}",
+                "name all inputs that it waits for, or leave it out",
             )
         yield MatchedLink(link.kind, node.process_id, inputs, outputs, link.line)
 

@@ -138,7 +138,32 @@ def test_what_does_not_exist_changes_nothing(
     assert contents(database) == before
 
 
-ENTRY = "  - {{kind: partial_sync, node: {}, inputs: [{}], outputs: [{}]}}\n"
+def test_contradictory_entries_are_named(database: Path) -> None:
+    """Both are in force; the finding goes with the file."""
+    found = "SELECT count, detail FROM diagnostic WHERE name = 'contradictory_annotations'"
+    entry = BOTH.partition("links:\n")[2]
+    other = entry.replace("periodic_async", "partial_sync").replace("[/c, /d]", "/d")
+    with Database(database) as opened:
+        opened.apply_links(write(database, f"links:\n{entry}{other}"))
+    ((count, detail),) = rows(database, found)
+    assert count == 2
+    assert detail.endswith("which both count: /a → /d, /b → /d")
+    with Database(database) as opened:
+        opened.apply_links(write(database, BOTH))
+    assert rows(database, found) == []
+
+
+def test_a_partial_sync_of_one_input_changes_nothing(database: Path) -> None:
+    before = contents(database)
+    text = BOTH.replace("periodic_async", "partial_sync").replace("[/a, /b]", "[/b]")
+    with Database(database) as opened, pytest.raises(UsageError) as caught:
+        opened.apply_links(write(database, text))
+    assert "links.yaml, line 3: a partial_sync of one input waits" in caught.value.message
+    assert "/b of /fusion" in caught.value.message
+    assert contents(database) == before
+
+
+ENTRY = "  - {{kind: periodic_async, node: {}, inputs: [{}], outputs: [{}]}}\n"
 
 
 @pytest.mark.parametrize(
@@ -176,7 +201,12 @@ def test_what_the_trace_declares_itself_is_not_declared_again(
     with Database(path) as database:
         database.ingest(shared_traces / "partial_sync")
         (applied,) = database.apply_links(file)
+        (none,) = database.apply_links(write(path, "links: []"))
     assert (applied.annotation_count, applied.known_count) == (1, 1)
+    assert applied.link_count == none.link_count == none.annotation_count == 0
+    assert [(applied.traced_link_count,)] == rows(
+        path, "SELECT count(*) FROM link_causal WHERE kind = 'partial_sync'"
+    )
     assert rows(path, "SELECT source, count(*) FROM annotation GROUP BY source") == [("trace", 1)]
 
 
