@@ -100,7 +100,7 @@ class Database:
         *,
         name: str | None = None,
         replace: bool = False,
-        hosts: Mapping[str, str] | None = None,
+        hosts: Mapping[str, str | Path | Sequence[str | Path]] | None = None,
         keep_staging: str | Path | None = None,
         links: str | Path | None = None,
         clock_sync: str | Path = "none",
@@ -115,7 +115,8 @@ class Database:
             paths: CTF directories, or directories above some.
             name: of the run; derived from the paths when None.
             replace: take the place of a run with the same name or packets.
-            hosts: name of a host -> path of one of its traces.
+            hosts: name of a host -> path or paths; the traces below belong to that host. Where
+                several paths lead to a trace, the deepest counts.
             keep_staging: directory for the staging tables as Parquet.
             links: file with indirect links to declare.
             clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a
@@ -128,7 +129,8 @@ class Database:
         Raises:
             TraceError: no trace, or none that can be read.
             DatabaseError: the file is locked, foreign, or of another schema revision.
-            UsageError: `links` is not such a file, or does not fit the traces.
+            UsageError: `links` is not such a file, or does not fit the traces; a path in `hosts`
+                that has two names, or has no trace of its own.
         """
         from msgflow.ingest import ingest
 

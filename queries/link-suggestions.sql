@@ -77,24 +77,37 @@ timer_publication AS (
     WHERE t.node_id = c.node_id
     GROUP BY t.timer_id, t.node_id, t.period_ns, c.topic_name
 ),
+publishing_timer AS (
+    SELECT
+        timer_id,
+        node_id,
+        list(topic_name) AS outputs,
+        printf(
+            'its timer of %.10g ms published %s',
+            any_value(period_ns) / 1e6,
+            string_agg(
+                printf('%d messages on %s', publication_count, topic_name), ' and '
+                ORDER BY topic_name
+            )
+        ) AS evidence
+    FROM timer_publication
+    GROUP BY timer_id, node_id
+),
+-- All timers of a node would use the same inputs: they are one candidate.
 periodic AS (
     SELECT
         t.node_id,
         'periodic_async' AS kind,
         any_value(d.inputs) AS inputs,
-        list(DISTINCT t.topic_name ORDER BY t.topic_name) AS outputs,
+        list_sort(list_distinct(flatten(list(t.outputs)))) AS outputs,
         printf(
-            'its timer of %.10g ms published %s, while %s led nowhere',
-            any_value(t.period_ns) / 1e6,
-            string_agg(
-                printf('%d messages on %s', t.publication_count, t.topic_name), ' and '
-                ORDER BY t.topic_name
-            ),
+            '%s, while %s led nowhere',
+            string_agg(t.evidence, ', ' ORDER BY t.timer_id),
             any_value(d.evidence)
         ) AS evidence
-    FROM timer_publication AS t
+    FROM publishing_timer AS t
     JOIN dead_end AS d ON t.node_id = d.node_id
-    GROUP BY t.timer_id, t.node_id
+    GROUP BY t.node_id
 ),
 -- Callbacks of subscriptions publish once per set of messages.
 fired AS (
@@ -153,6 +166,8 @@ synchronous AS (
             ),
             ', ' ORDER BY i.topic_name, i.subscription_id
         ) AS evidence,
+        string_agg(i.topic_name, ' and ' ORDER BY i.topic_name, i.subscription_id)
+            FILTER (WHERE m.own_count >= i.run_count) AS always_publishing,
         min(m.met_count) AS met_count
     FROM met AS m
     JOIN input AS i ON m.subscription_id = i.subscription_id
@@ -170,11 +185,19 @@ partial AS (
         list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
         printf(
             '%d of %d publications on %s came after a message of each input since the one before;'
-            || ' %s',
+            || ' %s%s',
             min(met_count),
             min(firing_count),
             string_agg(DISTINCT output_topic, ' and ' ORDER BY output_topic),
-            min(evidence)
+            min(evidence),
+            coalesce(
+                printf(
+                    '. Weak: each message on %s published, whether or not it had to wait for'
+                    || ' others, which may only be more frequent',
+                    min(always_publishing)
+                ),
+                ''
+            )
         ) AS evidence
     FROM synchronous
     GROUP BY node_id, inputs

@@ -42,7 +42,12 @@ def command(
     ] = False,
     host: Annotated[
         list[str] | None,
-        typer.Option("--host", metavar="NAME=PATH", help="Name the host of the traces below PATH"),
+        typer.Option(
+            "--host",
+            metavar="NAME=PATH",
+            help="Name the host of the traces below PATH; may be repeated, also with one name, and"
+            " the deepest PATH counts",
+        ),
     ] = None,
     keep_staging: Annotated[
         Path | None,
@@ -127,11 +132,11 @@ def _print_report(report: IngestReport, database: Path) -> None:
             print_note(f"{diagnostic.name} ({diagnostic.count}): {diagnostic.detail}")
 
 
-def _hosts(texts: list[str]) -> dict[str, str]:
-    hosts: dict[str, str] = {}
+def _hosts(texts: list[str]) -> dict[str, list[str]]:
+    hosts: dict[str, list[str]] = {}
     for text in texts:
         name, separator, path = text.partition("=")
         if not (name and separator and path):
             raise UsageError(f"--host takes NAME=PATH — {text}", "--host robot=traces/robot")
-        hosts[name] = path
+        hosts.setdefault(name, []).append(path)
     return hosts

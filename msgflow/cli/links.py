@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     OutputOption,
     RunOption,
 )
+from msgflow.errors import UsageError
 
 app = typer.Typer(help="Declare how nodes use the messages that they keep.")
 
@@ -31,18 +32,23 @@ def apply(
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Declare the links of a file and derive all links of the run anew; reads no trace."""
-    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.cli.output import count, print_note, print_runs, print_status
     from msgflow.database import Database
 
     with Database(database) as opened:
-        applied = opened.apply_links(file, run=run)
-    for one in applied:
-        print_runs([one.run])
-        known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
-        print_status(
-            f"{count(one.annotation_count, 'link')} declared{known}:"
-            f" {count(one.link_count, 'indirect link')} between messages"
-        )
+        for one in opened.apply_links(file, run=run):
+            print_runs([one.run])
+            known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
+            traced = f", and {one.traced_link_count} that the trace declares itself"
+            print_status(
+                f"{count(one.annotation_count, 'link')} declared{known}:"
+                f" {count(one.link_count, 'indirect link')} between messages"
+                f"{traced if one.traced_link_count else ''}"
+            )
+            findings = opened.query("info-diagnostics", run=one.run.run_id).to_arrow().to_pylist()
+            for finding in findings:
+                if finding["name"] == "contradictory_annotations":
+                    print_note(f"{finding['name']} ({finding['count']}): {finding['detail']}")
 
 
 @app.command("suggest")
@@ -56,6 +62,11 @@ def suggest(
     from msgflow.database import Database
     from msgflow.links import suggest_links
 
+    if run == "all":
+        raise UsageError(
+            "suggestions are a file for one run, which does not fit others — all",
+            "msgflow links suggest --run NAME for each of them; msgflow query info-runs names them",
+        )
     with Database(database) as opened:
         result = opened.query("link-suggestions", run=run)
     print_runs(result.runs)

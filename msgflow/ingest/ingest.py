@@ -98,7 +98,7 @@ def ingest(
     *,
     name: str | None = None,
     replace: bool = False,
-    hosts: Mapping[str, str] | None = None,
+    hosts: Mapping[str, str | Path | Sequence[str | Path]] | None = None,
     keep_staging: Path | None = None,
     links: Path | None = None,
     clock_sync: str | Path = "none",
@@ -119,7 +119,8 @@ def ingest(
             that name points to.
         name: name of the run; that of the first path when None.
         replace: delete the runs that hold some of these packets already, or have this name.
-        hosts: name of a host -> path; the traces below the path belong to that host.
+        hosts: name of a host -> path or paths; the traces below belong to that host. Where several
+            paths lead to a trace, the deepest counts.
         keep_staging: directory to which the staged events are written as Parquet.
         links: file with indirect links to declare.
         clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a file
@@ -341,18 +342,47 @@ def _names(con: duckdb.DuckDBPyConnection) -> set[str]:
     return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
 
 
-def _hostnames(traces: Sequence[TraceInfo], hosts: Mapping[str, str]) -> dict[int, str]:
+def _hostnames(
+    traces: Sequence[TraceInfo], hosts: Mapping[str, str | Path | Sequence[str | Path]]
+) -> dict[int, str]:
+    """Return the name of each trace for which one is given: that of the deepest path above it."""
+    given = _host_paths(hosts)
     names: dict[int, str] = {}
-    for name, path in hosts.items():
-        root = Path(path).resolve()
-        found = [t.index for t in traces if t.path == root or root in t.path.parents]
-        if not found:
-            raise TraceError(
-                f"none of the traces lies below the path given for host {name} — {path}",
-                "give --host NAME=PATH with a directory that holds traces of this ingest",
+    used: set[Path] = set()
+    for trace in traces:
+        above = [path for path in (trace.path, *trace.path.parents) if path in given]
+        if above:
+            names[trace.index] = given[above[0]][0]
+            used.add(above[0])
+    for root, (name, path) in given.items():
+        if root in used:
+            continue
+        if any(root in trace.path.parents for trace in traces):
+            raise UsageError(
+                f"other hosts have all traces below the path given for host {name} — {path}",
+                "leave it out, or leave out one of the deeper paths",
             )
-        names.update(dict.fromkeys(found, name))
+        raise TraceError(
+            f"none of the traces lies below the path given for host {name} — {path}",
+            "give --host NAME=PATH with a directory that holds traces of this ingest",
+        )
     return names
+
+
+def _host_paths(
+    hosts: Mapping[str, str | Path | Sequence[str | Path]],
+) -> dict[Path, tuple[str, str | Path]]:
+    """Return the name that belongs to each path, and the path as it was given."""
+    given: dict[Path, tuple[str, str | Path]] = {}
+    for name, paths in hosts.items():
+        for path in [paths] if isinstance(paths, str | Path) else paths:
+            other, _ = given.setdefault(Path(path).resolve(), (name, path))
+            if other != name:
+                raise UsageError(
+                    f"two names are given for the host of one path: {other} and {name} — {path}",
+                    "leave out one of the two",
+                )
+    return given
 
 
 @dataclass(frozen=True)

@@ -48,13 +48,15 @@ class AppliedLinks:
         run: the run.
         annotation_count: links declared, one per node that an entry matches.
         known_count: those among them that the trace declares itself, which are not stored again.
-        link_count: indirect links of the run now, of files and of the trace.
+        link_count: indirect links of the run now that the file declares, and the trace does not.
+        traced_link_count: those that the trace declares.
     """
 
     run: Run
     annotation_count: int
     known_count: int
     link_count: int
+    traced_link_count: int
 
 
 def apply_links(
@@ -91,7 +93,7 @@ def _apply(
         for run in runs:
             derive(con, run.run_id)
         applied = tuple(
-            AppliedLinks(run, *counts[run.run_id], _link_count(con, run.run_id)) for run in runs
+            AppliedLinks(run, *counts[run.run_id], *_link_counts(con, run.run_id)) for run in runs
         )
         con.commit()
     except BaseException:
@@ -165,10 +167,14 @@ def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]
     )
 
 
-def _link_count(con: duckdb.DuckDBPyConnection, run_id: int) -> int:
-    return int(
+def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]:
+    """Return how many indirect links files declare, and how many the trace does."""
+    counts = dict(
         con.execute(
-            "SELECT count(*) FROM store.link_causal WHERE run_id = ? AND annotation_id IS NOT NULL",
+            "SELECT a.source, count(*) FROM store.link_causal AS l "
+            "JOIN store.annotation AS a ON l.annotation_id = a.annotation_id "
+            "WHERE l.run_id = ? GROUP BY a.source",
             [run_id],
-        ).fetchall()[0][0]
+        ).fetchall()
     )
+    return counts.get("file", 0), counts.get("trace", 0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -81,7 +81,7 @@ def match_links(
 
     Raises:
         UsageError: a node or topic that the run does not have, a name that means several nodes, an
-            input that is an output too, or links that form a cycle.
+            input that is an output too, a partial_sync of one input, or links that form a cycle.
     """
     nodes = _read_nodes(con, run_id)
     matched = tuple(found for link in file.links for found in _match(file, link, nodes))
@@ -120,31 +120,33 @@ def _read_endpoints(
 
 def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterator[MatchedLink]:
     chosen = _choose(file, link, nodes)
-    found = False
-    for node in chosen:
-        inputs = _endpoints(link.inputs, node.subscriptions)
-        outputs = _endpoints(link.outputs, node.publishers)
-        missing = inputs[1] or outputs[1]
-        if missing is not None:
-            # A pattern may mean nodes of several kinds: those without these topics are not meant.
-            if _is_pattern(link.node.value):
-                continue
-            _fail_on_topic(file, missing, node, is_input=inputs[1] is not None)
-        both = {e.topic for e in inputs[0]} & {e.topic for e in outputs[0]}
+    # A name or pattern may mean several nodes: those without these topics are not meant.
+    fitting = [
+        (node, inputs, outputs)
+        for node in chosen
+        if (inputs := _endpoints(link.inputs, node.subscriptions))
+        and (outputs := _endpoints(link.outputs, node.publishers))
+    ]
+    if not fitting:
+        if not _is_pattern(link.node.value):
+            _refuse_repeated(file, link, chosen)
+        _fail_on_topic(file, link, chosen)
+    _refuse_repeated(file, link, [node for node, _, _ in fitting])
+    for node, inputs, outputs in fitting:
+        both = {e.topic for e in inputs} & {e.topic for e in outputs}
         if both:
             file.fail(
                 link.line,
                 f"a topic is input and output of the same link — {sorted(both)[0]}",
                 "leave it out on one side; narrow a pattern that matches it on both",
             )
-        found = True
-        yield MatchedLink(link.kind, node.process_id, inputs[0], outputs[0], link.line)
-    if not found:
-        file.fail(
-            link.line,
-            f"no node that matches {link.node.value} has all of these inputs and outputs",
-            f"the nodes are {_some(node.name for node in chosen)}",
-        )
+        if link.kind == "partial_sync" and len(inputs) == 1:
+            file.fail(
+                link.line,
+                f"a partial_sync of one input waits for nothing — {inputs[0].topic} of {node.name}",
+                "name all inputs that it waits for, or leave it out",
+            )
+        yield MatchedLink(link.kind, node.process_id, inputs, outputs, link.line)
 
 
 def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Sequence[Node]:
@@ -176,8 +178,13 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
                 f"no such node in this process — {wanted}",
                 f"{link.node.value} is in {_some(_place(node) for node in before)}",
             )
-    for node in placed:
-        same = [other for other in placed if other.name == node.name]
+    return placed
+
+
+def _refuse_repeated(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> None:
+    """Raise where a name means several nodes, and it was not said which."""
+    for node in nodes:
+        same = [other for other in nodes if other.name == node.name]
         in_one_process = len({other.process_id for other in same}) == 1
         if len(same) > 1 and not (in_one_process and link.process is not None):
             file.fail(
@@ -185,35 +192,57 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
                 f"{len(same)} nodes have this name — {node.name}",
                 f"say which with process: or host: — {_some(_place(other) for other in same)}",
             )
-    return placed
 
 
-def _endpoints(
-    wanted: Sequence[Text], there: Sequence[Endpoint]
-) -> tuple[tuple[Endpoint, ...], Text | None]:
-    """Return the endpoints meant, and the first text that means none."""
+def _endpoints(wanted: Sequence[Text], there: Sequence[Endpoint]) -> tuple[Endpoint, ...]:
+    """Return the endpoints meant; none where a text means none."""
     meant: dict[int, Endpoint] = {}
     for text in wanted:
-        found = [
-            endpoint
-            for endpoint in there
-            if endpoint.topic == text.value
-            or (not endpoint.is_internal and _matches(endpoint.topic, text.value))
-        ]
+        found = [endpoint for endpoint in there if _means(text, endpoint)]
         if not found:
-            return (), text
+            return ()
         meant.update((endpoint.id, endpoint) for endpoint in found)
-    return tuple(meant[number] for number in sorted(meant)), None
+    return tuple(meant[number] for number in sorted(meant))
 
 
-def _fail_on_topic(file: LinksFile, missing: Text, node: Node, *, is_input: bool) -> None:
-    there = node.subscriptions if is_input else node.publishers
-    what = "subscribe to" if is_input else "publish on"
-    topics = [endpoint.topic for endpoint in there if not endpoint.is_internal]
+def _means(text: Text, endpoint: Endpoint) -> bool:
+    return endpoint.topic == text.value or (
+        not endpoint.is_internal and _matches(endpoint.topic, text.value)
+    )
+
+
+def _fail_on_topic(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> NoReturn:
+    """Raise for the first topic that none of the nodes has, or as none has all of them."""
+    lacking: dict[str, str] = {}
+    for texts, is_input in ((link.inputs, True), (link.outputs, False)):
+        for text in texts:
+            there = [(n, n.subscriptions if is_input else n.publishers) for n in nodes]
+            without = [n for n, endpoints in there if not any(_means(text, e) for e in endpoints)]
+            for node in without:
+                lacking.setdefault(node.name, text.value)
+            if len(without) == len(nodes):
+                topics = [e.topic for _, endpoints in there for e in endpoints if not e.is_internal]
+                _fail_on_unknown_topic(file, link, text, topics, is_input=is_input)
     file.fail(
-        missing.line,
-        f"{node.name} does not {what} such a topic — {missing.value}",
-        _known("topics", missing, topics) if topics else f"{node.name} does not {what} any topic",
+        link.line,
+        f"no node that matches {link.node.value} has all of these inputs and outputs",
+        _some(f"{name} lacks {topic}" for name, topic in lacking.items()),
+    )
+
+
+def _fail_on_unknown_topic(
+    file: LinksFile, link: DeclaredLink, text: Text, topics: Sequence[str], *, is_input: bool
+) -> NoReturn:
+    if _is_pattern(link.node.value):
+        who = f"no node that matches {link.node.value}"
+        what = "subscribes to" if is_input else "publishes on"
+    else:
+        who = f"{link.node.value} does not"
+        what = "subscribe to" if is_input else "publish on"
+    file.fail(
+        text.line,
+        f"{who} {what} such a topic — {text.value}",
+        _known("topics", text, topics) if topics else f"{who} {what} any topic",
     )
 
 

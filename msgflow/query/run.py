@@ -8,6 +8,7 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
+from msgflow.query.identities import require_identities
 from msgflow.query.result import QueryResult
 from msgflow.query.topics import require_topics
 from msgflow.query.value import parse_text
@@ -58,7 +59,7 @@ def run_query(
         internal: show the rows of ROS's own topics and services too.
 
     Raises:
-        UsageError: a parameter, run, topic or time that does not exist or cannot be read.
+        UsageError: a parameter, run, topic, id or time that does not exist or cannot be read.
         QueryError: the database could not run it.
     """
     used = connection.extract_statements(header.body)[0].named_parameters
@@ -78,6 +79,7 @@ def run_query(
     bindings = {name: value for name, value in reserved.items() if name in used}
     own = bind(header, parameters)
     require_topics(connection, runs, own)
+    require_identities(connection, runs, own)
     bindings |= own
     try:
         table = connection.sql(header.body, params=bindings).to_arrow_table()

@@ -1,25 +1,27 @@
 -- name: derive.flow_hop
 -- description: Steps of the computation graph that messages really took: from nowhere (a source) or
---     a subscription through a publisher to a subscription. A step is cached where the message may
---     wait in the node for others (an indirect link).
--- grain: one row per run, subscription before (NULL: source), publisher and subscription
+--     a subscription through a publisher to a subscription, by a route of services
+--     (derive.flow_caller) or directly. A step is cached where the message may wait in the node for
+--     others (an indirect link).
+-- grain: one row per run, subscription before (NULL: source), route, publisher and subscription
 -- needs: derive.flow_transport, derive.flow_continuation, derive.flow_root
 WITH carried AS (
     SELECT DISTINCT run_id, publisher_id, subscription_id FROM derive.flow_transport
 ),
 entered AS (
     SELECT
-        run_id, subscription_id AS from_subscription_id, publisher_id, false AS is_source,
+        run_id, subscription_id AS from_subscription_id, route, publisher_id,
+        false AS is_source,
         bool_or(kind IN ('periodic_async', 'partial_sync')) AS is_cached
     FROM derive.flow_continuation
-    GROUP BY run_id, subscription_id, publisher_id
+    GROUP BY run_id, subscription_id, route, publisher_id
     UNION ALL
-    SELECT run_id, NULL, publisher_id, bool_or(is_source), false
+    SELECT run_id, NULL, route, publisher_id, bool_or(is_source), false
     FROM derive.flow_root
-    GROUP BY run_id, publisher_id
+    GROUP BY run_id, route, publisher_id
 )
 SELECT
-    e.run_id, e.from_subscription_id, e.publisher_id, c.subscription_id, e.is_source,
-    e.is_cached
+    e.run_id, e.from_subscription_id, e.route, e.publisher_id, c.subscription_id,
+    e.is_source, e.is_cached
 FROM entered AS e
 JOIN carried AS c ON e.run_id = c.run_id AND e.publisher_id = c.publisher_id

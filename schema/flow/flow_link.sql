@@ -3,8 +3,8 @@
 --     that it was for, callback run (or a take outside of any) to publication, callback run to
 --     request or response. Where no service callback was traced, a response comes from its
 --     request. Self loops are left out: flows do not pass through them.
--- grain: one row per link
--- needs: store.link_transport, store.link_causal, store.callback_instance, store.link_request,
+-- grain: one row per cause, effect and kind of link
+-- needs: store.link_transport, derive.flow_cause, store.callback_instance, store.link_request,
 --     store.link_response, store.response
 SELECT
     run_id,
@@ -28,7 +28,7 @@ SELECT
     coalesce(callback_instance_id, take_id),
     'publication', publication_id,
     kind
-FROM store.link_causal
+FROM derive.flow_cause
 UNION ALL
 SELECT
     run_id,

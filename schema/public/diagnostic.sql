@@ -7,9 +7,12 @@
 -- column: severity VARCHAR  'info', 'warning', 'data_loss' or 'error'
 -- column: count BIGINT  How often
 -- column: detail VARCHAR  Where, and what it means
--- needs: store.diagnostic, derive.link_diagnostic
+-- needs: store.diagnostic, derive.link_diagnostic, derive.annotation_conflict
 SELECT run_id, trace_id, name, severity, count, detail
 FROM store.diagnostic
 UNION ALL
 SELECT run_id, trace_id, name, severity, count, detail
 FROM derive.link_diagnostic
+UNION ALL
+SELECT run_id, trace_id, name, severity, count, detail
+FROM derive.annotation_conflict

@@ -43,7 +43,8 @@ CREATE OR REPLACE MACRO main.end_to_end(
 WITH RECURSIVE chain AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        publishers[1] AS first_publisher_id, is_cached, is_path
+        publishers[1] AS first_publisher_id, routes[1] AS first_route, routes[-1] AS route,
+        is_cached, is_path
     FROM main.flow_path(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
@@ -58,7 +59,7 @@ lineage (path_id, prefix_id, depth, parent_path_id) AS (
 path AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, is_cached, is_path
+        first_publisher_id, first_route, route, is_cached, is_path
     FROM chain
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
@@ -68,6 +69,7 @@ root AS MATERIALIZED (
         r.run_id,
         r.publication_id,
         r.publisher_id,
+        r.route,
         CASE WHEN i.callback_instance_id IS NULL THEN -r.publication_id
             ELSE i.callback_instance_id END AS root_key,
         coalesce(i.start_ns, b.start_ns) AS root_ns,
@@ -90,12 +92,12 @@ transport AS MATERIALIZED (
     WHERE list_contains(runs, run_id)
 ),
 continuation AS MATERIALIZED (
-    SELECT take_id, subscription_id, publication_id, publisher_id
+    SELECT take_id, subscription_id, publication_id, publisher_id, route
     FROM derive.flow_continuation
     WHERE list_contains(runs, run_id)
 ),
 step AS MATERIALIZED (
-    SELECT c.take_id AS from_take_id, t.publisher_id, t.subscription_id, t.take_id
+    SELECT c.take_id AS from_take_id, c.route, t.publisher_id, t.subscription_id, t.take_id
     FROM continuation AS c
     JOIN transport AS t ON c.publication_id = t.publication_id
 ),
@@ -106,6 +108,7 @@ reached (path_id, root_key, take_id) AS (
     JOIN path AS p
         ON t.publisher_id = p.publisher_id
         AND t.subscription_id = p.subscription_id
+        AND r.route = p.route
         AND p.depth = 1
     UNION
     SELECT p.path_id, r.root_key, s.take_id
@@ -115,6 +118,7 @@ reached (path_id, root_key, take_id) AS (
         ON r.take_id = s.from_take_id
         AND p.publisher_id = s.publisher_id
         AND p.subscription_id = s.subscription_id
+        AND p.route = s.route
 ),
 arrival AS MATERIALIZED (
     SELECT
@@ -154,7 +158,7 @@ expected AS MATERIALIZED (
         p.run_id, p.path_id, r.root_key, min(r.root_ns) AS root_ns,
         arg_max(r.publication_id, r.published_ns) AS publication_id
     FROM path AS p
-    JOIN root AS r ON p.first_publisher_id = r.publisher_id
+    JOIN root AS r ON p.first_publisher_id = r.publisher_id AND p.first_route = r.route
     WHERE p.is_path
     GROUP BY p.run_id, p.path_id, r.root_key
 ),
@@ -182,7 +186,7 @@ progress AS (
 stuck AS (
     SELECT
         m.path_id, m.root_key, p.last_take.take_id AS take_id, p.last_take.taken_ns AS taken_ns,
-        n.publisher_id, n.subscription_id, n.is_cached,
+        n.publisher_id, n.route, n.subscription_id, n.is_cached,
         CASE WHEN p.last_take IS NULL THEN m.publication_id ELSE c.publication_id END
             AS publication_id
     FROM missing AS m
@@ -191,10 +195,13 @@ stuck AS (
         ON m.path_id = l.path_id AND l.depth = coalesce(p.last_take.depth, 0) + 1
     LEFT JOIN path AS n ON l.prefix_id = n.path_id
     LEFT JOIN (
-        SELECT take_id, publisher_id, max(publication_id) AS publication_id
+        SELECT take_id, publisher_id, route, max(publication_id) AS publication_id
         FROM continuation
-        GROUP BY take_id, publisher_id
-    ) AS c ON p.last_take.take_id = c.take_id AND n.publisher_id = c.publisher_id
+        GROUP BY take_id, publisher_id, route
+    ) AS c
+        ON p.last_take.take_id = c.take_id
+        AND n.publisher_id = c.publisher_id
+        AND n.route = c.route
 ),
 -- When messages passed each step, as far as a root got stuck there.
 delivered AS (
@@ -209,13 +216,13 @@ delivered AS (
 ),
 continued AS (
     SELECT
-        c.subscription_id, c.publisher_id,
+        c.subscription_id, c.publisher_id, c.route,
         min(t.taken_ns) AS first_ns,
         max(t.taken_ns) AS last_ns
     FROM continuation AS c
     JOIN main.take AS t ON c.take_id = t.take_id
     WHERE c.publisher_id IN (SELECT publisher_id FROM stuck)
-    GROUP BY c.subscription_id, c.publisher_id
+    GROUP BY c.subscription_id, c.publisher_id, c.route
 ),
 finished AS (
     SELECT a.path_id, min(t.taken_ns) AS first_ns, max(t.taken_ns) AS last_ns
@@ -253,7 +260,9 @@ explained AS (
         ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
     LEFT JOIN main.take AS t ON s.take_id = t.take_id
     LEFT JOIN continued AS c
-        ON t.subscription_id = c.subscription_id AND s.publisher_id = c.publisher_id
+        ON t.subscription_id = c.subscription_id
+        AND s.publisher_id = c.publisher_id
+        AND s.route = c.route
 ),
 outcome AS MATERIALIZED (
     SELECT

@@ -70,7 +70,7 @@ WITH RECURSIVE flow AS MATERIALIZED (
     ) = 1
 ),
 path AS MATERIALIZED (
-    SELECT path_id, depth, publishers, subscriptions
+    SELECT path_id, depth, publishers, subscriptions, routes
     FROM main.flow_path(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
@@ -86,12 +86,14 @@ transport AS MATERIALIZED (
 continuation AS MATERIALIZED (
     SELECT
         l.publication_id, l.take_id, l.subscription_id,
-        l.callback_instance_id AS run_id_in, l.callback_instance_id AS run_id_out, l.kind
+        l.callback_instance_id AS run_id_in, l.callback_instance_id AS run_id_out, l.kind,
+        []::BIGINT[] AS route
     FROM store.link_causal AS l
     WHERE list_contains(runs, l.run_id)
     UNION ALL
     SELECT
-        l.publication_id, i.take_id, t.subscription_id, c.caller_id, l.callback_instance_id, l.kind
+        l.publication_id, i.take_id, t.subscription_id, c.caller_id, l.callback_instance_id,
+        l.kind, c.route
     FROM derive.flow_caller AS c
     JOIN store.callback_instance AS i ON c.caller_id = i.callback_instance_id
     LEFT JOIN store.take AS t ON i.take_id = t.take_id
@@ -117,6 +119,7 @@ trail (flow_id, hop, take_id, publication_id, takes, publications) AS (
         JOIN continuation AS c
             ON r.publication_id = c.publication_id
             AND p.subscriptions[r.hop - 1] = c.subscription_id
+            AND p.routes[r.hop] = c.route
         JOIN transport AS t
             ON c.take_id = t.take_id AND p.publishers[r.hop - 1] = t.publisher_id
         WHERE r.hop > 1

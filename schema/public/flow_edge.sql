@@ -1,7 +1,7 @@
 -- name: main.flow_edge
 -- description: All links in one shape, with the times of both ends: cause and effect of every step
 --     that a message takes.
--- grain: one row per link
+-- grain: one row per cause, effect and kind of link, however many annotations declare it
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: from_kind VARCHAR  Cause: 'publication', 'take', 'callback_instance' or 'request'
 -- column: from_id BIGINT  Identity of the cause
@@ -13,7 +13,7 @@
 --     of the callback run
 -- column: to_ns BIGINT [epoch ns]  Take, start of the callback run or publication, or sending of
 --     the request or response
--- needs: main.link_transport, main.link_causal, main.publication, main.take,
+-- needs: main.link_transport, derive.flow_cause, main.publication, main.take,
 --     main.callback_instance, main.link_request, main.link_response, main.request, main.response
 SELECT
     l.run_id,
@@ -50,7 +50,7 @@ SELECT
     l.kind,
     coalesce(i.start_ns, t.taken_ns),
     b.start_ns
-FROM main.link_causal AS l
+FROM derive.flow_cause AS l
 LEFT JOIN main.callback_instance AS i
     ON l.callback_instance_id = i.callback_instance_id
 LEFT JOIN main.take AS t

@@ -44,7 +44,7 @@
 --     store.link_transport, store.publisher, store.subscription, store.node, store.process,
 --     store.thread, store.host, store.callback, store.request, store.response, store.client,
 --     store.service, store.link_request, derive.vertex_key, derive.vertex_kind,
---     derive.flow_link, derive.flow_end, derive.node_label,
+--     derive.flow_link, derive.flow_cause, derive.flow_end, derive.node_label,
 --     main.publication, main.take, main.callback_instance, main.callback_label, main.request,
 --     main.response
 CREATE OR REPLACE MACRO main.flow_step(
@@ -297,7 +297,7 @@ LEFT JOIN arrow AS a ON d.key = a.to_key
 LEFT JOIN described AS f ON a.from_key = f.key
 LEFT JOIN store.link_transport AS lt
     ON a.link_kind = 'transport' AND a.to_id = lt.take_id AND a.from_id = lt.publication_id
-LEFT JOIN store.link_causal AS lc
+LEFT JOIN derive.flow_cause AS lc
     ON a.from_kind
         = CASE WHEN lc.callback_instance_id IS NULL THEN 'take' ELSE 'callback_instance' END
     AND a.from_id = coalesce(lc.callback_instance_id, lc.take_id)

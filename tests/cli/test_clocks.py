@@ -184,3 +184,13 @@ def test_containers_share_a_clock_and_have_equal_pids(msgflow: Msgflow, tmp_path
         assert hosts["hostname"].to_pylist() == ["one", "two"]
         again = opened.sql("SELECT count(*) FROM link_transport WHERE latency_ns > 0").to_arrow()
     assert again == links
+
+    # One name for two paths is one host.
+    result = msgflow(
+        "ingest", done.directory, "--db", tmp_path / "one.duckdb", "--quiet",
+        "--host", f"one={done.directory / 'box-1'}", "--host", f"one={done.directory / 'box-2'}",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    with open_db(tmp_path / "one.duckdb") as opened:
+        hosts = opened.sql("SELECT hostname FROM host").to_arrow()
+        assert hosts["hostname"].to_pylist() == ["one"]

@@ -49,3 +49,10 @@ def test_without_runs_or_files(msgflow: Msgflow, fresh_database: Path, tmp_path:
     assert result.exit_code == 2
     assert "the database holds no run" in result.stderr
     assert msgflow("links", "apply", file, "--db", tmp_path / "none.duckdb").exit_code == 4
+
+
+def test_suggestions_are_for_one_run(msgflow: Msgflow, fresh_database: Path) -> None:
+    result = msgflow("links", "suggest", "--run", "all", "--db", fresh_database)
+    assert result.exit_code == 2
+    assert "a file for one run" in result.stderr
+    assert result.stdout == ""

@@ -86,6 +86,27 @@ def test_hosts_can_be_named(other_trace: Path, new_database: Path) -> None:
     ) == [("beta", 1), ("robot", 2)]
 
 
+@pytest.mark.parametrize("is_reversed", [False, True])
+def test_the_deepest_path_names_a_host(
+    other_trace: Path, new_database: Path, is_reversed: bool
+) -> None:
+    given = [("base", str(other_trace)), ("arm", other_trace / "beta")]
+    ingest([other_trace], new_database, hosts=dict(given[::-1] if is_reversed else given))
+    assert rows(
+        new_database,
+        "SELECT hostname, count(*) FROM host JOIN process USING (host_id) GROUP BY 1 ORDER BY 1",
+    ) == [("arm", 1), ("base", 2)]
+
+
+def test_a_host_may_have_several_paths(other_trace: Path, new_database: Path) -> None:
+    ingest(
+        [other_trace],
+        new_database,
+        hosts={"robot": [other_trace / "alpha", str(other_trace / "beta")]},
+    )
+    assert rows(new_database, "SELECT DISTINCT hostname FROM host") == [("robot",)]
+
+
 def test_progress_and_report(trace: Path, new_database: Path) -> None:
     seen: list[IngestProgress] = []
     report = ingest([trace], new_database, progress=seen.append)

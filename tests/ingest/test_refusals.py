@@ -13,7 +13,7 @@ from uuid import UUID
 import duckdb
 import pytest
 
-from msgflow.errors import DatabaseError, ExitCode, TraceError
+from msgflow.errors import DatabaseError, ExitCode, TraceError, UsageError
 from msgflow.ingest import ingest
 
 ROS = {"ros2:rcl_init": {"context_handle": "u64", "version": "str"}}
@@ -97,6 +97,25 @@ def test_a_path_for_a_host_that_holds_none_of_the_traces(
 ) -> None:
     error = refused([trace], new_database, hosts={"robot": str(tmp_path)})
     assert "host robot" in error.message
+
+
+@pytest.mark.parametrize(
+    ("hosts", "message"),
+    [
+        ({"a": "alpha", "b": "alpha"}, "two names are given for the host of one path: a and b"),
+        ({"a": ".", "b": "alpha", "c": "beta"}, "other hosts have all traces below the path given"),
+    ],
+)
+def test_a_name_of_a_host_that_would_be_lost(
+    other_trace: Path, new_database: Path, hosts: dict[str, str], message: str
+) -> None:
+    with pytest.raises(UsageError, match=message):
+        ingest(
+            [other_trace],
+            new_database,
+            hosts={name: other_trace / path for name, path in hosts.items()},
+        )
+    assert not new_database.exists()
 
 
 def database_refused(trace: Path, database: Path) -> DatabaseError:

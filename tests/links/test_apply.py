@@ -66,11 +66,15 @@ def test_another_file_replaces_the_former(database: Path) -> None:
 
 
 def test_patterns(database: Path) -> None:
-    """Of nodes and topics; ROS's own topics are none of them, and nodes without are left out."""
+    """Of nodes and topics; ROS's own topics are none of them, and nodes without are left out.
+
+    Whether a name means several nodes is asked only of those that have the topics.
+    """
     text = BOTH.replace("/fusion", "'/*u*'").replace("[/a, /b]", "'*'").replace("[/c, /d]", "/[cd]")
-    with Database(database) as opened:
-        opened.apply_links(write(database, text))
-    assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
+    for written in (text, BOTH.replace("/fusion", "'*'")):
+        with Database(database) as opened:
+            opened.apply_links(write(database, written))
+        assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
 
 
 def test_equal_entries_are_one(database: Path) -> None:
@@ -101,7 +105,20 @@ def test_a_name_that_occurs_twice_with_its_process(database: Path) -> None:
         ("/fusion", "/ns/twin", 4, "2 nodes have this name — /ns/twin", "process right 400"),
         ("/b]", "/bb]", 5, "/fusion does not subscribe to such a topic — /bb", "/a, /b"),
         ("/d]", "'/z*']", 6, "/fusion does not publish on such a topic — /z*", "/c, /d"),
-        ("/fusion", "'/*'", 3, "2 nodes", None),
+        (
+            "/fusion\n    inputs: [/a, /b]\n    outputs: [/c, /d]",
+            "'/n*'\n    inputs: /x\n    outputs: /y",
+            4,
+            "2 nodes have this name — /ns/twin",
+            "process right 400",
+        ),
+        (
+            "/fusion\n    inputs: [/a, /b]",
+            "'/[fr]*'\n    inputs:\n      - /a\n      - '/z[a-c]'",
+            7,
+            "no node that matches /[fr]* subscribes to such a topic — /z[a-c]",
+            "the topics are /a, /b, /c",
+        ),
         ("periodic_async", "periodic", 3, "no such kind of link — periodic", "partial_sync"),
         ("/fusion", "/fusion\n    host: beta", 5, "no such node on this host — beta", "alpha"),
         ("/fusion", "/fusion\n    process: 7", 5, "in this process — 7", "fusion 100"),
@@ -121,7 +138,32 @@ def test_what_does_not_exist_changes_nothing(
     assert contents(database) == before
 
 
-ENTRY = "  - {{kind: partial_sync, node: {}, inputs: [{}], outputs: [{}]}}\n"
+def test_contradictory_entries_are_named(database: Path) -> None:
+    """Both are in force; the finding goes with the file."""
+    found = "SELECT count, detail FROM diagnostic WHERE name = 'contradictory_annotations'"
+    entry = BOTH.partition("links:\n")[2]
+    other = entry.replace("periodic_async", "partial_sync").replace("[/c, /d]", "/d")
+    with Database(database) as opened:
+        opened.apply_links(write(database, f"links:\n{entry}{other}"))
+    ((count, detail),) = rows(database, found)
+    assert count == 2
+    assert detail.endswith("which both count: /a → /d, /b → /d")
+    with Database(database) as opened:
+        opened.apply_links(write(database, BOTH))
+    assert rows(database, found) == []
+
+
+def test_a_partial_sync_of_one_input_changes_nothing(database: Path) -> None:
+    before = contents(database)
+    text = BOTH.replace("periodic_async", "partial_sync").replace("[/a, /b]", "[/b]")
+    with Database(database) as opened, pytest.raises(UsageError) as caught:
+        opened.apply_links(write(database, text))
+    assert "links.yaml, line 3: a partial_sync of one input waits" in caught.value.message
+    assert "/b of /fusion" in caught.value.message
+    assert contents(database) == before
+
+
+ENTRY = "  - {{kind: periodic_async, node: {}, inputs: [{}], outputs: [{}]}}\n"
 
 
 @pytest.mark.parametrize(
@@ -133,7 +175,8 @@ ENTRY = "  - {{kind: partial_sync, node: {}, inputs: [{}], outputs: [{}]}}\n"
             3,
             "the links form a cycle — /a → /c → /a",
         ),
-        ([("'/[fr]*'", "'*'", "/nowhere")], 2, "no node that matches /[fr]* has all"),
+        ([("'/[fr]*'", "'*'", "/z")], 2, "no node that matches /[fr]* publishes on such a topic"),
+        ([("'/[fr]*'", "/b", "/a")], 2, "no node that matches /[fr]* has all"),
     ],
 )
 def test_links_that_lead_back_change_nothing(
@@ -158,7 +201,12 @@ def test_what_the_trace_declares_itself_is_not_declared_again(
     with Database(path) as database:
         database.ingest(shared_traces / "partial_sync")
         (applied,) = database.apply_links(file)
+        (none,) = database.apply_links(write(path, "links: []"))
     assert (applied.annotation_count, applied.known_count) == (1, 1)
+    assert applied.link_count == none.link_count == none.annotation_count == 0
+    assert [(applied.traced_link_count,)] == rows(
+        path, "SELECT count(*) FROM link_causal WHERE kind = 'partial_sync'"
+    )
     assert rows(path, "SELECT source, count(*) FROM annotation GROUP BY source") == [("trace", 1)]
 
 

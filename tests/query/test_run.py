@@ -159,6 +159,24 @@ def test_topics_that_no_run_has_are_refused(
     assert hint in (raised.value.hint or "")
 
 
+def test_takes_that_no_run_has_are_refused(connection: duckdb.DuckDBPyConnection) -> None:
+    """The take of another run is none of this one."""
+    connection.execute("CREATE TABLE take (take_id BIGINT, run_id BIGINT)")
+    connection.execute("INSERT INTO take VALUES (7, 1), (8, 2)")
+    query = header(
+        "-- name: example\n-- description: x\n-- param: take_id BIGINT = NULL  Take\n"
+        "SELECT $take_id AS id, $runs AS runs\n"
+    )
+    for run, given in (("first", 7), ("all", 8), ("first", None)):
+        (row,) = run_query(connection, query, {"take_id": given}, run=run).to_arrow().to_pylist()
+        assert row["id"] == given
+    for run, number, where in (("first", 8, "the run"), ("all", 9, "these runs")):
+        with pytest.raises(UsageError) as raised:
+            run_query(connection, query, {"take_id": number}, run=run)
+        assert raised.value.message == f"there is no such take in {where} — {number}"
+        assert "msgflow query flows" in (raised.value.hint or "")
+
+
 def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -> None:
     with_topics.execute("DELETE FROM publisher")
     with pytest.raises(UsageError) as raised:

@@ -1,0 +1,17 @@
+-- name: derive.flow_cause
+-- description: Causes of publications, each once, however many annotations declare it.
+-- grain: one row per run of a callback, or take outside of any, publication that it led to, and
+--     kind of link
+-- needs: store.link_causal
+SELECT
+    run_id, callback_instance_id, take_id, publication_id, kind, candidate_count,
+    is_loss_affected
+FROM store.link_causal
+WHERE annotation_id IS NULL
+UNION ALL
+SELECT
+    run_id, callback_instance_id, take_id, publication_id, kind, max(candidate_count),
+    bool_or(is_loss_affected)
+FROM store.link_causal
+WHERE annotation_id IS NOT NULL
+GROUP BY run_id, callback_instance_id, take_id, publication_id, kind
