@@ -111,7 +111,7 @@ def follow(database: Path) -> dict[str, Cost]:
     """Measure the flows from the first and to the last message of the loop."""
     path = str(database)
     first, last = (
-        f"SELECT {end}(publication_id) FROM link_transport AS l JOIN publisher USING (publisher_id) "
+        f"SELECT {end}(publication_id) FROM link_transport JOIN publisher USING (publisher_id) "
         f"WHERE topic_name IN {LOOP_TOPICS}"
         for end in ("min", "max")
     )
