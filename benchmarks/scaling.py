@@ -72,7 +72,7 @@ print(json.dumps([seconds, con.execute("SELECT count(*) FROM x").fetchall()[0][0
 """
 
 QUERIES = ("e2e-latency", "reaction-time", "data-age", "path-breakdown", "critical-path")
-LOOP_TOPICS = ("/ping", "/pong", "/command", "/state")
+LOOP_TOPICS = ("/ping", "/state")
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,8 @@ def follow(database: Path) -> dict[str, Cost]:
     """Measure the flows from the first and to the last message of the loop."""
     path = str(database)
     first, last = (
-        f"SELECT {end}(publication_id) FROM link_transport JOIN publisher USING (publisher_id) "
-        f"WHERE topic_name IN {LOOP_TOPICS}"
+        f"SELECT {end}(publication_id) FROM link_transport JOIN publication USING (publication_id) "
+        f"JOIN publisher USING (publisher_id) WHERE topic_name IN {LOOP_TOPICS}"
         for end in ("min", "max")
     )
     return {
