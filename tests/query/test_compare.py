@@ -127,7 +127,8 @@ def test_an_interval_of_a_mean_is_as_wide_as_theory_says(fresh_database: Path) -
             if row["statistic"] == "mean"
         ]
     expected = 2 * 1.96 * 100_000 * (2 / VALUES) ** 0.5
-    assert sum(widths) / len(widths) == pytest.approx(expected, rel=0.1)
+    # Wider, if anything: how much blocks vary is estimated from few of them.
+    assert 0.98 * expected <= sum(widths) / len(widths) <= 1.18 * expected
 
 
 def test_values_that_are_held_count_once(fresh_database: Path) -> None:
