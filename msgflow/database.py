@@ -324,9 +324,11 @@ class Database:
         case: str = "first",
         skip_first: float = 0.0,
         confidence: float = 0.95,
-        resamples: int = 1_000,
+        resamples: int | None = None,
         seed: int = 0,
         internal: bool = False,
+        max_depth: int = 32,
+        max_paths: int = 1_000,
     ) -> Comparison:
         """Compare run B with run A: by path, callback or topic, with intervals and effect sizes.
 
@@ -340,9 +342,12 @@ class Database:
             case: arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
             skip_first: seconds to leave out at the begin of each run.
             confidence: of the intervals, between 0 and 1.
-            resamples: that the intervals are from.
+            resamples: that the intervals are from: 20 / (1 - confidence) at least; 1000, or as many
+                as that, when None.
             seed: of the resampling; the same seed gives the same intervals.
             internal: compare what ROS does for itself too.
+            max_depth: longest path, in topics.
+            max_paths: most paths, shortest first, and most chains per length.
 
         Raises:
             UsageError: a run, topic or choice that does not exist, or runs with nothing in common.
@@ -367,6 +372,8 @@ class Database:
                 resamples=resamples,
                 seed=seed,
                 internal=internal,
+                max_depth=max_depth,
+                max_paths=max_paths,
             ),
         )
 

@@ -78,6 +78,26 @@ def command(
             rich_help_panel=SELECTION,
         ),
     ] = 0.0,
+    max_depth: Annotated[
+        int,
+        typer.Option(
+            "--max-depth",
+            metavar="N",
+            min=1,
+            help="Longest path, in topics",
+            rich_help_panel=SELECTION,
+        ),
+    ] = 32,
+    max_paths: Annotated[
+        int,
+        typer.Option(
+            "--max-paths",
+            metavar="N",
+            min=1,
+            help="Most paths, shortest first, and most chains per length",
+            rich_help_panel=SELECTION,
+        ),
+    ] = 1_000,
     internal: InternalOption = False,
     fail_on: Annotated[
         list[str] | None,
@@ -85,7 +105,7 @@ def command(
             "--fail-on",
             metavar="CONDITION",
             help="Exit with 1 where run B exceeds run A by more: 'p95>5%', 'median>2ms', of median,"
-            " mean, p95, p99, max; several may be given",
+            " mean, p95, p99, max; or where less arrives: 'share<-1%'; several may be given",
         ),
     ] = None,
     confidence: Annotated[
@@ -95,15 +115,15 @@ def command(
         ),
     ] = 0.95,
     resamples: Annotated[
-        int,
+        int | None,
         typer.Option(
             "--resamples",
             metavar="N",
-            min=1,
             help="Resamples that the intervals are from",
+            show_default="1000, or 20 / (1 - confidence)",
             rich_help_panel=_METHOD,
         ),
-    ] = 1_000,
+    ] = None,
     seed: Annotated[
         int,
         typer.Option("--seed", help="Of the resampling", rich_help_panel=_METHOD),
@@ -114,8 +134,9 @@ def command(
 ) -> None:
     """Compare run B with run A: medians, means, percentiles, and whether it may be chance.
 
-    low and high enclose the true difference with the given confidence. The verdict is that B is
-    longer or shorter where they have one sign.
+    low and high enclose the difference with the given confidence, as far as chance within these two
+    recordings goes. The verdict is that B is longer or shorter where they have one sign. It does
+    not tell how much the same system differs when it is started again.
     """
     from msgflow.cli.output import print_error, print_result
     from msgflow.database import Database
@@ -135,6 +156,8 @@ def command(
             resamples=resamples,
             seed=seed,
             internal=internal,
+            max_depth=max_depth,
+            max_paths=max_paths,
         )
     print_result(comparison.result, form, output)
     failures = comparison.failures(fail_on or [])

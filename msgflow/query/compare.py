@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 
@@ -13,7 +14,7 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
 from msgflow.query.header import Header, read
 from msgflow.query.result import QueryResult
-from msgflow.query.run import first_line, read_runs
+from msgflow.query.run import CUT_COLUMN, first_line, read_runs
 from msgflow.query.topics import require_topic
 from msgflow.query.window import MAXIMUM_NS, Run, choose_runs
 from msgflow.resources import resource_directory
@@ -24,28 +25,38 @@ if TYPE_CHECKING:
 THINGS = ("paths", "callbacks", "topics")
 CASES = ("first", "last", "newest", "every_pair")
 STATISTICS = ("median", "mean", "p95", "p99", "max")
+SHARE = "share"
+DEFAULT_RESAMPLES = 1_000
 _CONDITION = re.compile(
-    rf"\s*(?P<statistic>{'|'.join(STATISTICS)})\s*>\s*(?P<limit>\d+(?:\.\d+)?)"
-    r"\s*(?P<unit>%|ns|us|µs|ms|s)\s*"
+    rf"\s*(?:(?P<statistic>{'|'.join(STATISTICS)})\s*>\s*(?P<limit>\d+(?:\.\d+)?)"
+    rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
 )
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
+_UNITS = {"paths": "flows", "callbacks": "callback runs", "topics": "takes"}
+_LOST = """
+SELECT run_id, sum(discarded_event_count)::BIGINT
+FROM main.trace
+WHERE list_contains($runs, run_id)
+GROUP BY run_id
+"""
 _SQL = """
 FROM main.comparison(
     $what, $run_a, $run_b, from_topic := $from_topic, to_topic := $to_topic,
     wanted_case := $wanted_case, skip_ns := $skip_ns, confidence := $confidence,
-    resamples := $resamples, seed := $seed, internal := $internal
+    resamples := $resamples, seed := $seed, internal := $internal,
+    max_depth := $max_depth, max_paths := $max_paths
 )
 """
 
 
 @dataclass(frozen=True)
 class Condition:
-    """By how much a statistic of run B may exceed that of run A.
+    """By how much a statistic of run B may exceed that of run A, or its share stay behind.
 
     Attributes:
-        text: as it was given, such as 'p95>5%'.
-        statistic: one of STATISTICS.
-        limit: in percent of run A, or in nanoseconds.
+        text: as it was given, such as 'p95>5%' or 'share<-1%'.
+        statistic: one of STATISTICS, or SHARE.
+        limit: in percent of run A, or in nanoseconds; of a share in percentage points.
         is_relative: the limit is in percent.
     """
 
@@ -87,19 +98,27 @@ class Comparison:
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
         """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
+        'share<-1%' is for what arrived: its share may be less than in run A by that many points.
         What has values in run A and none in run B fails, too. The limits are compared with what was
         measured, whether or not it may be chance.
 
         Raises:
-            UsageError: a condition that cannot be read.
+            UsageError: a condition that cannot be read, that is in percent of a negative latency,
+                or that cannot be answered for all paths because some were left out.
         """
         wanted = parse_conditions(conditions)
         rows = self.result.to_arrow().to_pylist()
+        if wanted and any(row[CUT_COLUMN] for row in rows):
+            raise UsageError(
+                f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
+                "a higher --max-paths or --max-depth, or --from and --to",
+            )
         return [
             Failure(condition.text, row["subject"], reason)
             for condition in wanted
             for row in rows
-            if row["statistic"] == condition.statistic
+            if row["statistic"]
+            == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
             and (reason := _excess(condition, row)) is not None
         ]
 
@@ -119,16 +138,20 @@ def _parse(text: str) -> Condition:
     if found is None:
         raise UsageError(
             f"cannot read the condition — {text.strip() or 'an empty one'}",
-            "such as 'p95>5%' or 'median>2ms', of " + ", ".join(STATISTICS),
+            "such as 'p95>5%' or 'median>2ms', of " + ", ".join(STATISTICS) + ", or 'share<-1%'",
         )
+    if found["points"] is not None:
+        return Condition(text.strip(), SHARE, float(found["points"]), True)
     unit = found["unit"]
     return Condition(
         text.strip(), found["statistic"], float(found["limit"]) * _UNIT_NS.get(unit, 1), unit == "%"
     )
 
 
-def _excess(condition: Condition, row: dict[str, int | float | None]) -> str | None:
+def _excess(condition: Condition, row: dict[str, Any]) -> str | None:
     a_ns, b_ns = row["a_ns"], row["b_ns"]
+    if condition.statistic == SHARE:
+        return _shortfall(condition, row["a_share"], row["b_share"])
     if a_ns is None:
         return None
     if b_ns is None:
@@ -136,10 +159,28 @@ def _excess(condition: Condition, row: dict[str, int | float | None]) -> str | N
     difference = b_ns - a_ns
     if not condition.is_relative:
         return f"{_ms(difference)} more" if difference > condition.limit else None
-    if a_ns <= 0:
-        return f"{_ms(a_ns)} in run A, so that no share of it can be told" if difference else None
+    if a_ns < 0:
+        raise UsageError(
+            f"no percentage can be told of {_ms(a_ns)} in run A: {condition.text}"
+            f" — {row['subject']}",
+            "msgflow clocks apply messages, or a limit in ns, us, ms or s",
+        )
+    if a_ns == 0:
+        return f"{_ms(b_ns)}, and 0 ms in run A" if difference > 0 else None
     if difference * 100 > condition.limit * a_ns:
         return f"{100 * difference / a_ns:.4g} % more ({_ms(a_ns)} to {_ms(b_ns)})"
+    return None
+
+
+def _shortfall(condition: Condition, a_share: float | None, b_share: float | None) -> str | None:
+    if a_share is None:
+        return None
+    if b_share is None:
+        return "has nothing in run B that could arrive"
+    # Shares have four digits.
+    points = round(100 * (a_share - b_share), 2)
+    if points > condition.limit:
+        return f"{points:.4g} points less ({100 * a_share:.4g} % to {100 * b_share:.4g} %)"
     return None
 
 
@@ -158,17 +199,28 @@ def compare(
     case: str = "first",
     skip_first: float = 0.0,
     confidence: float = 0.95,
-    resamples: int = 1_000,
+    resamples: int | None = None,
     seed: int = 0,
     internal: bool = False,
+    max_depth: int = 32,
+    max_paths: int = 1_000,
 ) -> Comparison:
     """Compare two runs of a database; see `Database.compare`."""
     _choose("what can be compared", what, THINGS)
     _choose("which arrivals count", case, CASES)
     if not 0 < confidence < 1:
         raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")
-    if resamples < 1:
-        raise UsageError(f"there is at least one resample — {resamples}", "1000 is usual")
+    needed = least_resamples(confidence)
+    if resamples is None:
+        resamples = max(DEFAULT_RESAMPLES, needed)
+    if resamples < needed:
+        raise UsageError(
+            f"the ends of an interval are not seen in so few resamples — {resamples}",
+            f"{needed} are needed for a confidence of {confidence:g}",
+        )
+    for name, limit in (("paths", max_paths), ("topics of a path", max_depth)):
+        if limit < 1:
+            raise UsageError(f"{name} are limited to one at least — {limit}")
     if not 0 <= skip_first <= MAXIMUM_NS / 1_000_000_000:
         raise UsageError(f"seconds to leave out are not negative — {skip_first}")
     if what != "paths" and (from_topic is not None or to_topic is not None):
@@ -191,6 +243,8 @@ def compare(
         "resamples": resamples,
         "seed": seed,
         "internal": internal,
+        "max_depth": max_depth,
+        "max_paths": max_paths,
     }
     try:
         table = connection.sql(_SQL, params=parameters).to_arrow_table()
@@ -198,6 +252,7 @@ def compare(
         raise QueryError(f"the comparison failed: {first_line(error)}") from error
     result = QueryResult(table, _header(), (first, second))
     result.notes.extend(_one_sided(result, what, first, second))
+    result.notes.extend(_doubts(connection, result, what, first, second))
     if len(result):
         result.notes.extend(clock_notes(connection, list(dict.fromkeys((first, second)))))
     return Comparison(result, first, second)
@@ -220,6 +275,38 @@ def _one(runs: Sequence[Run], wanted: str | int) -> Run:
     if len(chosen) > 1:
         raise UsageError(f"one run is compared with another — {wanted}", "give a name or an id")
     return chosen[0]
+
+
+def least_resamples(confidence: float) -> int:
+    """Return how many resamples an interval takes: ten beyond either end."""
+    return math.ceil(20 / (1 - confidence) - 1e-6)
+
+
+def _doubts(
+    connection: duckdb.DuckDBPyConnection, result: QueryResult, what: str, first: Run, second: Run
+) -> Iterable[str]:
+    """Say what the numbers do not tell."""
+    rows = result.to_arrow().to_pylist()
+    if any(row[CUT_COLUMN] for row in rows):
+        yield (
+            "paths beyond the limits are left out; --max-paths and --max-depth raise them, --from"
+            " and --to choose"
+        )
+    own = [row for row in rows if row["statistic"] == STATISTICS[0]]
+    lost = dict(connection.execute(_LOST, {"runs": [first.run_id, second.run_id]}).fetchall())
+    for side, run in (("a", first), ("b", second)):
+        affected = sum(row[f"{side}_loss_affected"] or 0 for row in own)
+        if affected or lost.get(run.run_id):
+            yield (
+                f"run {side.upper()}, {run.name} ({run.run_id}), lost {lost.get(run.run_id) or 0}"
+                f" events: {affected} of its {_UNITS[what]} have a gap in their time, others may be"
+                " missing altogether"
+            )
+    if any(row["verdict"] in ("B is longer", "B is shorter") for row in rows):
+        yield (
+            "longer and shorter are said of these two recordings; the same system started again"
+            " differs, too"
+        )
 
 
 def _one_sided(result: QueryResult, what: str, first: Run, second: Run) -> Iterable[str]:

@@ -2,10 +2,12 @@
 -- kind: macro
 -- description: How a run differs from another one, by path, callback or topic: what was measured in
 --     each, the difference with a bootstrap confidence interval, and how large the effect is.
---     Blocks of neighbouring values are resampled (circular block bootstrap, blocks as long as the
---     cube root of their number), because values that follow each other are alike. A quantile has
---     an interval where five values at least lie beyond it in either run, a mean where there are
---     ten values, the maximum never. The same seed gives the same interval.
+--     Blocks of neighbouring values are resampled (circular block bootstrap), because values that
+--     follow each other are alike; how long they are alike, and so the length of a block, is
+--     estimated from the values of each run. An interval takes ten blocks in either run, and beyond
+--     a quantile as much as five independent values; the maximum has none. The same seed gives the
+--     same interval. What is estimated is how surely these two recordings differ: not how much a
+--     system differs from itself when it is started again.
 -- grain: one row per thing compared and statistic; things that only one run has, too
 -- param: what VARCHAR  'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (transport
 --     latency)
@@ -20,6 +22,8 @@
 -- param: resamples BIGINT = 1000  Resamples that the interval is from
 -- param: seed BIGINT = 0  Of the random numbers
 -- param: internal BOOLEAN = false  Also what ROS does for itself
+-- param: max_depth INTEGER = 32  Longest path, in topics
+-- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
 -- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
 -- column: a_ns BIGINT [ns]  Its value in run A
 -- column: b_ns BIGINT [ns]  Its value in run B
@@ -27,23 +31,33 @@
 -- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
 -- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
 -- column: high_ns BIGINT [ns]  Its upper end
--- column: verdict VARCHAR  'B is longer', 'B is shorter', 'no difference shown', 'too few values'
---     for an interval, 'not estimated' (maximum), 'only in A' or 'only in B'
+-- column: verdict VARCHAR  'B is longer' or 'B is shorter', of these two recordings, where both
+--     ends have one sign; 'no difference shown', 'too few values' or 'too few independent values'
+--     for an interval, 'too few resamples', 'not estimated' (maximum), 'only in A' or 'only in B'
 -- column: cliffs_delta DOUBLE  How often a value of B exceeds one of A, less how often it is the
 --     other way round: -1 to 1, of all values
 -- column: effect VARCHAR  'negligible', 'small', 'medium' or 'large'
 -- column: a_count BIGINT  Values of run A
 -- column: b_count BIGINT  Values of run B
+-- column: a_independent BIGINT  How many independent values those of run A are worth for this
+--     statistic: their number by the time, in values, for which they are alike; NULL where they
+--     are alike for so long that it cannot be told
+-- column: b_independent BIGINT  Likewise of run B
 -- column: a_share DOUBLE  Share of the roots that reached the end, of the runs of a callback that
 --     were seen to end, of the takes whose publication is known; in run A
 -- column: b_share DOUBLE  Likewise in run B
+-- column: a_loss_affected BIGINT  Of those roots, runs or takes, the ones with lost events in their
+--     time: what is said of them may be wrong
+-- column: b_loss_affected BIGINT  Likewise in run B
+-- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
 -- needs: main.run, main.flow_path, main.end_to_end, main.callback_instance, main.callback_label,
 --     main.take, main.link_transport, main.subscription, main.process, main.node,
 --     derive.node_label
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
-    skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false
+    skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false,
+    max_depth := 32, max_paths := 1000
 ) AS TABLE
 WITH thing AS (
     -- A root counts once, however often it arrived; of those at the edge it is not known.
@@ -61,12 +75,18 @@ WITH thing AS (
             ELSE e.latency_ns
         END AS value_ns,
         e.is_first AND e.status <> 'edge' AS is_unit,
-        e.status = 'reached' AS is_complete
+        e.status = 'reached' AS is_complete,
+        e.is_loss_affected,
+        p.is_cut
     FROM main.end_to_end(
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
-        (-9223372036854775808)::BIGINT, 9223372036854775807
+        (-9223372036854775808)::BIGINT, 9223372036854775807,
+        max_depth := max_depth, max_paths := max_paths
     ) AS e
-    JOIN main.flow_path([run_a, run_b], from_topic, to_topic) AS p ON e.path_id = p.path_id
+    JOIN main.flow_path(
+        [run_a, run_b], from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
+    ) AS p
+        ON e.path_id = p.path_id
     WHERE what = 'paths'
     UNION ALL
     SELECT
@@ -77,7 +97,9 @@ WITH thing AS (
         i.callback_instance_id AS id,
         i.end_ns - i.start_ns AS value_ns,
         true AS is_unit,
-        i.end_ns IS NOT NULL AS is_complete
+        i.end_ns IS NOT NULL AS is_complete,
+        i.is_loss_affected,
+        false AS is_cut
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     WHERE what = 'callbacks' AND list_contains([run_a, run_b], i.run_id)
@@ -91,7 +113,9 @@ WITH thing AS (
         t.take_id AS id,
         l.latency_ns AS value_ns,
         true AS is_unit,
-        l.take_id IS NOT NULL AS is_complete
+        l.take_id IS NOT NULL AS is_complete,
+        t.is_loss_affected OR coalesce(l.is_loss_affected, false) AS is_loss_affected,
+        false AS is_cut
     FROM main.take AS t
     LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
@@ -105,7 +129,9 @@ side (side, run_id) AS (
     VALUES ('a', run_a), ('b', run_b)
 ),
 sided AS MATERIALIZED (
-    SELECT s.side, t.subject, t.at_ns, t.id, t.value_ns, t.is_unit, t.is_complete
+    SELECT
+        s.side, t.subject, t.at_ns, t.id, t.value_ns, t.is_unit, t.is_complete,
+        t.is_loss_affected, t.is_cut
     FROM thing AS t
     JOIN side AS s ON t.run_id = s.run_id
     JOIN main.run AS r ON t.run_id = r.run_id
@@ -122,7 +148,9 @@ measured AS MATERIALIZED (
         list(value_ns ORDER BY at_ns, id, value_ns) FILTER (WHERE value_ns IS NOT NULL)
             AS series,
         count(*) FILTER (WHERE is_unit AND is_complete) / nullif(count(*) FILTER (WHERE is_unit), 0)
-            AS share
+            AS share,
+        count(*) FILTER (WHERE is_unit AND is_loss_affected) AS loss_affected,
+        bool_or(is_cut) AS is_cut
     FROM sided
     GROUP BY side, subject
 ),
@@ -149,8 +177,130 @@ effect AS (
     GROUP BY subject
     HAVING count(DISTINCT side) = 2
 ),
--- Blocks wrap around the end. More than 1000 values are not drawn at once: the spread of fewer is
--- wider by the root of how many times fewer they are, and is made narrower by that.
+-- What each statistic varies with, about its mean: the value, or whether it lies beyond a quantile.
+centred AS MATERIALIZED (
+    SELECT
+        s.side,
+        s.subject,
+        m.number,
+        row_number() OVER (
+            PARTITION BY s.side, s.subject ORDER BY s.at_ns, s.id, s.value_ns
+        ) - 1 AS position,
+        s.value_ns - m.mean_ns AS mean_part,
+        (s.value_ns > m.quantiles[1])::BIGINT AS median_part,
+        (s.value_ns > m.quantiles[2])::BIGINT AS p95_part,
+        (s.value_ns > m.quantiles[3])::BIGINT AS p99_part
+    FROM sided AS s
+    JOIN measured AS m ON s.side = m.side AND s.subject = m.subject
+    JOIN effect AS e ON s.subject = e.subject
+    WHERE s.value_ns IS NOT NULL AND m.number >= 20
+),
+variance AS (
+    SELECT
+        side,
+        subject,
+        avg(median_part) AS median_mean,
+        avg(mean_part) AS mean_mean,
+        avg(p95_part) AS p95_mean,
+        avg(p99_part) AS p99_mean,
+        nullif(var_pop(median_part), 0) AS median_variance,
+        nullif(var_pop(mean_part), 0) AS mean_variance,
+        nullif(var_pop(p95_part), 0) AS p95_variance,
+        nullif(var_pop(p99_part), 0) AS p99_variance
+    FROM centred
+    GROUP BY side, subject
+),
+-- Blocks of 2, 4, 8, … neighbours, each overlapping the next one by half; five of them at least.
+half AS (
+    SELECT
+        c.side,
+        c.subject,
+        1 << n.level AS half_length,
+        c.position >> n.level AS place,
+        any_value(c.number) AS number,
+        sum(c.median_part) AS median_sum,
+        sum(c.mean_part) AS mean_sum,
+        sum(c.p95_part) AS p95_sum,
+        sum(c.p99_part) AS p99_sum
+    FROM centred AS c
+    JOIN range(24) AS n (level) ON c.number >= 10 * (1 << n.level)
+    WHERE c.position < (c.number >> n.level) << n.level
+    GROUP BY c.side, c.subject, n.level, c.position >> n.level
+),
+whole AS (
+    SELECT
+        side,
+        subject,
+        number,
+        2 * half_length AS block_length,
+        median_sum + lead(median_sum) OVER following AS median_sum,
+        mean_sum + lead(mean_sum) OVER following AS mean_sum,
+        p95_sum + lead(p95_sum) OVER following AS p95_sum,
+        p99_sum + lead(p99_sum) OVER following AS p99_sum
+    FROM half
+    WINDOW following AS (PARTITION BY side, subject, half_length ORDER BY place)
+),
+-- For how many values they are alike (integrated autocorrelation time), by batch means: how much
+-- more the means of blocks vary than those of as many independent values.
+alike AS (
+    SELECT
+        w.side,
+        w.subject,
+        w.number,
+        w.block_length,
+        list_transform(
+            [
+                avg(pow(w.median_sum - w.block_length * v.median_mean, 2) / v.median_variance),
+                avg(pow(w.mean_sum - w.block_length * v.mean_mean, 2) / v.mean_variance),
+                avg(pow(w.p95_sum - w.block_length * v.p95_mean, 2) / v.p95_variance),
+                avg(pow(w.p99_sum - w.block_length * v.p99_mean, 2) / v.p99_variance)
+            ],
+            lambda each: coalesce(
+                each / w.block_length * w.number / (w.number - w.block_length), 1
+            )
+        ) AS times
+    FROM whole AS w
+    JOIN variance AS v ON w.side = v.side AND w.subject = v.subject
+    GROUP BY w.side, w.subject, w.number, w.block_length
+),
+grown AS (
+    SELECT
+        side,
+        subject,
+        number,
+        block_length,
+        times,
+        lead(times) OVER longer AS twice_times,
+        max(list_max(times)) OVER longer AS longest
+    FROM alike
+    WINDOW longer AS (PARTITION BY side, subject ORDER BY block_length)
+),
+-- Blocks are long enough where they are twice that; the more values, the longer in any case. They
+-- still miss what reaches beyond their ends: it halves with twice the length, and is added. How much
+-- so few blocks vary is not known well: intervals are wider by as much as Student's t is.
+block AS (
+    SELECT
+        side,
+        subject,
+        block_length,
+        list_transform(
+            list_zip(times, twice_times),
+            lambda each: sqrt(
+                least(greatest(1, 2 * each[2] / each[1] - 1), 3)
+                * (number / block_length - 1) / (number / block_length - 3)
+            )
+        ) AS widenings,
+        list_transform(
+            list_zip(times, twice_times),
+            lambda each: greatest(1, each[1], 2 * each[2] - each[1])
+        ) AS times
+    FROM grown
+    WHERE block_length >= greatest(2 * longest, cbrt(number) / 2) AND number >= 10 * block_length
+    QUALIFY row_number() OVER (PARTITION BY side, subject ORDER BY block_length) = 1
+),
+-- Blocks wrap around the end. More than 1000 values (ten blocks) are not drawn at once: the spread
+-- of fewer is wider by the root of how many times fewer they are, and is made narrower by that. Of
+-- a block longer than 128 values, every other one (third, …) is taken.
 ring AS (
     SELECT
         m.side,
@@ -158,28 +308,31 @@ ring AS (
         m.number,
         m.quantiles,
         m.mean_ns,
-        ceil(cbrt(m.number))::BIGINT AS block_length,
-        ceil(least(m.number, 1000) / ceil(cbrt(m.number)))::BIGINT AS blocks,
-        list_concat(m.series, m.series[:ceil(cbrt(m.number))::BIGINT - 1]) AS series,
+        k.block_length,
+        greatest(10, ceil(least(m.number, 1000) / k.block_length))::BIGINT AS blocks,
+        ceil(k.block_length / 128)::BIGINT AS step,
+        list_concat(m.series, m.series[:k.block_length - 1]) AS series,
+        k.widenings,
         hash(m.side, m.subject, seed) AS salt
     FROM measured AS m
-    JOIN effect AS e ON m.subject = e.subject
-    WHERE m.number >= 10
+    JOIN block AS k ON m.side = k.side AND m.subject = k.subject
+    WHERE resamples * (1 - confidence) >= 20 - 1e-9
 ),
 drawn AS (
     SELECT
         r.side,
         r.subject,
-        r.number,
         r.quantiles,
         r.mean_ns,
+        r.widenings,
+        sqrt(r.blocks * r.block_length / r.number) AS narrowing,
         n.resample,
         list_sort(flatten(list_transform(
             list_transform(
                 range(r.blocks),
                 lambda block: (hash(r.salt, n.resample, block) % r.number)::BIGINT
             ),
-            lambda before: r.series[1 + before:r.block_length + before]
+            lambda before: r.series[1 + before:r.block_length + before:r.step]
         ))) AS sorted
     FROM ring AS r
     CROSS JOIN range(resamples) AS n (resample)
@@ -189,7 +342,8 @@ resampled AS (
         side,
         subject,
         resample,
-        sqrt(len(sorted) / number) AS narrowing,
+        narrowing,
+        widenings,
         [
             sorted[ceil(0.5 * len(sorted))::BIGINT] - quantiles[1],
             list_avg(sorted) - mean_ns,
@@ -204,7 +358,9 @@ deviation AS (
         subject,
         resample,
         unnest(['median', 'mean', 'p95', 'p99']) AS statistic,
-        unnest(list_transform(deviations, lambda each: each * narrowing)) AS deviation_ns
+        unnest(list_transform(
+            list_zip(deviations, widenings), lambda each: each[1] * each[2] * narrowing
+        )) AS deviation_ns
     FROM resampled
 ),
 spread AS (
@@ -222,16 +378,20 @@ spread AS (
 ),
 value AS (
     SELECT
-        side,
-        subject,
-        number,
-        share,
+        m.side,
+        m.subject,
+        m.number,
+        m.share,
+        m.loss_affected,
+        m.is_cut,
         unnest(['median', 'mean', 'p95', 'p99', 'max']) AS statistic,
         unnest([0.5, NULL, 0.95, 0.99, 1.0]) AS quantile,
         unnest([
-            quantiles[1], round(mean_ns)::BIGINT, quantiles[2], quantiles[3], max_ns
-        ]) AS value_ns
-    FROM measured
+            m.quantiles[1], round(m.mean_ns)::BIGINT, m.quantiles[2], m.quantiles[3], m.max_ns
+        ]) AS value_ns,
+        m.number / unnest(list_append(k.times, NULL)) AS independent
+    FROM measured AS m
+    LEFT JOIN block AS k ON m.side = k.side AND m.subject = k.subject
 ),
 paired AS (
     SELECT
@@ -242,23 +402,35 @@ paired AS (
         b.value_ns AS b_ns,
         coalesce(a.number, 0) AS a_count,
         coalesce(b.number, 0) AS b_count,
+        a.independent AS a_independent,
+        b.independent AS b_independent,
         a.share AS a_share,
-        b.share AS b_share
+        b.share AS b_share,
+        a.loss_affected AS a_loss_affected,
+        b.loss_affected AS b_loss_affected,
+        coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
     FROM (SELECT * FROM value WHERE side = 'a') AS a
     FULL JOIN (SELECT * FROM value WHERE side = 'b') AS b
         ON a.subject = b.subject AND a.statistic = b.statistic
 ),
 judged AS (
     SELECT
-        p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_share, p.b_share,
+        p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_independent,
+        p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.is_cut,
         e.cliffs_delta,
         CASE
             WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
             WHEN p.b_count = 0 THEN 'only in A'
             WHEN p.a_count = 0 THEN 'only in B'
             WHEN p.quantile = 1 THEN 'not estimated'
-            WHEN least(p.a_count, p.b_count) * (1 - coalesce(p.quantile, 0.5)) < 5 - 1e-9
+            WHEN least(p.a_count, p.b_count) < 20
+                OR least(p.a_count, p.b_count) * (1 - coalesce(p.quantile, 0.5)) < 5 - 1e-9
                 THEN 'too few values'
+            WHEN p.a_independent IS NULL OR p.b_independent IS NULL
+                OR least(p.a_independent, p.b_independent) * (1 - coalesce(p.quantile, 0.5))
+                    < 5 - 1e-9
+                THEN 'too few independent values'
+            WHEN s.ends IS NULL THEN 'too few resamples'
         END AS reason,
         p.b_ns - p.a_ns + round(s.ends[1])::BIGINT AS low_ns,
         p.b_ns - p.a_ns + round(s.ends[2])::BIGINT AS high_ns
@@ -289,8 +461,13 @@ SELECT
     END AS effect,
     a_count,
     b_count,
+    floor(a_independent + 1e-9)::BIGINT AS a_independent,
+    floor(b_independent + 1e-9)::BIGINT AS b_independent,
     round(a_share, 4) AS a_share,
     round(b_share, 4) AS b_share,
+    a_loss_affected,
+    b_loss_affected,
+    is_cut,
     subject
 FROM judged
 ORDER BY
