@@ -129,6 +129,10 @@ SELECT
         )
     END
 FROM staging.loss_interval
+-- What a packet lacks that was cut off is told as a damage.
+WHERE kind <> 'loss'
+    OR event_count IS NOT NULL
+    OR trace_id NOT IN (SELECT trace_index + 1 FROM staging.damage)
 GROUP BY trace_id, kind
 UNION ALL
 SELECT

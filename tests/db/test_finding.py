@@ -229,6 +229,24 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_pat
     assert find(database, [1]) == []
 
 
+@pytest.mark.parametrize(("count", "name"), [("", "damaged_trace"), ("7", "discarded_events")])
+def test_a_packet_that_was_cut_off_is_no_full_buffer(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path, count: str, name: str
+) -> None:
+    fill(
+        database,
+        tmp_path,
+        {
+            "loss_interval": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
+            "packet": "event_count\n100\n",
+            "diagnostic": "trace_id,name,severity,count,detail\n"
+            "1,damaged_trace,data_loss,1,cut off\n",
+            "node": "node_id\n1\n",
+        },
+    )
+    assert {f.name for f in find(database, [1])} == {"damaged_trace", name}
+
+
 def test_errors_come_first(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
     fill(
         database,
