@@ -44,7 +44,7 @@ initialised AS (
 inferred AS (
     SELECT 'node' AS kind, process_id FROM staging.node WHERE is_inferred
     UNION ALL
-    SELECT 'publisher', process_id FROM staging.publisher WHERE is_inferred
+    SELECT 'publisher', process_id FROM staging.publisher WHERE is_inferred AND NOT is_internal
     UNION ALL
     SELECT 'subscription', process_id FROM staging.subscription WHERE is_inferred
     UNION ALL

@@ -73,7 +73,9 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "started_late": (
         {
-            "publisher": "publisher_id,is_inferred\n1,true\n2,false\n",
+            # the third is one that ROS makes for /rosout
+            "publisher": "publisher_id,is_inferred,is_internal\n"
+            "1,true,false\n2,false,false\n3,true,true\n",
             "callback": "callback_id,kind\n1,unknown\n",
             "node": "node_id,is_inferred\n1,false\n",
         },
