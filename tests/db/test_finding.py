@@ -97,8 +97,10 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     "process_without_ros": (
         {
             "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n"
-            "1,1,ros,0,1\n2,2,bridge,0,1500000000\n",
+            "1,1,ros,0,1\n2,2,bridge,0,1500000000\n3,3,client,0,1\n4,4,server,0,1\n",
             "node": "process_id\n1\n",
+            "client": "process_id\n3\n",
+            "service": "process_id\n4\n",
         },
         [("bridge 2 on host", 1, "seen for 1.500 s")],
     ),
