@@ -112,6 +112,17 @@ WHERE NOT e.is_known
 GROUP BY e.trace_index, s.domain
 UNION ALL
 SELECT
+    t.trace_id,
+    'empty_trace',
+    'warning',
+    1,
+    'not one event was recorded: ' || t.path
+FROM staging.trace AS t
+-- A chunk of a recording may well be empty, and of a copy nothing is read.
+WHERE t.event_count = 0
+    AND coalesce(t.uuid NOT IN (SELECT uuid FROM staging.trace WHERE event_count > 0), true)
+UNION ALL
+SELECT
     trace_id,
     CASE kind WHEN 'loss' THEN 'discarded_events' WHEN 'packets' THEN 'lost_packets'
         ELSE 'pause' END,

@@ -16,13 +16,17 @@ Msgflow = Callable[..., Result]
 
 @pytest.fixture
 def database(fresh_database: Path) -> Path:
-    """A run with a node, to which tests add what is wrong."""
+    """A run with something of every kind, to which tests add what is wrong."""
     from golden import BASE
 
     with duckdb.connect(str(fresh_database)) as connection:
         for table, row in BASE.items():
             insert(connection, table, list(row), [list(row.values())])
         insert(connection, "node", ["node_id", "full_name"], [["1", "/node"]])
+        insert(connection, "publication", ["publication_id"], [["1"]])
+        insert(connection, "take", ["take_id", "method"], [["1", "rmw"]])
+        insert(connection, "callback_instance", ["callback_instance_id", "end_ns"], [["1", "9"]])
+        insert(connection, "executor_state", ["state"], [["wait"]])
     return fresh_database
 
 

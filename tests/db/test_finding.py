@@ -16,6 +16,14 @@ from msgflow.db.finding import SEVERITIES, find
 Tables = dict[str, str]
 PUBLISHED = "publication_id,publisher_id,process_id,start_ns,end_ns,source_timestamp_ns\n"
 TAKEN = "take_id,subscription_id,process_id,taken_ns,source_timestamp_ns,method\n"
+# Something of every kind, so that nothing is missing altogether.
+SOUND: Tables = {
+    "node": "node_id\n1\n",
+    "publication": "publication_id\n1\n",
+    "take": "take_id,method\n1,rmw\n",
+    "callback_instance": "callback_instance_id,end_ns\n1,9\n",
+    "executor_state": "state\nwait\n",
+}
 TWO_HOSTS: Tables = {
     "clock": "clock_id,method\n1,none\n2,none\n",
     "host": "host_id,clock_id,hostname\n1,1,alpha\n2,2,beta\n",
@@ -63,6 +71,13 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     "audit_failed": (
         {"diagnostic": "name,severity,count,detail\ncheck_failed,error,3,two of one\n"},
         [("database", 3, "two of one")],
+    ),
+    "empty_trace": (
+        {
+            "diagnostic": "trace_id,name,severity,count,detail\n"
+            "1,empty_trace,warning,1,not one event\n"
+        },
+        [("trace", 1, "not one event was recorded")],
     ),
     "overlapping_traces": (
         {
@@ -241,14 +256,22 @@ def test_a_packet_that_was_cut_off_is_no_full_buffer(
         database,
         tmp_path,
         {
+            **SOUND,
             "loss_interval": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
             "packet": "event_count\n100\n",
             "diagnostic": "trace_id,name,severity,count,detail\n"
             "1,damaged_trace,data_loss,1,cut off\n",
-            "node": "node_id\n1\n",
         },
     )
     assert {f.name for f in find(database, [1])} == {"damaged_trace", name}
+
+
+def test_a_run_in_which_nothing_happened(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path
+) -> None:
+    """Not even what one part would call for of another."""
+    fill(database, tmp_path, {"node": "node_id\n1\n"})
+    assert [(f.name, f.subject) for f in find(database, [1])] == [("missing_layer", "everything")]
 
 
 def test_errors_come_first(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
@@ -256,9 +279,9 @@ def test_errors_come_first(database: duckdb.DuckDBPyConnection, tmp_path: Path) 
         database,
         tmp_path,
         {
+            **SOUND,
             "loss_interval": "kind,cpu,start_ns,end_ns,event_count\npause,,0,9,\nloss,0,20,29,5\n",
             "packet": "event_count\n100\n",
-            "node": "node_id\n1\n",
         },
     )
     assert [f.severity for f in find(database, [1])] == ["error", "warning"]
