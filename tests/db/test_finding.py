@@ -79,6 +79,10 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         },
         [("trace", 1, "not one event was recorded")],
     ),
+    "ignored_events": (
+        {"diagnostic": "name,severity,count,detail\nignored_events,info,9,dds:* (9)\n"},
+        [("case", 9, "dds:* (9)")],
+    ),
     "overlapping_traces": (
         {
             "diagnostic": "trace_id,name,severity,count,detail\n"
