@@ -10,7 +10,7 @@
 --     the size given above; or enable fewer events, or write to a faster disk.
 -- grain: one row per trace
 -- severity: error
--- needs: main.loss_interval, main.trace, store.packet, store.diagnostic
+-- needs: main.loss_interval, main.trace, store.packet, store.diagnostic, derive.counted
 WITH damaged AS (
     SELECT DISTINCT trace_id FROM store.diagnostic WHERE name = 'damaged_trace'
 ),
@@ -36,10 +36,11 @@ SELECT
     t.path AS subject,
     coalesce(l.events, l.places) AS count,
     printf(
-        '%s events in %d places, %.3f s in all; --subbuf-size=%dM would have held the largest '
+        '%s in %s, %.3f s in all; --subbuf-size=%dM would have held the largest '
         || 'burst',
-        coalesce(format('{:,}', l.events), 'unknown'),
-        l.places,
+        CASE WHEN l.events = 1 THEN '1 event'
+            ELSE coalesce(format('{:,}', l.events), 'unknown') || ' events' END,
+        derive.counted(l.places, 'place'),
         l.length_ns / 1e9,
         -- About 100 bytes for an event, the next power of two that holds them, at least 1 MiB.
         (2 ** greatest(

@@ -130,9 +130,9 @@ SELECT
     CASE kind WHEN 'loss' THEN coalesce(sum(event_count), count(*)) ELSE count(*) END::BIGINT,
     CASE kind
         WHEN 'loss' THEN printf(
-            'events that the tracer discarded in %d places, %.3f s in all: use more or larger '
+            'events that the tracer discarded in %d place%s, %.3f s in all: use more or larger '
             || 'sub-buffers',
-            count(*), sum(end_ns - start_ns) / 1e9
+            count(*), CASE WHEN count(*) = 1 THEN '' ELSE 's' END, sum(end_ns - start_ns) / 1e9
         )
         WHEN 'packets' THEN 'places where whole packets were overwritten or are missing'
         ELSE printf(

@@ -63,7 +63,7 @@ def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> 
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
     assert lines[0] == "1. warning: Tracing was paused (tracing_paused)"
-    assert lines[1] == "   trace — 1 pauses, 1.000 s in all, the longest 1.000 s"
+    assert lines[1] == "   trace — 1 pause, 1.000 s in all, the longest 1.000 s"
     assert [line.strip().partition(":")[0] for line in lines[2:] if line[3:4] != " "] == [
         "means",
         "cause",

@@ -52,7 +52,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "lost_packets": (
         {"loss_interval": "kind,cpu,start_ns,end_ns\npackets,0,0,2000000000\nloss,0,5,6\n"},
-        [("trace", 1, "1 places on 1 CPUs, 2.000 s in all")],
+        [("trace", 1, "1 place on 1 CPU, 2.000 s in all")],
     ),
     "tracing_paused": (
         {
@@ -140,14 +140,14 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "orphan_take": "take_id,subscription_id,reason\n1,1,publisher_trace_ends\n",
             "take": "take_id,taken_ns,method\n1,1250000000,rmw\n",
         },
-        [("/a", 1, "1 messages until 0.250 s after the last event of talker 1 on host")],
+        [("/a", 1, "1 message until 0.250 s after the last event of talker 1 on host")],
     ),
     "stream_ends_early": (
         {
             "packet": "cpu_id,stream_instance_id,begin_ns,end_ns\n"
             "0,0,0,10000000000\n1,1,0,4000000000\n2,2,0,9900000000\n"
         },
-        [("trace", 1, "1 streams (CPU 1) end up to 6.000 s early")],
+        [("trace", 1, "1 stream (CPU 1) end up to 6.000 s early")],
     ),
     "unbalanced_callbacks": (
         {
@@ -155,7 +155,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "callback_instance": "callback_instance_id,start_ns,end_ns,is_loss_affected\n"
             "1,10,,false\n2,20,,true\n3,30,35,false\n4,40,,false\n"
         },
-        [("process 1 on host", 1, "1 runs of 1 callbacks")],
+        [("process 1 on host", 1, "1 run of 1 callback")],
     ),
     "clocks_apart": (
         {
@@ -164,7 +164,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "take": TAKEN + "1,1,2,4000000,7,rmw\n2,1,2,7000,8,rmw\n",
             "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
         },
-        [("alpha → beta", 1, "1 messages received up to 2.000 ms before they were published")],
+        [("alpha → beta", 1, "1 message received up to 2.000 ms before publication")],
     ),
     "clock_jumps": (
         {
@@ -172,7 +172,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "take": TAKEN + "1,1,1,2000,1000,rmw\n2,1,1,12000000500,32000000000,rmw\n",
             "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
         },
-        [("host", 1, "1 jumps, the largest 20.000 s")],
+        [("host", 1, "1 jump, the largest 20.000 s")],
     ),
     "missing_layer": (
         {
