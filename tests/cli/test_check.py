@@ -106,3 +106,13 @@ def test_many_places_are_cut_and_it_says_so(msgflow: Msgflow, database: Path) ->
 
 def test_a_run_that_does_not_exist(msgflow: Msgflow, database: Path) -> None:
     assert msgflow("check", "--run", "nothing", "--db", database).exit_code == 2
+
+
+def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) -> None:
+    add(database, "run", {"run_id": "2", "name": "other"})
+    add(database, "loss_interval", pause())
+    alone = msgflow("check", "--run", "case", "--db", database).stdout
+    assert "   trace — 1 pause, " in alone
+    every = msgflow("check", "--run", "all", "--db", database).stdout
+    assert "   run case (1): trace — 1 pause, " in every
+    assert "   run other (2): everything — nothing was published" in every

@@ -132,6 +132,16 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         },
         [("/a", 2, "2 messages")],
     ),
+    "message_without_stamp": (
+        {
+            "subscription": "subscription_id,topic_name,is_internal\n1,/a,false\n2,/rosout,true\n",
+            "orphan_take": "take_id,subscription_id,reason\n1,1,no_stamp\n2,2,no_stamp\n"
+            "3,1,no_stamp\n4,1,ambiguous\n",
+            # the third was kept by a ring buffer for a subscription that came late
+            "take": "take_id,method\n1,callback_only\n2,rmw\n3,ring_buffer\n4,rmw\n",
+        },
+        [("/a", 1, "1 message")],
+    ),
     "trace_ends_early": (
         {
             "process": "process_id,pid,name,last_seen_ns\n1,1,talker,1000000000\n",
