@@ -26,6 +26,9 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"cannot write the file: {reason} — {path}") from error
+        raise UsageError(
+            f"cannot write the file: {reason} — {path}",
+            "give a file in a directory that exists and can be written",
+        ) from error
     finally:
         temporary.unlink(missing_ok=True)

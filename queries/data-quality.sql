@@ -2,9 +2,9 @@
 -- title: Data quality, and what share of the answers it touches
 -- description: What the traces lack, by trace, process and topic. `affected` of `total` things of
 --     a kind are touched: events that were discarded among those that happened, time in gaps,
---     callback runs never seen to end, objects that were never seen to be created, takes without a
---     publication, messages with an unknown fate, links that lost events may have spoilt. The last
---     rows give the share of the whole run.
+--     callback runs never seen to end, objects that were never seen to be created (those of ROS
+--     itself left out), takes without a publication, messages with an unknown fate, links that lost
+--     events may have spoilt. The last rows give the share of the whole run.
 -- grain: one row per trace, process, topic or run, and measure
 -- param: all BOOLEAN = false     Show measures with nothing affected, too
 -- column: run_id BIGINT          Run
@@ -45,9 +45,9 @@ process_label AS (
 object AS (
     SELECT process_id, is_inferred FROM main.node
     UNION ALL
-    SELECT process_id, is_inferred FROM main.publisher
+    SELECT process_id, is_inferred FROM main.publisher WHERE NOT is_internal
     UNION ALL
-    SELECT process_id, is_inferred FROM main.subscription
+    SELECT process_id, is_inferred FROM main.subscription WHERE NOT is_internal
     UNION ALL
     SELECT process_id, kind = 'unknown' FROM main.callback
 ),

@@ -17,10 +17,10 @@
 -- column: wait_median_ns BIGINT [ns]  Median wait, where its beginning is known
 -- column: wait_max_ns BIGINT [ns]   Longest wait
 -- column: busy_worst_ns BIGINT [ns]   Longest that the executor can have been busy during one wait
--- column: busy_min_ns BIGINT [ns]   Executor busy with others during all waits, at least
--- column: busy_max_ns BIGINT [ns]   Executor busy with others during all waits, at most
--- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, where the wait is known, at least
--- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, where the wait is known, at most
+-- column: busy_total_min_ns BIGINT [ns]  Executor busy with others during all waits, at least
+-- column: busy_total_max_ns BIGINT [ns]  Executor busy with others during all waits, at most
+-- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where the wait is known, at least
+-- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where the wait is known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile, by its share: the three with the most, with
 --     their node where it is another
 -- column: unknown BIGINT            Runs of which the beginning of the wait is not known
@@ -47,10 +47,10 @@ measured AS (
         quantile_disc(wait_ns, 0.5) AS wait_median_ns,
         max(wait_ns) AS wait_max_ns,
         max(busy_max_ns) AS busy_worst_ns,
-        sum(busy_min_ns)::BIGINT AS busy_min_ns,
-        sum(coalesce(busy_max_ns, busy_min_ns))::BIGINT AS busy_max_ns,
-        sum(wait_ns - busy_max_ns)::BIGINT AS rest_min_ns,
-        sum(wait_ns - busy_min_ns)::BIGINT AS rest_max_ns,
+        sum(busy_min_ns)::BIGINT AS busy_total_min_ns,
+        sum(coalesce(busy_max_ns, busy_min_ns))::BIGINT AS busy_total_max_ns,
+        sum(wait_ns - busy_max_ns)::BIGINT AS rest_total_min_ns,
+        sum(wait_ns - busy_min_ns)::BIGINT AS rest_total_max_ns,
         count(*) - count(wait_ns) AS unknown,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected
     FROM waited
@@ -98,10 +98,10 @@ SELECT
     m.wait_median_ns,
     m.wait_max_ns,
     m.busy_worst_ns,
-    m.busy_min_ns,
-    m.busy_max_ns,
-    m.rest_min_ns,
-    m.rest_max_ns,
+    m.busy_total_min_ns,
+    m.busy_total_max_ns,
+    m.rest_total_min_ns,
+    m.rest_total_max_ns,
     w.shares AS meanwhile,
     m.unknown,
     m.loss_affected,
@@ -110,4 +110,4 @@ SELECT
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id
-ORDER BY m.run_id, m.busy_max_ns DESC, l.node, l.label, m.callback_id
+ORDER BY m.run_id, m.busy_total_max_ns DESC, l.node, l.label, m.callback_id

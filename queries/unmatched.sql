@@ -6,7 +6,10 @@
 -- param: topic VARCHAR = NULL     Only this topic
 -- param: side VARCHAR {take|publication} = NULL   Only takes without a publication, or only
 --     publications without a take
--- param: reason VARCHAR = NULL    Only this reason
+-- param: reason VARCHAR {before_subscription|subscription_ended|receiver_gap|take_failed|
+--     before_discovery|not_delivered|overwritten|lost_in_transport|pending_at_end|no_stamp|
+--     before_tracing|publisher_gap|publisher_trace_ends|publisher_not_traced|ambiguous|unknown}
+--     = NULL  Only this reason
 -- column: run_id BIGINT           Run
 -- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
 -- column: side VARCHAR            'publication' or 'take': what there is

@@ -16,7 +16,7 @@ from msgflow.cli.options import DEFAULT_DATABASE, OUTPUT, DatabaseOption, RunOpt
 from msgflow.errors import ExitCode
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from msgflow.db.finding import Finding
 
@@ -47,7 +47,9 @@ def command(
 
     with Database(database) as opened:
         findings = opened.findings(run=run)
-    print_lines(_json(findings) if form is CheckFormat.JSON else _text(findings))
+        names = {known.run_id: f"{known.name} ({known.run_id})" for known in opened.runs()}
+    labels = names if run == "all" and len(names) > 1 else {}
+    print_lines(_json(findings) if form is CheckFormat.JSON else _text(findings, labels))
     numbers = [
         count(len({f.name for f in findings if f.severity == severity}), severity)
         for severity in ("error", "warning")
@@ -73,7 +75,7 @@ def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
             yield number, finding
 
 
-def _text(findings: Sequence[Finding]) -> Iterator[str]:
+def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterator[str]:
     from msgflow.export.human import format_cell
 
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)
@@ -84,7 +86,8 @@ def _text(findings: Sequence[Finding]) -> Iterator[str]:
             yield ""
         yield f"{number}. {first.severity}: {first.title} ({first.name})"
         for finding in places[:_PLACES_SHOWN]:
-            yield f"   {format_cell(finding.subject)} — {format_cell(finding.detail)}"
+            run = f"run {run_labels[finding.run_id]}: " if run_labels else ""
+            yield f"   {format_cell(run + finding.subject)} — {format_cell(finding.detail)}"
         if len(places) > _PLACES_SHOWN:
             yield f"   … and {len(places) - _PLACES_SHOWN} more; --format json has them all"
         for label, text in (

@@ -16,6 +16,13 @@ from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+# What the libraries below say of values, and how we do.
+_LEAKED = (
+    ("Value error, ", ""),
+    ("Input should be a valid integer, unable to parse string as an integer", "no whole number"),
+    ("Input should be a valid number, unable to parse string as a number", "no number"),
+    ("Input should be ", "it has to be "),
+)
 COMMANDS = (
     "ingest", "query", "flow", "compare", "sql", "info", "check", "events", "links", "clocks",
     "export", "db", "simulate",
@@ -85,6 +92,8 @@ def _unwritable(error: OSError) -> ExitCode:
 
 def _usage(error: typer.TyperException) -> tuple[str, str | None]:
     message, _, suggestion = error.format_message().strip().partition(". Did you mean ")
+    for leaked, ours in _LEAKED:
+        message = message.replace(leaked, ours)
     context = getattr(error, "ctx", None)
     hint = None if context is None else f"{context.command_path} --help"
     if suggestion:

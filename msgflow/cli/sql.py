@@ -49,5 +49,7 @@ def _statements(text: str | None, file: Path | None) -> str:
             return file.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or "not UTF-8 text"
-            raise UsageError(f"cannot read the file: {reason.lower()} — {file}") from None
+            raise UsageError(
+                f"cannot read the file: {reason.lower()} — {file}", "give a file with SQL with -f"
+            ) from None
     return sys.stdin.read() if text == "-" else str(text)

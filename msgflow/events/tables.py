@@ -143,6 +143,9 @@ def _new_directory(directory: Path) -> Iterator[Path]:
         temporary.replace(directory)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"cannot write the directory: {reason} — {directory}") from error
+        raise UsageError(
+            f"cannot write the directory: {reason} — {directory}",
+            "give a directory in a place that exists and can be written with -o",
+        ) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)

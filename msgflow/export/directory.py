@@ -94,4 +94,7 @@ def _is_exported(path: Path) -> bool:
 
 def _cannot(action: str, error: OSError, directory: Path) -> UsageError:
     reason = (error.strerror or str(error)).lower()
-    return UsageError(f"cannot {action}: {reason} — {directory}")
+    return UsageError(
+        f"cannot {action}: {reason} — {directory}",
+        "give a directory in a place that exists and can be written",
+    )

@@ -25,6 +25,8 @@ _LEAST_WIDTH = 60
 _INDENT = 4
 # Links that say something of the effect, whichever way the flow is drawn, or nothing at all.
 _OF_EFFECT = ("transport", "service", "callback", "direct")
+# Reasons with which a message may have been taken all the same: of the status 'unknown'.
+_FATE_UNKNOWN = ("receiver_gap", "unknown", "reason unknown")
 _REQUEST = {
     "callback": "no callback was seen",
     "sending": "its sending was not seen",
@@ -159,7 +161,9 @@ class _Painter:
     def _details(self, item: Item, link: Row | None) -> list[str]:
         node = item.node
         if node["kind"] == "subscription":
-            return [f"not taken: {_reason(link)}"]
+            reason = _reason(link)
+            is_known = reason not in _FATE_UNKNOWN
+            return [f"{'not taken' if is_known else 'take not known'}: {reason}"]
         details = [
             _waits(edge) for _, edge in item.causes if edge["link_kind"] in ("transport", "service")
         ]

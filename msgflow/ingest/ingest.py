@@ -279,6 +279,8 @@ def _store(
             loaded.duplicate_packet_count,
             "packets that several of the given traces hold were read once",
         )
+    for diagnostic in loaded.diagnostics:
+        _add_diagnostic(con, run_id, *diagnostic)
     return run_id, run_name
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fnmatch
 import itertools
 import time
 from dataclasses import dataclass
@@ -14,6 +13,8 @@ import duckdb
 from msgflow.errors import UsageError
 from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
+from msgflow.ingest.ignored import diagnostics as ignored_diagnostics
+from msgflow.ingest.ignored import is_ignored
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
@@ -54,11 +55,13 @@ class Loaded:
         event_counts: (trace index, event name) -> events read, wanted or not.
         duplicate_packet_count: packets that another trace of the input held already.
         replaced_runs: ids of the runs that hold some of these packets already.
+        diagnostics: name, severity, count and detail of what was left out on request.
     """
 
     event_counts: Mapping[tuple[int, str], int]
     duplicate_packet_count: int
     replaced_runs: frozenset[int]
+    diagnostics: tuple[tuple[str, str, int, str], ...]
 
 
 def load_traces(
@@ -93,7 +96,7 @@ def load_traces(
     wanted = {
         name: tracepoint.arrow_schema()
         for name, tracepoint in catalogue.tracepoints.items()
-        if not any(fnmatch.fnmatchcase(name, pattern) for pattern in ignore)
+        if not is_ignored(name, ignore)
     }
     sources = _sources(traces.traces, hostnames)
     for source in sources:
@@ -149,7 +152,10 @@ def load_traces(
             ],
         )
     return Loaded(
-        dict(traces.event_counts), traces.duplicate_packet_count, frozenset(tables.replaced)
+        dict(traces.event_counts),
+        traces.duplicate_packet_count,
+        frozenset(tables.replaced),
+        tuple(ignored_diagnostics(ignore, traces.event_counts)),
     )
 
 

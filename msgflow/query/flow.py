@@ -152,9 +152,9 @@ def read_steps(
             f"there is no such direction — {direction}", f"choose {' or '.join(DIRECTIONS)}"
         )
     if depth < 0:
-        raise UsageError(f"the depth is at least 0 — {depth}")
+        raise UsageError(f"the depth is at least 0 — {depth}", "32 messages in a row are usual")
     if not 1 <= limit <= MOST_VERTICES:
-        raise UsageError(f"the limit is from 1 to {MOST_VERTICES} — {limit}")
+        raise UsageError(f"the limit is from 1 to {MOST_VERTICES} — {limit}", "1000 is usual")
     bindings = {
         "kind": start.kind,
         "id": start.id,

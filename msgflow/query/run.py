@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
+from msgflow.query.catalogue import nearest
 from msgflow.query.clocks import clock_notes
 from msgflow.query.identities import require_identities
 from msgflow.query.result import QueryResult
 from msgflow.query.topics import require_topics
-from msgflow.query.value import parse_text
+from msgflow.query.value import described_type, parse_text
 from msgflow.query.window import Run, choose_runs, time_window
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def bind(header: Header, given: Mapping[str, Value]) -> dict[str, Value]:
     bound: dict[str, Value] = {}
     for param in header.params:
         if param.name in by_name:
-            bound[param.name] = _fit(param, by_name[param.name])
+            bound[param.name] = _fit(header, param, by_name[param.name])
         elif param.has_default:
             bound[param.name] = param.default
         else:
@@ -135,18 +136,27 @@ def first_line(error: Exception) -> str:
     return (text if separator else line).rstrip(".!")
 
 
-def _fit(param: Param, value: Value) -> Value:
+def _fit(header: Header, param: Param, value: Value) -> Value:
+    option = f"--{param.name.replace('_', '-')}"
     if isinstance(value, str):
         try:
             value = parse_text(value, param.type)
         except ValueError:
-            raise UsageError(f"{param.name} takes a {param.type} — {value}") from None
+            raise UsageError(
+                f"{option} takes {described_type(param.type)} — {value}",
+                f"msgflow query {header.name} --help",
+            ) from None
     if param.choices and value is not None and value not in param.choices:
+        near = nearest(str(value), param.choices)
         raise UsageError(
-            f"{param.name} has no such value — {value}", f"choose {' or '.join(param.choices)}"
+            f"{option} has no such value — {value}",
+            f"did you mean {' or '.join(near)}" if near else f"choose {' or '.join(param.choices)}",
         )
     if param.minimum is not None and isinstance(value, int) and value < param.minimum:
-        raise UsageError(f"{param.name} is at least {param.minimum} — {value}")
+        raise UsageError(
+            f"{option} is at least {param.minimum} — {value}",
+            f"msgflow query {header.name} {option} {param.minimum}",
+        )
     return value
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from msgflow.query.window import Run
 
 # Parameters with these names take a topic, in every query that has them.
-TOPIC_PARAMETERS = ("from", "to")
+TOPIC_PARAMETERS = ("from", "to", "topic")
 _SHOWN = 3
 _TOPICS = """
 SELECT topic_name FROM main.publisher WHERE list_contains($runs, run_id)

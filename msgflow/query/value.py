@@ -24,6 +24,18 @@ def is_integer(type_name: str) -> bool:
     return type_name.upper() in _INTEGER_TYPES
 
 
+def described_type(type_name: str) -> str:
+    """Return what people call a value of the DuckDB type `type_name`: 'a whole number'."""
+    name = type_name.upper()
+    if name.endswith("[]"):
+        return "values separated by commas"
+    if is_integer(name):
+        return "a whole number"
+    if name in _REAL_TYPES or name.startswith("DECIMAL"):
+        return "a number"
+    return "yes or no" if name == "BOOLEAN" else "text"
+
+
 def parse_literal(text: str) -> Value:
     """Return the value of a literal as SQL writes it: NULL, a truth value, number, string or list.
 

@@ -108,7 +108,10 @@ def time_window(
         start_ns = MINIMUM_NS if start is None else time_point(start, runs, "--start")
     end_ns = MAXIMUM_NS if end is None else time_point(end, runs, "--end")
     if start_ns > end_ns:
-        raise UsageError(f"the window ends before it starts — {start_ns} to {end_ns} ns")
+        raise UsageError(
+            f"the window ends before it starts — {start_ns} to {end_ns} ns",
+            "give an --end that is later than the start",
+        )
     return start_ns, end_ns
 
 
@@ -168,7 +171,10 @@ def _run_start(runs: Sequence[Run], option: str) -> int:
             "choose one with --run, or give epoch ns or ISO times",
         )
     if runs[0].start_ns is None:
-        raise UsageError(f"{option} counts from the start of a run, which has no events")
+        raise UsageError(
+            f"{option} counts from the start of a run, which has no events",
+            "give epoch ns or ISO times",
+        )
     return runs[0].start_ns
 
 

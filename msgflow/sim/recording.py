@@ -76,14 +76,14 @@ class Recording:
             raise UsageError(
                 f"a pause must end after it has begun — {bad[0]}", "give its begin first"
             )
-        times = [self.start_ns]
+        previous = self.start_ns
         for begin, end in sorted((*self.pauses, *((time, time) for time in self.rotations))):
-            times += [begin, end]
-        if times != sorted(times):
-            raise UsageError(
-                "pauses and rotations must follow the start and each other",
-                "give times that do not overlap",
-            )
+            if begin <= previous:
+                raise UsageError(
+                    "pauses and rotations must follow the start and each other",
+                    "give times that do not overlap or touch",
+                )
+            previous = end
 
     @property
     def is_perfect(self) -> bool:

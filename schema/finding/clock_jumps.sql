@@ -7,7 +7,7 @@
 -- cure: Let the clock settle before recording (chronyc waitsync), and slew instead of step.
 -- grain: one row per host
 -- severity: warning
--- needs: derive.stamp_shift, main.host
+-- needs: derive.stamp_shift, main.host, derive.counted
 WITH step AS (
     SELECT
         run_id, host_id,
@@ -18,7 +18,10 @@ SELECT
     h.run_id,
     h.hostname AS subject,
     count(*) AS count,
-    printf('%d jumps, the largest %.3f s', count(*), max(abs(s.step_ns)) / 1e9) AS detail
+    printf(
+        '%s, the largest %.3f s',
+        derive.counted(count(*), 'jump'), max(abs(s.step_ns)) / 1e9
+    ) AS detail
 FROM step AS s
 JOIN main.host AS h ON s.host_id = h.host_id
 WHERE abs(s.step_ns) > 100_000_000

@@ -7,14 +7,14 @@
 --     msgflow clocks apply messages.
 -- grain: one row per pair of hosts
 -- severity: warning
--- needs: main.link_transport, main.publication, main.take, main.process, main.host
+-- needs: main.link_transport, main.publication, main.take, main.process, main.host, derive.counted
 SELECT
     l.run_id,
     fh.hostname || ' → ' || th.hostname AS subject,
     count(*) AS count,
     printf(
-        '%d messages received up to %.3f ms before they were published',
-        count(*), -min(l.latency_ns) / 1e6
+        '%s received up to %.3f ms before publication',
+        derive.counted(count(*), 'message'), -min(l.latency_ns) / 1e6
     ) AS detail
 FROM main.link_transport AS l
 JOIN main.publication AS b ON l.publication_id = b.publication_id

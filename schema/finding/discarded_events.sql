@@ -2,6 +2,7 @@
 -- title: The tracer discarded events
 -- description: Events were lost because the buffers were full. What happened in those gaps is
 --     missing, nothing is paired across them, and results near them are marked is_loss_affected.
+--     A packet that was cut off, whose events nobody counted, is a damage of the trace.
 -- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
 --     take them away.
 -- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
@@ -9,17 +10,21 @@
 --     the size given above; or enable fewer events, or write to a faster disk.
 -- grain: one row per trace
 -- severity: error
--- needs: main.loss_interval, main.trace, store.packet
-WITH loss AS (
+-- needs: main.loss_interval, main.trace, store.packet, store.diagnostic, derive.counted
+WITH damaged AS (
+    SELECT DISTINCT trace_id FROM store.diagnostic WHERE name = 'damaged_trace'
+),
+loss AS (
     SELECT
-        trace_id,
+        g.trace_id,
         count(*) AS places,
-        sum(event_count)::BIGINT AS events,
-        max(event_count) AS largest,
-        sum(end_ns - start_ns)::BIGINT AS length_ns
-    FROM main.loss_interval
-    WHERE kind = 'loss'
-    GROUP BY trace_id
+        sum(g.event_count)::BIGINT AS events,
+        max(g.event_count) AS largest,
+        sum(g.end_ns - g.start_ns)::BIGINT AS length_ns
+    FROM main.loss_interval AS g
+    LEFT JOIN damaged AS d ON g.trace_id = d.trace_id
+    WHERE g.kind = 'loss' AND (g.event_count IS NOT NULL OR d.trace_id IS NULL)
+    GROUP BY g.trace_id
 ),
 fullest AS (
     SELECT trace_id, max(event_count) AS events
@@ -31,10 +36,11 @@ SELECT
     t.path AS subject,
     coalesce(l.events, l.places) AS count,
     printf(
-        '%s events in %d places, %.3f s in all; --subbuf-size=%dM would have held the largest '
+        '%s in %s, %.3f s in all; --subbuf-size=%dM would have held the largest '
         || 'burst',
-        coalesce(format('{:,}', l.events), 'unknown'),
-        l.places,
+        CASE WHEN l.events = 1 THEN '1 event'
+            ELSE coalesce(format('{:,}', l.events), 'unknown') || ' events' END,
+        derive.counted(l.places, 'place'),
         l.length_ns / 1e9,
         -- About 100 bytes for an event, the next power of two that holds them, at least 1 MiB.
         (2 ** greatest(

@@ -8,14 +8,16 @@
 --     enable-channel --userspace --discard CHANNEL; or take snapshots of larger buffers.
 -- grain: one row per trace
 -- severity: error
--- needs: main.loss_interval, main.trace
+-- needs: main.loss_interval, main.trace, derive.counted
 SELECT
     t.run_id,
     t.path AS subject,
     count(*) AS count,
     printf(
-        '%d places on %d CPUs, %.3f s in all',
-        count(*), count(DISTINCT g.cpu), sum(g.end_ns - g.start_ns) / 1e9
+        '%s on %s, %.3f s in all',
+        derive.counted(count(*), 'place'),
+        derive.counted(count(DISTINCT g.cpu), 'CPU'),
+        sum(g.end_ns - g.start_ns) / 1e9
     ) AS detail
 FROM main.loss_interval AS g
 JOIN main.trace AS t ON g.trace_id = t.trace_id

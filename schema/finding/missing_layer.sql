@@ -8,7 +8,7 @@
 --     use a tracetools and a middleware that have them.
 -- grain: one row per run and kind
 -- severity: warning
--- needs: main.publication, main.take, main.callback_instance, main.executor_state
+-- needs: main.run, main.publication, main.take, main.callback_instance, main.executor_state
 WITH layer AS (
     SELECT run_id, 'publication' AS kind FROM main.publication
     UNION ALL
@@ -20,17 +20,22 @@ WITH layer AS (
 ),
 counted AS (
     SELECT
-        run_id,
-        sum(CASE WHEN kind = 'publication' THEN 1 ELSE 0 END) AS publications,
-        sum(CASE WHEN kind = 'take' THEN 1 ELSE 0 END) AS takes,
-        sum(CASE WHEN kind = 'callback' THEN 1 ELSE 0 END) AS callbacks,
-        sum(CASE WHEN kind = 'state' THEN 1 ELSE 0 END) AS states
-    FROM layer
-    GROUP BY run_id
+        r.run_id,
+        sum(CASE WHEN l.kind = 'publication' THEN 1 ELSE 0 END) AS publications,
+        sum(CASE WHEN l.kind = 'take' THEN 1 ELSE 0 END) AS takes,
+        sum(CASE WHEN l.kind = 'callback' THEN 1 ELSE 0 END) AS callbacks,
+        sum(CASE WHEN l.kind = 'state' THEN 1 ELSE 0 END) AS states
+    FROM main.run AS r
+    LEFT JOIN layer AS l ON r.run_id = l.run_id
+    GROUP BY r.run_id
 )
-SELECT run_id, 'publications' AS subject, 1::BIGINT AS count,
+SELECT run_id, 'everything' AS subject, 1::BIGINT AS count,
+    'nothing was published or taken and no callback ran, as far as traced: no answers' AS detail
+FROM counted
+WHERE publications + takes + callbacks = 0
+UNION ALL
+SELECT run_id, 'publications', 1,
     'nothing was published as far as traced (rcl_publish, rclcpp_publish, rmw_publish): no flows'
-        AS detail
 FROM counted
 WHERE publications = 0 AND takes + callbacks > 0
 UNION ALL

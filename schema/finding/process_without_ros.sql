@@ -1,7 +1,7 @@
 -- name: finding.process_without_ros
 -- title: A traced process shows nothing of ROS
 -- description: The trace has events of the process, but none of ROS: no node, publisher,
---     subscription or callback. What it does with messages is not known.
+--     subscription, service, client, timer or callback. What it does with messages is not known.
 -- cause: It runs with a tracetools that was built without LTTng, or it is no ROS process at all.
 -- cure: In its environment, ros2 run tracetools status must say that tracing is enabled; build
 --     tracetools with LTTng installed where it does not. Start the process with the events of ROS
@@ -9,7 +9,7 @@
 -- grain: one row per process
 -- severity: warning
 -- needs: main.process, main.host, main.node, main.publisher, main.subscription, main.callback,
---     main.timer
+--     main.timer, main.service, main.client
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
@@ -27,4 +27,8 @@ WHERE p.process_id NOT IN (
     SELECT process_id FROM main.callback
     UNION ALL
     SELECT process_id FROM main.timer
+    UNION ALL
+    SELECT process_id FROM main.service
+    UNION ALL
+    SELECT process_id FROM main.client
 )

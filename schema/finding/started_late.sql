@@ -2,6 +2,7 @@
 -- title: Tracing started after ROS
 -- description: Objects were used whose creation is not in the trace. They are placeholders without
 --     a name or with one deduced from messages, so that topics and nodes are missing in results.
+--     Those of ROS itself do not count: /rosout is published on handles never initialised.
 -- cause: The session was started after the nodes, or the events of initialisation were not enabled
 --     or lost.
 -- cure: Start the session first: ros2 trace, or the Trace action at the head of the launch file; or
@@ -13,9 +14,9 @@
 WITH object AS (
     SELECT process_id, 'nodes' AS kind, is_inferred FROM main.node
     UNION ALL
-    SELECT process_id, 'publishers', is_inferred FROM main.publisher
+    SELECT process_id, 'publishers', is_inferred FROM main.publisher WHERE NOT is_internal
     UNION ALL
-    SELECT process_id, 'subscriptions', is_inferred FROM main.subscription
+    SELECT process_id, 'subscriptions', is_inferred FROM main.subscription WHERE NOT is_internal
     UNION ALL
     SELECT process_id, 'timers', is_inferred FROM main.timer
     UNION ALL

@@ -8,7 +8,7 @@
 --     originals.
 -- grain: one row per trace
 -- severity: warning
--- needs: store.packet, main.trace
+-- needs: store.packet, main.trace, derive.counted
 WITH stream AS (
     SELECT
         run_id, trace_id, cpu_id, stream_class_id, stream_instance_id,
@@ -26,8 +26,8 @@ SELECT
     t.path AS subject,
     count(*) AS count,
     printf(
-        '%d streams (CPU %s) end up to %.3f s early',
-        count(*),
+        '%s (CPU %s) end up to %.3f s early',
+        derive.counted(count(*), 'stream'),
         string_agg(DISTINCT coalesce(s.cpu_id::VARCHAR, '?'), ', '),
         max(e.end_ns - s.end_ns) / 1e9
     ) AS detail

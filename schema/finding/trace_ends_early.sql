@@ -8,7 +8,8 @@
 --     by themselves.
 -- grain: one row per topic
 -- severity: warning
--- needs: main.stat_orphan, main.subscription, main.publisher, main.process, main.host, main.take
+-- needs: main.stat_orphan, main.subscription, main.publisher, main.process, main.host, main.take,
+--     derive.counted
 WITH late AS (
     SELECT o.run_id, s.topic_name, count(*) AS number, max(t.taken_ns) AS last_ns
     FROM main.stat_orphan AS o
@@ -33,8 +34,8 @@ SELECT
     coalesce(l.topic_name, 'unknown topic') AS subject,
     l.number AS count,
     printf(
-        '%d messages until %.3f s after the last event of %s',
-        l.number, (l.last_ns - s.last_seen_ns) / 1e9, coalesce(s.label, 'every process')
+        '%s until %.3f s after the last event of %s',
+        derive.counted(l.number, 'message'), (l.last_ns - s.last_seen_ns) / 1e9, coalesce(s.label, 'every process')
     ) AS detail
 FROM late AS l
 LEFT JOIN sender AS s ON l.run_id = s.run_id AND l.topic_name = s.topic_name

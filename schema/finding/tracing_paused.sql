@@ -7,14 +7,14 @@
 --     without stopping.
 -- grain: one row per trace
 -- severity: warning
--- needs: main.loss_interval, main.trace
+-- needs: main.loss_interval, main.trace, derive.counted
 SELECT
     t.run_id,
     t.path AS subject,
     count(*) AS count,
     printf(
-        '%d pauses, %.3f s in all, the longest %.3f s',
-        count(*), sum(g.end_ns - g.start_ns) / 1e9, max(g.end_ns - g.start_ns) / 1e9
+        '%s, %.3f s in all, the longest %.3f s',
+        derive.counted(count(*), 'pause'), sum(g.end_ns - g.start_ns) / 1e9, max(g.end_ns - g.start_ns) / 1e9
     ) AS detail
 FROM main.loss_interval AS g
 JOIN main.trace AS t ON g.trace_id = t.trace_id

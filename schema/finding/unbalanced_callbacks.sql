@@ -8,7 +8,7 @@
 --     exceptions.
 -- grain: one row per process
 -- severity: warning
--- needs: main.callback_instance, main.process, main.host
+-- needs: main.callback_instance, main.process, main.host, derive.counted
 WITH last_start AS (
     SELECT thread_id, max(start_ns) AS start_ns
     FROM main.callback_instance
@@ -18,7 +18,8 @@ SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
     count(*) AS count,
-    printf('%d runs of %d callbacks', count(*), count(DISTINCT i.callback_id)) AS detail
+    derive.counted(count(*), 'run') || ' of '
+    || derive.counted(count(DISTINCT i.callback_id), 'callback') AS detail
 FROM main.callback_instance AS i
 JOIN last_start AS l ON i.thread_id = l.thread_id
 JOIN main.process AS p ON i.process_id = p.process_id

@@ -44,7 +44,7 @@ initialised AS (
 inferred AS (
     SELECT 'node' AS kind, process_id FROM staging.node WHERE is_inferred
     UNION ALL
-    SELECT 'publisher', process_id FROM staging.publisher WHERE is_inferred
+    SELECT 'publisher', process_id FROM staging.publisher WHERE is_inferred AND NOT is_internal
     UNION ALL
     SELECT 'subscription', process_id FROM staging.subscription WHERE is_inferred
     UNION ALL
@@ -112,6 +112,17 @@ WHERE NOT e.is_known
 GROUP BY e.trace_index, s.domain
 UNION ALL
 SELECT
+    t.trace_id,
+    'empty_trace',
+    'warning',
+    1,
+    'not one event was recorded: ' || t.path
+FROM staging.trace AS t
+-- A chunk of a recording may well be empty, and of a copy nothing is read.
+WHERE t.event_count = 0
+    AND coalesce(t.uuid NOT IN (SELECT uuid FROM staging.trace WHERE event_count > 0), true)
+UNION ALL
+SELECT
     trace_id,
     CASE kind WHEN 'loss' THEN 'discarded_events' WHEN 'packets' THEN 'lost_packets'
         ELSE 'pause' END,
@@ -119,9 +130,9 @@ SELECT
     CASE kind WHEN 'loss' THEN coalesce(sum(event_count), count(*)) ELSE count(*) END::BIGINT,
     CASE kind
         WHEN 'loss' THEN printf(
-            'events that the tracer discarded in %d places, %.3f s in all: use more or larger '
+            'events that the tracer discarded in %d place%s, %.3f s in all: use more or larger '
             || 'sub-buffers',
-            count(*), sum(end_ns - start_ns) / 1e9
+            count(*), CASE WHEN count(*) = 1 THEN '' ELSE 's' END, sum(end_ns - start_ns) / 1e9
         )
         WHEN 'packets' THEN 'places where whole packets were overwritten or are missing'
         ELSE printf(
@@ -129,6 +140,10 @@ SELECT
         )
     END
 FROM staging.loss_interval
+-- What a packet lacks that was cut off is told as a damage.
+WHERE kind <> 'loss'
+    OR event_count IS NOT NULL
+    OR trace_id NOT IN (SELECT trace_index + 1 FROM staging.damage)
 GROUP BY trace_id, kind
 UNION ALL
 SELECT

@@ -3,7 +3,7 @@
 -- grain: one row per ingest of traces that belong together
 -- column: run_id BIGINT  Identity of the run
 -- column: name VARCHAR  Name given by the user, or the name of the first trace directory
--- column: created_at TIMESTAMP  When the run was ingested, UTC
+-- column: created_at VARCHAR  When the run was ingested: ISO 8601, UTC
 -- column: msgflow_version VARCHAR  Version of msgflow that ingested the run
 -- column: derivation_hash VARCHAR  SHA-256 of the SQL that derived the links
 -- column: start_ns BIGINT [epoch ns]  First event of any trace but kernel traces
@@ -23,7 +23,7 @@ WITH extent AS (
 SELECT
     self.run_id,
     self.name,
-    self.created_at,
+    strftime(self.created_at, '%Y-%m-%dT%H:%M:%S.%fZ') AS created_at,
     self.msgflow_version,
     self.derivation_hash,
     self.start_ns + coalesce(e.start_shift_ns, 0) AS start_ns,

@@ -35,7 +35,7 @@ SELECT
     'unmatched_take' AS name,
     'warning' AS severity,
     sum(number)::BIGINT AS count,
-    'messages received whose publication is not in the traces'
+    'messages received whose publication is not known'
     || CASE WHEN has_no_stamp THEN ', and that carry no stamp: ' ELSE ': ' END
     || string_agg(printf('%s (%d)', topic_name, number), ', ' ORDER BY topic_name) AS detail
 FROM by_topic

@@ -16,13 +16,17 @@ Msgflow = Callable[..., Result]
 
 @pytest.fixture
 def database(fresh_database: Path) -> Path:
-    """A run with a node, to which tests add what is wrong."""
+    """A run with something of every kind, to which tests add what is wrong."""
     from golden import BASE
 
     with duckdb.connect(str(fresh_database)) as connection:
         for table, row in BASE.items():
             insert(connection, table, list(row), [list(row.values())])
         insert(connection, "node", ["node_id", "full_name"], [["1", "/node"]])
+        insert(connection, "publication", ["publication_id"], [["1"]])
+        insert(connection, "take", ["take_id", "method"], [["1", "rmw"]])
+        insert(connection, "callback_instance", ["callback_instance_id", "end_ns"], [["1", "9"]])
+        insert(connection, "executor_state", ["state"], [["wait"]])
     return fresh_database
 
 
@@ -59,7 +63,7 @@ def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> 
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
     assert lines[0] == "1. warning: Tracing was paused (tracing_paused)"
-    assert lines[1] == "   trace — 1 pauses, 1.000 s in all, the longest 1.000 s"
+    assert lines[1] == "   trace — 1 pause, 1.000 s in all, the longest 1.000 s"
     assert [line.strip().partition(":")[0] for line in lines[2:] if line[3:4] != " "] == [
         "means",
         "cause",
@@ -102,3 +106,13 @@ def test_many_places_are_cut_and_it_says_so(msgflow: Msgflow, database: Path) ->
 
 def test_a_run_that_does_not_exist(msgflow: Msgflow, database: Path) -> None:
     assert msgflow("check", "--run", "nothing", "--db", database).exit_code == 2
+
+
+def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) -> None:
+    add(database, "run", {"run_id": "2", "name": "other"})
+    add(database, "loss_interval", pause())
+    alone = msgflow("check", "--run", "case", "--db", database).stdout
+    assert "   trace — 1 pause, " in alone
+    every = msgflow("check", "--run", "all", "--db", database).stdout
+    assert "   run case (1): trace — 1 pause, " in every
+    assert "   run other (2): everything — nothing was published" in every

@@ -57,7 +57,7 @@ def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
     assert late < whole
     refused = msgflow("query", "e2e-latency", "--case", "middle")
     assert refused.exit_code == 2
-    assert refused.stderr.startswith("error: case has no such value — middle\n\nhint: choose ")
+    assert refused.stderr.startswith("error: --case has no such value — middle\n\nhint: choose ")
 
 
 def test_quiet_says_nothing_and_a_run_has_the_name_given(msgflow: Msgflow, trace: Path) -> None:

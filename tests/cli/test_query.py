@@ -117,10 +117,15 @@ def test_durations_and_times_are_for_people_in_tables_only(
         (("info-runs", "--limit", "3"), 2, "no such option: --limit", "info-runs --help"),
         (("info-runs", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
         (("info-runs", "--start", "1s"), 2, "no time window — info-runs", "leave out --start"),
-        (("info-runs", "--format", "xml"), 2, "'xml' is not one of", "info-runs --help"),
+        (
+            ("info-runs", "--format", "xml"),
+            2,
+            "'--format': 'xml' is not one of",
+            "info-runs --help",
+        ),
         (("info-runs", "--list"), 2, "--list takes no name of a query", "info-runs --help"),
         (("--list", "info-runs"), 2, "--list takes no name of a query", "info-runs --help"),
-        (("info-runs", "-o", "no/dir/x.csv"), 2, "no such file or directory", ""),
+        (("info-runs", "-o", "no/dir/x.csv"), 2, "no such file or directory", "can be written"),
     ],
 )
 def test_mistakes_have_a_message_and_a_code(

@@ -16,6 +16,14 @@ from msgflow.db.finding import SEVERITIES, find
 Tables = dict[str, str]
 PUBLISHED = "publication_id,publisher_id,process_id,start_ns,end_ns,source_timestamp_ns\n"
 TAKEN = "take_id,subscription_id,process_id,taken_ns,source_timestamp_ns,method\n"
+# Something of every kind, so that nothing is missing altogether.
+SOUND: Tables = {
+    "node": "node_id\n1\n",
+    "publication": "publication_id\n1\n",
+    "take": "take_id,method\n1,rmw\n",
+    "callback_instance": "callback_instance_id,end_ns\n1,9\n",
+    "executor_state": "state\nwait\n",
+}
 TWO_HOSTS: Tables = {
     "clock": "clock_id,method\n1,none\n2,none\n",
     "host": "host_id,clock_id,hostname\n1,1,alpha\n2,2,beta\n",
@@ -44,7 +52,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "lost_packets": (
         {"loss_interval": "kind,cpu,start_ns,end_ns\npackets,0,0,2000000000\nloss,0,5,6\n"},
-        [("trace", 1, "1 places on 1 CPUs, 2.000 s in all")],
+        [("trace", 1, "1 place on 1 CPU, 2.000 s in all")],
     ),
     "tracing_paused": (
         {
@@ -64,6 +72,17 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         {"diagnostic": "name,severity,count,detail\ncheck_failed,error,3,two of one\n"},
         [("database", 3, "two of one")],
     ),
+    "empty_trace": (
+        {
+            "diagnostic": "trace_id,name,severity,count,detail\n"
+            "1,empty_trace,warning,1,not one event\n"
+        },
+        [("trace", 1, "not one event was recorded")],
+    ),
+    "ignored_events": (
+        {"diagnostic": "name,severity,count,detail\nignored_events,info,9,dds:* (9)\n"},
+        [("case", 9, "dds:* (9)")],
+    ),
     "overlapping_traces": (
         {
             "diagnostic": "trace_id,name,severity,count,detail\n"
@@ -73,7 +92,9 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "started_late": (
         {
-            "publisher": "publisher_id,is_inferred\n1,true\n2,false\n",
+            # the third is one that ROS makes for /rosout
+            "publisher": "publisher_id,is_inferred,is_internal\n"
+            "1,true,false\n2,false,false\n3,true,true\n",
             "callback": "callback_id,kind\n1,unknown\n",
             "node": "node_id,is_inferred\n1,false\n",
         },
@@ -95,8 +116,10 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     "process_without_ros": (
         {
             "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n"
-            "1,1,ros,0,1\n2,2,bridge,0,1500000000\n",
+            "1,1,ros,0,1\n2,2,bridge,0,1500000000\n3,3,client,0,1\n4,4,server,0,1\n",
             "node": "process_id\n1\n",
+            "client": "process_id\n3\n",
+            "service": "process_id\n4\n",
         },
         [("bridge 2 on host", 1, "seen for 1.500 s")],
     ),
@@ -109,6 +132,16 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         },
         [("/a", 2, "2 messages")],
     ),
+    "message_without_stamp": (
+        {
+            "subscription": "subscription_id,topic_name,is_internal\n1,/a,false\n2,/rosout,true\n",
+            "orphan_take": "take_id,subscription_id,reason\n1,1,no_stamp\n2,2,no_stamp\n"
+            "3,1,no_stamp\n4,1,ambiguous\n",
+            # the third was kept by a ring buffer for a subscription that came late
+            "take": "take_id,method\n1,callback_only\n2,rmw\n3,ring_buffer\n4,rmw\n",
+        },
+        [("/a", 1, "1 message")],
+    ),
     "trace_ends_early": (
         {
             "process": "process_id,pid,name,last_seen_ns\n1,1,talker,1000000000\n",
@@ -117,14 +150,14 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "orphan_take": "take_id,subscription_id,reason\n1,1,publisher_trace_ends\n",
             "take": "take_id,taken_ns,method\n1,1250000000,rmw\n",
         },
-        [("/a", 1, "1 messages until 0.250 s after the last event of talker 1 on host")],
+        [("/a", 1, "1 message until 0.250 s after the last event of talker 1 on host")],
     ),
     "stream_ends_early": (
         {
             "packet": "cpu_id,stream_instance_id,begin_ns,end_ns\n"
             "0,0,0,10000000000\n1,1,0,4000000000\n2,2,0,9900000000\n"
         },
-        [("trace", 1, "1 streams (CPU 1) end up to 6.000 s early")],
+        [("trace", 1, "1 stream (CPU 1) end up to 6.000 s early")],
     ),
     "unbalanced_callbacks": (
         {
@@ -132,7 +165,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "callback_instance": "callback_instance_id,start_ns,end_ns,is_loss_affected\n"
             "1,10,,false\n2,20,,true\n3,30,35,false\n4,40,,false\n"
         },
-        [("process 1 on host", 1, "1 runs of 1 callbacks")],
+        [("process 1 on host", 1, "1 run of 1 callback")],
     ),
     "clocks_apart": (
         {
@@ -141,7 +174,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "take": TAKEN + "1,1,2,4000000,7,rmw\n2,1,2,7000,8,rmw\n",
             "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
         },
-        [("alpha → beta", 1, "1 messages received up to 2.000 ms before they were published")],
+        [("alpha → beta", 1, "1 message received up to 2.000 ms before publication")],
     ),
     "clock_jumps": (
         {
@@ -149,7 +182,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "take": TAKEN + "1,1,1,2000,1000,rmw\n2,1,1,12000000500,32000000000,rmw\n",
             "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
         },
-        [("host", 1, "1 jumps, the largest 20.000 s")],
+        [("host", 1, "1 jump, the largest 20.000 s")],
     ),
     "missing_layer": (
         {
@@ -229,14 +262,40 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_pat
     assert find(database, [1]) == []
 
 
+@pytest.mark.parametrize(("count", "name"), [("", "damaged_trace"), ("7", "discarded_events")])
+def test_a_packet_that_was_cut_off_is_no_full_buffer(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path, count: str, name: str
+) -> None:
+    fill(
+        database,
+        tmp_path,
+        {
+            **SOUND,
+            "loss_interval": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
+            "packet": "event_count\n100\n",
+            "diagnostic": "trace_id,name,severity,count,detail\n"
+            "1,damaged_trace,data_loss,1,cut off\n",
+        },
+    )
+    assert {f.name for f in find(database, [1])} == {"damaged_trace", name}
+
+
+def test_a_run_in_which_nothing_happened(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path
+) -> None:
+    """Not even what one part would call for of another."""
+    fill(database, tmp_path, {"node": "node_id\n1\n"})
+    assert [(f.name, f.subject) for f in find(database, [1])] == [("missing_layer", "everything")]
+
+
 def test_errors_come_first(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
     fill(
         database,
         tmp_path,
         {
+            **SOUND,
             "loss_interval": "kind,cpu,start_ns,end_ns,event_count\npause,,0,9,\nloss,0,20,29,5\n",
             "packet": "event_count\n100\n",
-            "node": "node_id\n1\n",
         },
     )
     assert [f.severity for f in find(database, [1])] == ["error", "warning"]

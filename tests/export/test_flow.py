@@ -51,6 +51,21 @@ def test_a_chain_goes_straight_down_and_what_was_asked_for_is_marked(robot: Data
     ]
 
 
+@pytest.mark.parametrize("reason", ["receiver_gap", "unknown"])
+def test_what_may_have_been_taken_is_not_called_untaken(
+    reason: str, empty_database: Path, tmp_path: Path
+) -> None:
+    database = database_of("forward_with_internal", empty_database, tmp_path)
+    with duckdb.connect(str(database.path)) as connection:
+        connection.execute(
+            f"UPDATE store.undelivered SET reason = '{reason}' WHERE reason = 'lost_in_transport'"
+        )
+    with database:
+        tree = str(database.flow("/detections"))
+    assert f"/recorder  Subscription(/tracks)  take not known: {reason}\n" in tree
+    assert "/camera  Subscription(/tracks)  not taken: before_subscription" in tree
+
+
 def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> None:
     assert str(robot.flow("/image", direction="forward")).splitlines() == [
         "publication 1, /image; times count from 1970-01-01T00:00:00.000000110Z",

@@ -56,6 +56,29 @@ def test_events_may_be_ignored(
     assert "my_app:started (1), ros2:from_the_future (2)" in unknown.detail
 
 
+def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
+    """And what is ignored in vain, as a mistyped name is."""
+    report = ingest(
+        [make_trace(FIELDS, EVENTS)],
+        new_database,
+        ignore=("dds:*", "dds:write", "dsd:*", "ros2:rcl_take"),
+    )
+    told = {d.name: (d.severity, d.count, d.detail) for d in report.diagnostics}
+    assert told["ignored_events"] == (
+        "info",
+        2,
+        "events that were left out on request: dds:* (2), dds:write (1)",
+    )
+    assert told["ignored_nothing"] == (
+        "warning",
+        2,
+        "patterns of events to leave out that match none: dsd:*, ros2:rcl_take",
+    )
+    assert rows(new_database, "SELECT count(*) FROM diagnostic WHERE name LIKE 'ignored_%'") == [
+        (2,)
+    ]
+
+
 def test_staging_can_be_kept(trace: Path, new_database: Path, tmp_path: Path) -> None:
     """Events as read and the objects of the model, as Parquet; without them nothing is left."""
     kept = tmp_path / "kept" / "staging"

@@ -208,6 +208,7 @@ def test_one_of_several_rosout_of_a_process_is_not_guessed(
         "SELECT topic_name, is_internal, is_inferred FROM publication "
         "JOIN publisher USING (publisher_id)"
     ) == [("/rosout", True, True)]
+    assert model.rows("SELECT * FROM diagnostic WHERE name = 'inferred_publisher'") == []
 
 
 def test_a_publisher_with_another_rmw_handle_is_not_rosout(

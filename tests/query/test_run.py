@@ -21,12 +21,12 @@ SELECT 1
 QUERY = """\
 -- name: example
 -- description: x
--- param: topic VARCHAR = NULL  Only this topic
+-- param: channel VARCHAR = NULL  Only this one
 SELECT topic, start_ns, is_internal
 FROM message
 WHERE list_contains($runs, run_id)
     AND start_ns BETWEEN $start_ns AND $end_ns
-    AND ($topic IS NULL OR topic = $topic)
+    AND ($channel IS NULL OR topic = $channel)
 ORDER BY start_ns
 """
 
@@ -66,7 +66,7 @@ def test_runs_window_and_parameters_select(connection: duckdb.DuckDBPyConnection
     assert starts(connection, run="all") == [100, 200, 400, 1_000_000_000, 2_500_000_000]
     assert starts(connection, run="first", start=150, end="300ns") == [200, 400]
     assert starts(connection, skip_first=1.0) == [2_500_000_000]
-    assert starts(connection, run="first", parameters={"topic": "/b"}) == [200]
+    assert starts(connection, run="first", parameters={"channel": "/b"}) == [200]
 
 
 def test_internal_rows_are_hidden_and_counted(connection: duckdb.DuckDBPyConnection) -> None:
@@ -177,6 +177,15 @@ def test_takes_that_no_run_has_are_refused(connection: duckdb.DuckDBPyConnection
         assert "msgflow query flows" in (raised.value.hint or "")
 
 
+def test_the_parameter_topic_is_one(with_topics: duckdb.DuckDBPyConnection) -> None:
+    only = header(
+        "-- name: example\n-- description: x\n-- param: topic VARCHAR = NULL  x\nSELECT $topic\n"
+    )
+    assert len(run_query(with_topics, only, {"topic": "/lidar"})) == 1
+    with pytest.raises(UsageError, match="no such topic in the run — /nope"):
+        run_query(with_topics, only, {"topic": "/nope"})
+
+
 def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -> None:
     with_topics.execute("DELETE FROM publisher")
     with pytest.raises(UsageError) as raised:
@@ -216,7 +225,7 @@ def test_clocks_that_differ_are_named(
     result = run_query(connection, header(query), {}, run=run, internal=True)
     assert result.notes == [f"{note}{rest}" for note in notes]
     assert run_query(connection, header(QUERY), {}, run=run, internal=True).notes == []
-    late = run_query(connection, header(query), {"topic": "/none"}, run=run)
+    late = run_query(connection, header(query), {"channel": "/none"}, run=run)
     assert late.notes == []
 
 
@@ -227,8 +236,9 @@ def test_the_minimum_itself_will_do(given: Value) -> None:
     )
     assert bind(least, {"depth": given}) == {"depth": None if given is None else 1}
     for less in (0, "-1"):
-        with pytest.raises(UsageError, match=f"depth is at least 1 — {less}"):
+        with pytest.raises(UsageError, match=f"--depth is at least 1 — {less}") as raised:
             bind(least, {"depth": less})
+        assert raised.value.hint == "msgflow query example --depth 1"
 
 
 @pytest.mark.parametrize(
@@ -249,8 +259,9 @@ def test_binding(given: dict[str, Value], bound: dict[str, Value]) -> None:
     [
         ({}, "example needs a value for a parameter — depth", "--depth BIGINT"),
         ({"deep": 1}, "has no such parameter — deep", "its parameters are from, case, depth"),
-        ({"depth": "deep"}, "depth takes a BIGINT — deep", ""),
-        ({"depth": 1, "case": "middle"}, "case has no such value — middle", "first or last"),
+        ({"depth": "deep"}, "--depth takes a whole number — deep", "msgflow query example --help"),
+        ({"depth": 1, "case": "middle"}, "--case has no such value — middle", "first or last"),
+        ({"depth": 1, "case": "firts"}, "--case has no such value — firts", "did you mean first"),
     ],
 )
 def test_parameters_that_do_not_fit(given: dict[str, Value], message: str, hint: str) -> None:

@@ -91,9 +91,10 @@ def test_reasons_add_up(recordings: Callable[[str], Ingested], name: str) -> Non
     assert results["check.vocabulary_is_closed"].row_count == 0
 
 
-def test_reasons_of_simulated_systems_add_up(simulated: Ingested) -> None:
-    results = {result.name: result for result in run_checks(simulated.connection)}
-    assert results["check.delivery_is_complete"].row_count == 0
+def test_simulated_systems_pass_every_audit(simulated: Ingested) -> None:
+    """That reasons add up is one; none complains about what a sound system does."""
+    results = run_checks(simulated.connection)
+    assert [result.name for result in results if result.row_count] == []
 
 
 def test_the_trace_of_trace_compass(recordings: Callable[[str], Ingested]) -> None:
