@@ -182,8 +182,11 @@ exposed AS MATERIALIZED (
     ASOF JOIN gap AS g ON f.exposed_trace_id = g.trace_id AND f.start_ns > g.start_ns
     WHERE g.covered_until_ns >= f.input_start_ns
 ),
+-- What may have been lost on other CPUs is marked.
 break AS (
-    SELECT thread_id, resumed_event_id FROM store.thread_break WHERE run_id = only_run
+    SELECT thread_id, resumed_event_id
+    FROM store.thread_break
+    WHERE run_id = only_run AND is_elsewhere IS NOT TRUE
 ),
 crossing AS (
     SELECT e.annotation_id, e.publication_id, e.callback_instance_id
