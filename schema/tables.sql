@@ -417,7 +417,8 @@ CREATE TABLE store.thread_break (
     run_id           BIGINT NOT NULL,            -- Run that the row belongs to -> run.run_id
     thread_id        BIGINT NOT NULL,            -- Thread whose events may be missing -> thread.thread_id
     resumed_ns       BIGINT NOT NULL,            -- First event of the thread behind the gap [epoch ns]
-    resumed_event_id BIGINT                      -- First event of the thread behind the gap [event order]
+    resumed_event_id BIGINT,                     -- First event of the thread behind the gap [event order]
+    is_elsewhere     BOOLEAN                     -- Only other CPUs lost events, which it may have visited; NULL: no
 );
 
 -- One row per stretch of time in which stamps run along a clock of the traces.

@@ -636,6 +636,11 @@ thread_break = _table(
     _thread("Thread whose events may be missing"),
     _time("resumed_ns", "First event of the thread behind the gap", required=True),
     _order("resumed_event_id", "First event of the thread behind the gap"),
+    _column(
+        "is_elsewhere",
+        Boolean,
+        "Only other CPUs lost events, which it may have visited; NULL: no",
+    ),
 )
 
 # --- links ---------------------------------------------------------------------------------------

@@ -26,7 +26,8 @@ _PACKET_TABLE = """
 CREATE TABLE raw.packet (
     trace_index INTEGER, stream_index INTEGER, stream_class_id BIGINT, stream_instance_id BIGINT,
     cpu_id INTEGER, position BIGINT, begin_ns BIGINT, end_ns BIGINT, last_event_ns BIGINT,
-    event_count BIGINT, discarded_event_count BIGINT, lost_packet_count BIGINT
+    event_count BIGINT, discarded_event_count BIGINT, lost_packet_count BIGINT,
+    is_numbered BOOLEAN
 )
 """
 

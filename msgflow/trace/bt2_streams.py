@@ -94,6 +94,7 @@ class Stream:
             self.event_count,
             self.discarded_event_count,
             self.lost_packet_count,
+            False,
         )
         self.discarded_event_count = 0
         self.lost_packet_count = 0

@@ -42,6 +42,7 @@ PACKET_SCHEMA: Final = pa.schema(
         pa.field("event_count", pa.int64(), nullable=False),
         pa.field("discarded_event_count", pa.int64()),
         pa.field("lost_packet_count", pa.int64()),
+        pa.field("is_numbered", pa.bool_(), nullable=False),
     ]
 )
 """Columns of the batches of packets, one row per packet.
@@ -49,5 +50,7 @@ PACKET_SCHEMA: Final = pa.schema(
 `stream_index` is dense within the trace, in the order (stream class, stream instance); `position`
 is the place of the packet in its stream. `discarded_event_count` events were lost after
 `last_event_ns` and before `end_ns`; `lost_packet_count` packets are missing right before this
-one. Both are NULL where something was lost but the trace does not say how much.
+one. Both are NULL where something was lost but the trace does not say how much. Where
+`is_numbered`, that was told by numbers that go on through the directories of a recording; else it is
+not known how many are missing before the first packet of a directory.
 """

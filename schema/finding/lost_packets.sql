@@ -1,11 +1,13 @@
 -- name: finding.lost_packets
 -- title: Whole packets are missing
--- description: The tracer counted packets that are not in the trace. What happened in them is
---     missing, and nothing is paired across the places.
--- cause: The buffers were overwritten (a snapshot, or a channel in overwrite mode), or packets were
---     lost on the way to the relay daemon.
+-- description: The numbers of the packets skip some, or the stream of a CPU ends before events of
+--     others. What happened in them is missing, and nothing is paired across the places.
+-- cause: The buffers were overwritten (a snapshot, or a channel in overwrite mode), packets were
+--     lost on the way to the relay daemon, a chunk of a rotated recording was not given to the
+--     ingest, or files are cut off.
 -- cure: Record into a trace on a disk (not a snapshot) with a channel in discard mode: lttng
---     enable-channel --userspace --discard CHANNEL; or take snapshots of larger buffers.
+--     enable-channel --userspace --discard CHANNEL; or take snapshots of larger buffers. Ingest all
+--     chunks of a recording together.
 -- grain: one row per trace
 -- severity: error
 -- needs: main.loss_interval, main.trace, derive.counted

@@ -9,7 +9,8 @@
 -- param: only_run BIGINT  Run to look at
 -- param: wanted_kind VARCHAR  Kind of the annotations
 -- needs: derive.annotated_publication, derive.annotated_run, store.annotation_input,
---     store.callback_instance, store.thread_break, store.loss_interval
+--     store.callback_instance, store.thread_break, derive.exposed_trace,
+--     derive.recording_gap
 CREATE OR REPLACE MACRO derive.annotated_input(only_run, wanted_kind) AS TABLE
 WITH nesting AS (
     SELECT DISTINCT parent_id
@@ -159,31 +160,29 @@ found AS MATERIALIZED (
         ON c.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
 ),
 -- Only traces with gaps need a closer look.
-gap AS (
-    SELECT
-        trace_id, start_ns,
-        max(end_ns) OVER (
-            PARTITION BY trace_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
-        ) AS covered_until_ns
-    FROM store.loss_interval
-    WHERE run_id = only_run
-),
 exposed AS MATERIALIZED (
     SELECT
         f.annotation_id, f.publication_id, f.callback_instance_id, f.thread_id,
         f.input_thread_id, f.start_event_id, f.input_start_event_id,
         g.start_ns >= f.input_start_ns AS begins_between
     FROM (
-        SELECT *, unnest(list_distinct([trace_id, input_trace_id])) AS exposed_trace_id
-        FROM found
-        WHERE trace_id IN (SELECT trace_id FROM store.loss_interval)
-            OR input_trace_id IN (SELECT trace_id FROM store.loss_interval)
+        SELECT n.*, x.recording_id
+        FROM found AS n
+        JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
+        UNION
+        SELECT n.*, x.recording_id
+        FROM found AS n
+        JOIN derive.exposed_trace AS x ON n.input_trace_id = x.trace_id
     ) AS f
-    ASOF JOIN gap AS g ON f.exposed_trace_id = g.trace_id AND f.start_ns > g.start_ns
+    ASOF JOIN derive.recording_gap AS g
+        ON f.recording_id = g.recording_id AND f.start_ns > g.start_ns
     WHERE g.covered_until_ns >= f.input_start_ns
 ),
+-- What may have been lost on other CPUs is marked.
 break AS (
-    SELECT thread_id, resumed_event_id FROM store.thread_break WHERE run_id = only_run
+    SELECT thread_id, resumed_event_id
+    FROM store.thread_break
+    WHERE run_id = only_run AND is_elsewhere IS NOT TRUE
 ),
 crossing AS (
     SELECT e.annotation_id, e.publication_id, e.callback_instance_id

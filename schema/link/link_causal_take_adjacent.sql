@@ -7,7 +7,8 @@
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, store.publication, store.take, store.request, store.response,
---     store.callback_instance, store.executor_state, store.loss_interval
+--     store.callback_instance, store.executor_state, derive.exposed_trace,
+--     derive.recording_gap
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH handled AS (
     SELECT take_id
@@ -56,9 +57,14 @@ adjacent AS (
 ),
 behind_gap AS (
     SELECT a.publication_id
-    FROM adjacent AS a
-    ASOF JOIN store.loss_interval AS l ON a.trace_id = l.trace_id AND a.start_ns > l.start_ns
-    WHERE l.start_ns >= a.taken_ns
+    FROM (
+        SELECT n.publication_id, n.start_ns, n.taken_ns, x.recording_id
+        FROM adjacent AS n
+        JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
+    ) AS a
+    ASOF JOIN derive.recording_gap AS g
+        ON a.recording_id = g.recording_id AND a.start_ns > g.start_ns
+    WHERE g.start_ns >= a.taken_ns OR g.covered_until_ns > a.taken_ns
 ),
 -- Requests and responses that the thread took; of them the times are stored, not the events.
 called AS (

@@ -9,8 +9,9 @@
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_transport_exact, derive.link_transport_nearest,
---     derive.link_transport_ring_buffer, derive.trace_gap, store.publication, store.publisher,
---     store.take, store.subscription, store.node, store.process, store.host
+--     derive.link_transport_ring_buffer, derive.recording_gap, derive.exposed_trace,
+--     store.publication, store.publisher, store.take, store.subscription, store.node,
+--     store.process, store.host
 CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
 WITH link AS (
     SELECT
@@ -50,18 +51,24 @@ guess AS (
 ),
 exposed AS (
     SELECT u.run_id, u.take_id
-    FROM guess AS u
-    ASOF JOIN derive.trace_gap AS g
-        ON u.run_id = g.run_id
-        AND u.sender_trace_id = g.trace_id
+    FROM (
+        SELECT q.*, x.recording_id
+        FROM guess AS q
+        JOIN derive.exposed_trace AS x ON q.sender_trace_id = x.trace_id
+    ) AS u
+    ASOF JOIN derive.recording_gap AS g
+        ON u.recording_id = g.recording_id
         AND u.sent_until_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.sent_ns
     UNION
     SELECT u.run_id, u.take_id
-    FROM guess AS u
-    ASOF JOIN derive.trace_gap AS g
-        ON u.run_id = g.run_id
-        AND u.receiver_trace_id = g.trace_id
+    FROM (
+        SELECT q.*, x.recording_id
+        FROM guess AS q
+        JOIN derive.exposed_trace AS x ON q.receiver_trace_id = x.trace_id
+    ) AS u
+    ASOF JOIN derive.recording_gap AS g
+        ON u.recording_id = g.recording_id
         AND u.taken_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.received_from_ns
 )

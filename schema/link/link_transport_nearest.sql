@@ -5,7 +5,7 @@
 -- grain: one row per take whose publication is known by time
 -- param: only_run BIGINT  Run to look at
 -- needs: store.nearest_message, store.take, store.subscription, store.publication,
---     store.loss_interval
+--     derive.exposed_trace, derive.recording_gap
 CREATE OR REPLACE MACRO derive.link_transport_nearest(only_run) AS TABLE
 WITH received AS (
     SELECT
@@ -31,10 +31,14 @@ sent AS (
 ),
 affected AS (
     SELECT s.take_id
-    FROM sent AS s
-    ASOF JOIN store.loss_interval AS l
-        ON s.trace_id = l.trace_id AND s.until_ns >= l.start_ns
-    WHERE l.end_ns >= s.start_ns
+    FROM (
+        SELECT e.take_id, e.start_ns, e.until_ns, x.recording_id
+        FROM sent AS e
+        JOIN derive.exposed_trace AS x ON e.trace_id = x.trace_id
+    ) AS s
+    ASOF JOIN derive.recording_gap AS g
+        ON s.recording_id = g.recording_id AND s.until_ns >= g.start_ns
+    WHERE g.covered_until_ns >= s.start_ns
 )
 SELECT
     s.run_id,

@@ -5,7 +5,8 @@
 --     trace may hide that it was used again.
 -- grain: one row per dequeue whose publication is known
 -- param: only_run BIGINT  Run to look at
--- needs: store.ring_buffer_event, store.loss_interval, store.publication, store.take
+-- needs: store.ring_buffer_event, derive.exposed_trace, derive.recording_gap, store.publication,
+--     store.take
 CREATE OR REPLACE MACRO derive.link_transport_ring_buffer(only_run) AS TABLE
 WITH slot_use AS (
     SELECT
@@ -13,6 +14,7 @@ WITH slot_use AS (
         lag(kind) OVER in_slot AS previous_kind,
         lag(event_id) OVER in_slot AS previous_event_id,
         lag(at_ns) OVER in_slot AS previous_ns,
+        lag(trace_id) OVER in_slot AS previous_trace_id,
         lag(publication_id) OVER in_slot AS publication_id
     FROM store.ring_buffer_event
     WHERE run_id = only_run AND kind <> 'clear'
@@ -32,11 +34,22 @@ cleared AS (
         AND s.event_id > c.event_id
     WHERE c.event_id > s.previous_event_id
 ),
-behind_gap AS (
-    SELECT s.run_id, s.take_id
+exposed AS (
+    SELECT s.take_id, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
-    ASOF JOIN store.loss_interval AS l ON s.trace_id = l.trace_id AND s.at_ns > l.start_ns
-    WHERE l.start_ns >= s.previous_ns
+    JOIN derive.exposed_trace AS x ON s.trace_id = x.trace_id
+    UNION ALL
+    SELECT s.take_id, s.at_ns, s.previous_ns, x.recording_id
+    FROM slot_use AS s
+    JOIN derive.exposed_trace AS x ON s.previous_trace_id = x.trace_id
+    WHERE s.previous_trace_id <> s.trace_id
+),
+behind_gap AS (
+    SELECT e.take_id
+    FROM exposed AS e
+    ASOF JOIN derive.recording_gap AS g
+        ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
+    WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 )
 SELECT
     s.run_id,

@@ -4,24 +4,26 @@
 --     have lost a part.
 -- grain: one row per such event and side
 -- needs: staging.callback_gap, staging.predecessor, staging.event, staging.thread,
---     staging.loss_interval
+--     staging.gap, staging.exposed_trace
 WITH last_gap AS (
-    SELECT trace_id - 1 AS trace_index, cpu, max(end_ns) AS end_ns
-    FROM staging.loss_interval
-    GROUP BY trace_id, cpu
+    SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
+    FROM staging.gap
+    GROUP BY recording_index, cpu_id
 )
 SELECT event_id, thread_id, true AS is_behind
 FROM staging.callback_gap
+WHERE is_between
 UNION ALL
 SELECT p.previous_event_id, g.thread_id, false
 FROM staging.predecessor AS p
 JOIN staging.callback_gap AS g ON p.event_id = g.event_id
-WHERE p.sequence = 'call' AND p.previous_event_id IS NOT NULL
+WHERE g.is_between AND p.sequence = 'call' AND p.previous_event_id IS NOT NULL
 UNION ALL
 SELECT DISTINCT e.event_id, t.thread_id, false
 FROM staging.event AS e
 JOIN staging.thread AS t ON e.event_id = t.last_event_id
+JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
 JOIN last_gap AS g
-    ON e.trace_index = g.trace_index
-    AND coalesce(e.cpu_id = g.cpu, true)
+    ON x.recording_index = g.recording_index
+    AND g.cpu_id IN (e.cpu_id, -1)
     AND e.ts_ns <= g.end_ns

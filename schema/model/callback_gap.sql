@@ -1,12 +1,16 @@
 -- name: staging.callback_gap
--- description: Gaps that threads have seen while they made calls, numbered on each thread.
+-- description: Gaps that threads have seen while they made calls, or that the CPUs had which they
+--     may have visited meanwhile. The former are numbered on each thread.
 -- grain: one row per event of a call behind a gap
--- needs: staging.behind_gap, staging.context
+-- needs: staging.near_gap, staging.context
 SELECT
     g.event_id,
     c.thread_id,
-    row_number() OVER (PARTITION BY c.thread_id ORDER BY g.event_id) AS segment
-FROM staging.behind_gap AS g
+    g.is_between,
+    CASE WHEN g.is_between
+        THEN row_number() OVER (PARTITION BY c.thread_id, g.is_between ORDER BY g.event_id)
+    END AS segment
+FROM staging.near_gap AS g
 JOIN staging.context AS c
     ON g.thread_index = c.thread_index
     AND g.event_id >= c.from_event_id

@@ -3,7 +3,7 @@
 --     each is nested in.
 -- grain: one row per run of a callback
 -- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take,
---     staging.beside_gap, staging.request_origin
+--     staging.beside_gap, staging.callback_gap, staging.request_origin
 WITH callback_of AS (
     SELECT b.start_event_id, c.callback_id
     FROM staging.callback_binding AS b
@@ -53,11 +53,15 @@ nested AS (
         AND n.depth - 1 = p.depth
         AND n.start_event_id > p.start_event_id
 ),
--- Runs with a gap inside, right before, or (never seen to end) right after.
+-- Runs with a gap inside, right before, or (never seen to end) right after; or with one of other
+-- CPUs in their time, which the thread may have visited: two runs may look like one.
 exposed AS (
     SELECT callback_instance_id, thread_id, start_event_id, end_event_id, effective_end_event_id
     FROM numbered
     WHERE thread_id IN (SELECT thread_id FROM staging.beside_gap)
+),
+elsewhere AS (
+    SELECT thread_id, event_id FROM staging.callback_gap WHERE NOT is_between
 ),
 touched AS (
     SELECT e.callback_instance_id
@@ -71,6 +75,14 @@ touched AS (
     ASOF JOIN (SELECT thread_id, event_id FROM staging.beside_gap WHERE NOT is_behind) AS g
         ON e.thread_id = g.thread_id AND e.effective_end_event_id > g.event_id
     WHERE g.event_id >= e.start_event_id
+    UNION
+    SELECT e.callback_instance_id
+    FROM (
+        SELECT * FROM numbered WHERE thread_id IN (SELECT thread_id FROM elsewhere)
+    ) AS e
+    ASOF JOIN elsewhere AS g
+        ON e.thread_id = g.thread_id AND e.effective_end_event_id >= g.event_id
+    WHERE g.event_id > e.start_event_id
 )
 SELECT
     n.callback_instance_id, n.trace_id, n.callback_id, n.process_id, n.thread_id, n.start_ns,

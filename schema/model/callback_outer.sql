@@ -2,7 +2,7 @@
 -- description: Runs of callbacks that others may be nested in: those with anything of a callback
 --     before their end, and those never seen to end. The latter last, for what is inside them,
 --     until the first event of their thread that cannot be inside: the next begin or end of a
---     callback, executor event, or event behind a gap.
+--     callback, executor event, or event behind a gap of any CPU.
 -- grain: one row per such run
 -- needs: staging.callback_event, staging.callback_pair, staging.callback_open,
 --     staging.executor_event,

@@ -3,7 +3,10 @@
 --     any at all.
 -- grain: one row per callback_start or callback_end behind the first gap of its thread
 -- needs: staging.callback_gap, staging.context, raw
-WITH event AS (
+WITH gap AS (
+    SELECT event_id, thread_id, segment FROM staging.callback_gap WHERE is_between
+),
+event AS (
     SELECT event_id, thread_index FROM raw.ros2_callback_start
     UNION ALL
     SELECT event_id, thread_index FROM raw.ros2_callback_end
@@ -15,8 +18,8 @@ located AS (
         ON e.thread_index = c.thread_index
         AND e.event_id >= c.from_event_id
         AND e.event_id < c.until_event_id
-    WHERE c.thread_id IN (SELECT thread_id FROM staging.callback_gap)
+    WHERE c.thread_id IN (SELECT thread_id FROM gap)
 )
 SELECT e.event_id, g.segment
 FROM located AS e
-ASOF JOIN staging.callback_gap AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id
+ASOF JOIN gap AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id

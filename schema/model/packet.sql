@@ -15,6 +15,7 @@ SELECT
     p.last_event_ns,
     p.event_count,
     p.discarded_event_count,
-    p.lost_packet_count
+    p.lost_packet_count,
+    p.is_numbered
 FROM raw.packet AS p
 JOIN staging.source AS s ON p.trace_index = s.trace_index

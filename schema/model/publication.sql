@@ -2,7 +2,7 @@
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
 -- needs: staging.publication_call, staging.publication_origin, staging.publisher,
---     staging.callback_left_over, staging.callback_pair, staging.beside_gap,
+--     staging.callback_left_over, staging.callback_pair, staging.beside_gap, staging.callback_gap,
 --     staging.publication_next
 WITH publisher_of AS (
     SELECT o.start_event_id, p.publisher_id
@@ -39,6 +39,20 @@ placed AS (
         FROM staging.callback_pair
         WHERE end_event_id IS NOT NULL AND thread_id IN (SELECT thread_id FROM stray)
     ) AS e ON s.thread_id = e.thread_id AND s.start_event_id > e.event_id
+),
+elsewhere AS (
+    SELECT thread_id, event_id FROM staging.callback_gap WHERE NOT is_between
+),
+-- With a gap of other CPUs between its events: they may be of two.
+interrupted AS (
+    SELECT c.start_event_id
+    FROM (
+        SELECT * FROM staging.publication_call WHERE thread_id IN (SELECT thread_id FROM elsewhere)
+    ) AS c
+    ASOF JOIN elsewhere AS g
+        ON c.thread_id = g.thread_id
+        AND c.end_event_id >= g.event_id
+    WHERE g.event_id > c.start_event_id
 )
 SELECT
     n.publication_id,
@@ -58,7 +72,8 @@ SELECT
     c.end_event_id,
     CASE WHEN q.start_event_id IS NULL THEN c.callback_event_id ELSE q.callback_event_id END
         AS callback_event_id,
-    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL AS is_loss_affected,
+    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL OR inside.start_event_id IS NOT NULL
+        AS is_loss_affected,
     x.next_event_ns
 FROM staging.publication_call AS c
 JOIN numbered AS n ON c.start_event_id = n.start_event_id
@@ -69,3 +84,4 @@ LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
 LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE NOT is_behind) AS before
     ON c.end_event_id = before.event_id
 LEFT JOIN staging.publication_next AS x ON c.start_event_id = x.start_event_id
+LEFT JOIN interrupted AS inside ON c.start_event_id = inside.start_event_id

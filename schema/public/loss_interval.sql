@@ -2,7 +2,7 @@
 -- description: Gaps in the traces: no two events are paired across one.
 -- grain: one row per gap in a trace
 -- column: run_id BIGINT  Run that the row belongs to
--- column: trace_id BIGINT  Trace it was recorded in
+-- column: trace_id BIGINT  Trace it was recorded in; between two chunks of a recording, the later
 -- column: cpu INTEGER  CPU concerned; NULL: all
 -- column: kind VARCHAR  'loss' (discarded events), 'packets' (lost packets) or 'pause' (not
 --     tracing)

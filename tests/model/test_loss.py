@@ -97,6 +97,76 @@ def test_an_idle_stream_does_not_hide_a_pause(system: RosSystem, analyse: Analys
     assert analyse(system).rows(GAPS) == [("pause", None, 100, 500, None)]
 
 
+def chunks(system: RosSystem, *, numbered: bool = True, lost: int = 0) -> None:
+    """Two of one recording: until 200, and on each of two CPUs from its first event on."""
+    for chunk in (0, 1):
+        system.add_source(chunk, "alpha", "boot", "recording")
+    for cpu in (0, 1):
+        system.add_packet(0, 200, cpu=cpu, trace=0, numbered=numbered)
+        system.add_packet(
+            500 + cpu,
+            700,
+            cpu=cpu,
+            trace=1,
+            numbered=numbered,
+            lost_packets=lost,
+        )
+
+
+def test_chunks_of_a_recording_follow_each_other(system: RosSystem, analyse: Analyse) -> None:
+    """The first packet of a CPU behind a rotation begins with its first event."""
+    chunks(system)
+    assert analyse(system).rows(GAPS) == []
+
+
+def test_a_chunk_is_missing(system: RosSystem, analyse: Analyse) -> None:
+    """As its packets are. A run does not go on behind them, nor one on both sides of another."""
+    chunks(system, lost=3)
+    before, after = Thread(100), Thread(100, trace=1)
+    start = system.add("ros2:callback_start", before, ts=150, callback=0xC1)
+    end = system.add("ros2:callback_end", after, ts=600, callback=0xC1)
+    model = analyse(system)
+    assert model.rows(GAPS) == [
+        ("packets", 0, 200, 500, None),
+        ("packets", 1, 200, 501, None),
+    ]
+    assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, None)]
+    assert model.column("SELECT resumed_ns FROM thread_break") == [end]
+
+
+def test_a_silence_between_chunks_without_numbers(system: RosSystem, analyse: Analyse) -> None:
+    chunks(system, numbered=False)
+    assert analyse(system).rows(GAPS) == [("pause", None, 200, 500, None)]
+
+
+def test_a_gap_of_a_chunk_holds_for_the_recording(system: RosSystem, analyse: Analyse) -> None:
+    """The thread is seen again in the next one only."""
+    for chunk in (0, 1):
+        system.add_source(chunk, "alpha", "boot", "recording")
+    system.add_packet(0, 200, last_event=180, discarded=5, trace=0)
+    system.add_packet(200, 400, trace=1)
+    start = system.add("ros2:callback_start", Thread(100), ts=150, callback=0xC1)
+    system.add("ros2:callback_end", Thread(100, trace=1), ts=300, callback=0xC1)
+    assert analyse(system).rows(
+        "SELECT start_ns, end_ns, is_loss_affected FROM callback_instance"
+    ) == [(start, None, True)]
+
+
+def test_packets_before_the_first_of_a_stream(system: RosSystem, analyse: Analyse) -> None:
+    """Others were recorded by then; whatever was before all of them is before the recording."""
+    system.add_packet(100, 600, cpu=0, lost_packets=7)
+    system.add_packet(350, 600, cpu=1, lost_packets=2)
+    assert analyse(system).rows(GAPS) == [("packets", 1, 100, 350, None)]
+
+
+def test_a_stream_that_ends_before_events_of_others(system: RosSystem, analyse: Analyse) -> None:
+    """Whatever came after them is what stopping left, a little later on each CPU."""
+    system.add_packet(0, 300, cpu=0)
+    system.add_packet(0, 603, cpu=1, last_event=550)
+    system.add_packet(0, 600, cpu=2, last_event=10)
+    assert analyse(system).rows(GAPS) == [("packets", 0, 300, 603, None)]
+
+
 def test_nothing_is_paired_across_a_pause(system: RosSystem, analyse: Analyse) -> None:
     """Threads of any CPU of that trace, and only of that trace."""
     system.add_source(1, "beta", "boot-b")

@@ -99,6 +99,23 @@ def test_a_gap_may_hide_another_use_of_the_slot(intra: Intra, analyse: Analyse) 
     assert analyse(intra.system).rows(LINKS) == []
 
 
+def test_a_gap_may_have_begun_before_the_message(intra: Intra, analyse: Analyse) -> None:
+    """One that was over by then hides nothing."""
+    published = [intra.publish(0)]
+    taken = [intra.dequeue(0)]
+    begin = intra.system.start(TALKER, 0xC1)
+    intra.publish(0)
+    middle = intra.system.end(TALKER, 0xC1)
+    intra.dequeue(0)
+    published.append(intra.publish(0))
+    taken.append(intra.dequeue(0))
+    intra.system.add_packet(0, 10_000, cpu=0)
+    intra.system.add_packet(0, middle, last_event=begin, discarded=3, cpu=3)
+    assert analyse(intra.system).rows(LINKS) == [
+        (one, at, "ring_buffer") for one, at in zip(published, taken, strict=True)
+    ]
+
+
 def test_buffers_of_other_processes_are_others(intra: Intra, analyse: Analyse) -> None:
     intra.publish(0)
     other = Thread(200)

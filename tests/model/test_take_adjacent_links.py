@@ -61,6 +61,15 @@ def test_not_across_a_gap(relay: RosSystem, analyse: Analyse) -> None:
     assert analyse(relay).rows(LINKS) == []
 
 
+def test_not_across_a_gap_that_began_before(relay: RosSystem, analyse: Analyse) -> None:
+    """On a CPU that the thread may have visited."""
+    taken = relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
+    published = relay.publish(PYTHON, 0x11, 2, layers="rcl rmw")
+    relay.add_packet(0, 10_000, cpu=0)
+    relay.add_packet(0, published - 1, last_event=taken - 100, discarded=3, cpu=1)
+    assert analyse(relay).rows(LINKS) == []
+
+
 def test_flows_pass_through(relay: RosSystem, analyse: Analyse) -> None:
     relay.publish(SOURCE, 0x10, 11)
     relay.take(PYTHON, 0x20, 11, layers="rmw rcl")

@@ -49,10 +49,11 @@ class Thread:
 
 @dataclass(frozen=True)
 class Source:
-    """A trace: of which host, by which clock."""
+    """A trace: of which host, by which clock, and (unless it is one alone) of which recording."""
 
     hostname: str = "alpha"
     clock: str = "boot"
+    recording: str | None = None
 
 
 class StagedEvents:
@@ -101,9 +102,11 @@ class StagedEvents:
         """Let time pass before the next event."""
         self._now += duration_ns
 
-    def add_source(self, trace: int, hostname: str, clock: str) -> None:
+    def add_source(
+        self, trace: int, hostname: str, clock: str, recording: str | None = None
+    ) -> None:
         """Add a trace, or change the one there is."""
-        self.sources[trace] = Source(hostname, clock)
+        self.sources[trace] = Source(hostname, clock, recording)
 
     def add_packet(
         self,
@@ -114,6 +117,7 @@ class StagedEvents:
         count: int = 1,
         discarded: int = 0,
         lost_packets: int = 0,
+        numbered: bool = True,
         cpu: int = 0,
         trace: int = 0,
     ) -> None:
@@ -133,6 +137,7 @@ class StagedEvents:
                 "event_count": count,
                 "discarded_event_count": discarded,
                 "lost_packet_count": lost_packets,
+                "is_numbered": numbered,
             }
         )
 
@@ -156,7 +161,7 @@ class StagedEvents:
                 [
                     index,
                     f"trace-{index}",
-                    f"uuid-{index}",
+                    source.recording or f"uuid-{index}",
                     source.hostname,
                     source.clock,
                     source.clock,
@@ -189,9 +194,11 @@ class StagedEvents:
     ) -> None:
         batches = [(name, batch) for name, batch in batches if batch.num_rows]
         if batches:
-            hosts: dict[Source, int] = {}
+            hosts: dict[tuple[str, str], int] = {}
             sources = [self.sources.get(n, Source()) for n in range(max(self.sources) + 1)]
-            numbers = [hosts.setdefault(source, len(hosts)) for source in sources]
+            numbers = [
+                hosts.setdefault((source.hostname, source.clock), len(hosts)) for source in sources
+            ]
             placed = Sequences(load(), numbers).place(batches)
             _insert(con, "raw.thread", placed.threads)
             _insert(con, "raw.thread_name", placed.thread_names)

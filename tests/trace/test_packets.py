@@ -32,7 +32,7 @@ def column(rows: Rows, name: str) -> list[Any]:
     return [row[name] for row in rows[PACKET]]
 
 
-def test_every_column(tmp_path: Path, open_traces: Open) -> None:
+def test_every_column(tmp_path: Path, open_traces: Open, reader: str) -> None:
     packets = [Packet(events(12, 17), begin=10, end=20, cpu=3), Packet(begin=20, end=30, cpu=3)]
     with open_traces(write(tmp_path / "trace", *packets)) as traces:
         (batch,) = [b.batch for b in traces.batches() if b.name == PACKET]
@@ -51,6 +51,7 @@ def test_every_column(tmp_path: Path, open_traces: Open) -> None:
         "event_count": 2,
         "discarded_event_count": 0,
         "lost_packet_count": 0,
+        "is_numbered": reader != "bt2",
     }
     assert (second["position"], second["event_count"], second["last_event_ns"]) == (1, 0, None)
 
@@ -156,3 +157,15 @@ def test_lost_packets_count_for_the_next_one(tmp_path: Path, read_rows: Read) ->
     ]
     rows = read_rows(write(tmp_path / "trace", *packets))
     assert column(rows, "lost_packet_count") == [0, 2, 0]
+
+
+def test_numbers_go_on_in_the_next_chunk(tmp_path: Path, read_rows: Read, reader: str) -> None:
+    """Babeltrace compares them within a directory only."""
+    chunks = [[(0, 2), (10, 3)], [(20, 4), (30, 7)], [(40, 9)]]
+    for number, chunk in enumerate(chunks):
+        packets = [Packet(events(t), begin=t, end=t + 5, sequence=n) for t, n in chunk]
+        write(tmp_path / str(number), *packets)
+    rows = read_rows(tmp_path)
+    is_known = reader != "bt2"
+    assert column(rows, "lost_packet_count") == [2, 0, 0, 2, 1] if is_known else [0, 0, 0, 2, 0]
+    assert column(rows, "is_numbered") == [is_known] * 5

@@ -17,14 +17,14 @@ _LARGEST = (1 << 63) - 1
 class LossCounter:
     """Turns the counters of one packet after the other into what each lost.
 
-    A recording may be rotated into several directories; the counter of lost events goes on in the
-    next one, that of packets is only compared within one (before its first packet may be what a
-    snapshot left out on purpose).
+    A recording may be rotated into several directories, or be given as several snapshots: the
+    counter of lost events and the numbers of the packets go on in the next one.
     """
 
     def __init__(self) -> None:
         self._counters: dict[Recording, int] = {}
         self._previous: dict[int, Packet] = {}
+        self._sequences: dict[Recording, int] = {}
 
     def losses(
         self, recording: Recording, stream: Stream, packet: Packet, counts: bool
@@ -32,7 +32,7 @@ class LossCounter:
         """Return the events lost in a packet (None: unknown), and the packets lost before it.
 
         Args:
-            recording: what the counter of events counts for.
+            recording: what the counters count for.
             stream: the packet's stream.
             packet: must come in order of time.
             counts: False for a copy of a packet, which only serves to be compared with.
@@ -41,9 +41,10 @@ class LossCounter:
         self._previous[id(stream)] = packet
         lost = 0
         header = packet.header
-        if previous is not None and previous.header.sequence is not None:
-            sequence = header.sequence or 0
-            lost = min(max(sequence - previous.header.sequence - 1, 0), _LARGEST)
+        if header.sequence is not None:
+            expected = self._sequences.get(recording, -1) + 1
+            lost = min(max(header.sequence - expected, 0), _LARGEST)
+            self._sequences[recording] = header.sequence
         if header.discarded is None:
             return None if packet.is_cut else 0, lost
         before = self._counters.get(recording, 0)

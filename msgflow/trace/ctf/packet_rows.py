@@ -87,4 +87,5 @@ class PacketRows:
             count,
             entry.discarded,
             entry.lost,
+            entry.packet.header.sequence is not None,
         )

@@ -1,0 +1,44 @@
+-- name: staging.near_gap
+-- description: Events with a gap between themselves and their predecessor in a sequence of their
+--     thread. `is_between`: on the CPU of either, or a pause, so that the record of the thread is
+--     interrupted. Else on other CPUs only, which the thread may have visited meanwhile.
+-- grain: one row per event and sequence
+-- needs: staging.predecessor, staging.event, staging.exposed_trace, staging.gap
+WITH exposed AS (
+    SELECT
+        e.event_id, e.thread_index, e.trace_index, e.sequence, e.ts_ns, e.cpu_id,
+        p.ts_ns AS previous_ns, p.cpu_id AS previous_cpu_id
+    FROM staging.predecessor AS e
+    JOIN staging.event AS p ON e.previous_event_id = p.event_id
+    WHERE e.trace_index IN (SELECT trace_index FROM staging.exposed_trace)
+),
+near AS (
+    SELECT
+        e.event_id, e.thread_index, e.sequence, e.recording_index, e.ts_ns, e.cpu_id,
+        e.previous_ns, e.previous_cpu_id
+    FROM (
+        SELECT x.*, t.recording_index
+        FROM exposed AS x
+        JOIN staging.exposed_trace AS t ON x.trace_index = t.trace_index
+    ) AS e
+    ASOF JOIN staging.gap AS g
+        ON e.recording_index = g.recording_index AND e.ts_ns > g.start_ns
+    WHERE g.start_ns >= e.previous_ns OR g.any_covered_until_ns > e.previous_ns
+),
+place AS (
+    SELECT
+        event_id, sequence, recording_index, ts_ns, previous_ns,
+        unnest([cpu_id, previous_cpu_id, -1]) AS cpu_id
+    FROM near
+),
+between_the_two AS (
+    SELECT DISTINCT e.event_id, e.sequence
+    FROM place AS e
+    ASOF JOIN staging.gap AS g
+        ON e.recording_index = g.recording_index AND e.cpu_id = g.cpu_id AND e.ts_ns > g.start_ns
+    WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
+)
+SELECT
+    n.event_id, n.thread_index, n.sequence, b.event_id IS NOT NULL AS is_between
+FROM near AS n
+LEFT JOIN between_the_two AS b ON n.event_id = b.event_id AND n.sequence = b.sequence
