@@ -13,10 +13,7 @@
 CREATE OR REPLACE MACRO derive.undelivered(of_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
-        publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
-        row_number() OVER (
-            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
-        ) AS position
+        publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns
     FROM derive.expected_arrival
     WHERE run_id = of_run
 ),
@@ -36,11 +33,21 @@ link AS (
 missing AS MATERIALIZED (
     SELECT
         a.publication_id, a.publisher_id, s.subscription_id, a.topic_name, a.clock_id,
-        a.arrival_ns, a.position, a.source_timestamp_ns IS NULL AS has_no_stamp
+        a.arrival_ns, a.source_timestamp_ns IS NULL AS has_no_stamp
     FROM arrival AS a
     JOIN life AS s ON a.topic_name = s.topic_name AND a.clock_id = s.clock_id
     ANTI JOIN link AS l
         ON a.publication_id = l.publication_id AND s.subscription_id = l.subscription_id
+),
+-- The order of messages, where any is missing.
+ordered AS MATERIALIZED (
+    SELECT
+        publication_id, topic_name, clock_id, arrival_ns,
+        row_number() OVER (
+            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
+        ) AS position
+    FROM arrival
+    WHERE (topic_name, clock_id) IN (SELECT (topic_name, clock_id) FROM missing)
 ),
 delivered AS MATERIALIZED (
     SELECT l.subscription_id, l.publisher_id, a.arrival_ns, t.taken_ns
@@ -101,7 +108,7 @@ long_wait AS (
 known AS (
     SELECT
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
-        m.arrival_ns, m.position, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
+        m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
         s.last_seen_ns, s.replaced_ns, s.host_end_ns,
         coalesce(c.longest_ns, 10_000_000) AS longest_ns,
         coalesce(c.patience_ns, 10_000_000) AS patience_ns,
@@ -155,8 +162,9 @@ facts AS (
         g.covered_until_ns >= b.arrival_ns AS has_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
         u.taken_ns <= coalesce(b.waited_ns, b.gone_ns) AS has_unidentified_take,
-        q.position - b.position AS newer_count
+        q.position - o.position AS newer_count
     FROM bounded AS b
+    JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id
     ASOF LEFT JOIN (SELECT * FROM derive.process_gap WHERE run_id = of_run) AS g
         ON b.process_id = g.process_id AND b.until_ns >= g.start_ns
     ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = of_run) AS f
@@ -172,7 +180,7 @@ facts AS (
         ON b.subscription_id = u.subscription_id
         AND b.has_no_stamp = u.for_no_stamp
         AND b.arrival_ns <= u.taken_ns
-    ASOF LEFT JOIN arrival AS q
+    ASOF LEFT JOIN ordered AS q
         ON b.topic_name = q.topic_name
         AND b.clock_id = q.clock_id
         AND b.gone_ns >= q.arrival_ns
