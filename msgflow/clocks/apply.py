@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import duckdb
-
-from msgflow.db.connection import connect
+from msgflow.db.change import change_runs
 from msgflow.db.derive import derive_from_clocks
-from msgflow.errors import UsageError
-from msgflow.query.interrupt import interruptible
-from msgflow.query.run import read_runs
-from msgflow.query.window import choose_runs
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import duckdb
 
     from msgflow.clocks.file import ClockSync, GivenClock
     from msgflow.query.window import Run
@@ -92,27 +87,14 @@ def apply_clocks(
         UsageError: no such run, or a file that does not fit it.
         DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
-    with contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con:
-        runs = choose_runs(read_runs(con), run)
-        if not runs:
-            raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")
-        return interruptible(con, lambda: _apply(con, sync, runs))
 
-
-def _apply(
-    con: duckdb.DuckDBPyConnection, sync: ClockSync, runs: tuple[Run, ...]
-) -> tuple[Run, ...]:
-    con.begin()
-    try:
+    def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
         for run in runs:
             set_clocks(con, run.run_id, sync)
             derive_from_clocks(con, run.run_id)
-        con.commit()
-    except BaseException:
-        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
-            con.rollback()
-        raise
-    return runs
+        return runs
+
+    return change_runs(path, run, apply, memory_limit=memory_limit)
 
 
 def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:

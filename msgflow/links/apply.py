@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import duckdb
-
-from msgflow.db.connection import connect
+from msgflow.db.change import change_runs
 from msgflow.db.derive import derive
-from msgflow.errors import UsageError
 from msgflow.links.match import match_links
-from msgflow.query.interrupt import interruptible
-from msgflow.query.run import read_runs
-from msgflow.query.window import choose_runs
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import duckdb
 
     from msgflow.links.file import LinksFile
     from msgflow.links.match import MatchedLink
@@ -77,30 +72,16 @@ def apply_links(
         UsageError: no such run, or a link that does not fit it.
         DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
-    with contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con:
-        runs = choose_runs(read_runs(con), run)
-        if not runs:
-            raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")
-        return interruptible(con, lambda: _apply(con, file, runs))
 
-
-def _apply(
-    con: duckdb.DuckDBPyConnection, file: LinksFile, runs: tuple[Run, ...]
-) -> tuple[AppliedLinks, ...]:
-    con.begin()
-    try:
+    def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[AppliedLinks, ...]:
         counts = {run.run_id: declare_links(con, run.run_id, file) for run in runs}
         for run in runs:
             derive(con, run.run_id)
-        applied = tuple(
+        return tuple(
             AppliedLinks(run, *counts[run.run_id], *_link_counts(con, run.run_id)) for run in runs
         )
-        con.commit()
-    except BaseException:
-        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
-            con.rollback()
-        raise
-    return applied
+
+    return change_runs(path, run, apply, memory_limit=memory_limit)
 
 
 def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) -> tuple[int, int]:
