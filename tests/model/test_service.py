@@ -141,6 +141,28 @@ def test_a_client_that_came_again(system: RosSystem, analyse: Analyse) -> None:
     assert analysis.rows(RESPONSES) == [(1, sent, answered, got)]
 
 
+def test_handles_that_are_used_again(system: RosSystem, analyse: Analyse) -> None:
+    """Clients and services made anew at the addresses of former ones; one before tracing began."""
+    system.add_source(1, "beta", "other boot")
+    system.send_request(CLIENT, 0x10, 9)
+    system.take_request(SERVER, 0x20, 9, gid=3)
+    for number, name in enumerate(("/add", "/sub", "/add"), start=1):
+        system.client(CLIENT, 0x10, name, gid=10 + number)
+        system.service(SERVER, 0x20, name, callback=None)
+        call(system, 1, gid=10 + number, stamp=number)
+    assert analyse(system).rows(
+        "SELECT q.sequence_number, c.client_id, c.service_name, s.service_id, s.service_name "
+        "FROM request AS q LEFT JOIN client AS c USING (client_id) "
+        "LEFT JOIN service AS s USING (service_id) ORDER BY q.request_id"
+    ) == [
+        (9, 1, None, None, None),
+        (9, None, None, 1, None),
+        (1, 2, "/add", 2, "/add"),
+        (1, 3, "/sub", 3, "/sub"),
+        (1, 4, "/add", 4, "/add"),
+    ]
+
+
 def test_equal_requests_without_response_go_by_order(system: RosSystem, analyse: Analyse) -> None:
     hosts(system)
     sent = [system.send_request(CLIENT, 0x10, 1) for _ in range(2)]
