@@ -95,6 +95,7 @@ def test_layers_around_a_loss_elsewhere_are_marked(system: RosSystem, analyse: A
     for moment in (moments[0], moments[3]):
         system.add_packet(begin, moment + 4, last_event=moment + 2, discarded=3, cpu=2)
         begin = moment + 4
+    system.add_packet(begin, 10_000, cpu=2)
     model = analyse(system)
     assert model.column("SELECT is_loss_affected FROM publication ORDER BY start_ns") == [
         True,
