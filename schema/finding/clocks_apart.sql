@@ -3,8 +3,8 @@
 -- description: Messages seem to be received before they were published. Latencies between the two
 --     hosts are off by at least that much; links are right all the same, as they compare stamps.
 -- cause: The hosts were not synchronised while recording.
--- cure: Synchronise the clocks before recording (chrony, ptp4l), or correct them now: msgflow clocks
---     apply messages, or, where messages go one way only, msgflow clocks apply FILE.
+-- cure: Synchronise the clocks before recording (chrony, ptp4l), or correct them now:
+--     msgflow clocks apply messages, or, where messages go one way only, msgflow clocks apply FILE.
 -- grain: one row per pair of hosts
 -- severity: warning
 -- needs: main.link_transport, main.publication, main.take, main.process, main.host, derive.counted
