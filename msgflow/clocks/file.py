@@ -22,7 +22,8 @@ _FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
 _EXAMPLE = "robot-b: {offset_ns: -350000000, drift_ppb: 20}"
 _INTEGER = re.compile(r"[-+]?\d[\d_]*")
 _LARGEST_NS = 2**62
-_LARGEST_DRIFT_PPB = 1_000_000_000
+# A thousandth: no clock that counts seconds is worse.
+_LARGEST_DRIFT_PPB = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def read_clock_sync(given: str | Path) -> ClockSync:
     except UnicodeDecodeError as error:
         raise UsageError(f"not a text file in UTF-8 — {path}", _EXAMPLE) from error
     sync = ClockSync("file", path)
-    entries = _toml(text, sync) if path.suffix == ".toml" else _yaml(text, sync)
+    entries = _toml(text, sync) if _is_toml(path) else _yaml(text, sync)
     clocks = tuple(_clock(sync, *entry) for entry in entries)
     if not clocks:
         sync.fail(1, "the file names no clock", _EXAMPLE)
@@ -97,6 +98,10 @@ def read_clock_sync(given: str | Path) -> ClockSync:
 
 # Both yield: name, its line, and its fields with their lines; a number alone is the offset.
 _Entry = tuple[str, int, dict[str, tuple[str, int]]]
+
+
+def _is_toml(path: Path | None) -> bool:
+    return path is not None and path.suffix == ".toml"
 
 
 def _toml(text: str, sync: ClockSync) -> Iterator[_Entry]:
@@ -143,13 +148,13 @@ def _yaml(text: str, sync: ClockSync) -> Iterator[_Entry]:
     if root is None:
         return
     for name, value in _pairs(sync, root, "the file is not a mapping from hosts to offsets"):
-        fields = {"offset_ns": (_scalar(value), _line(value))}
+        fields = {"offset_ns": (_scalar(value), _line(value if _scalar(value) else name))}
         if value.id == "mapping":
             fields = {}
             for key, field in _pairs(sync, value, ""):
                 if _scalar(key) in fields:
                     sync.fail(_line(key), f"{_scalar(key)} is given twice")
-                fields[_scalar(key)] = (_scalar(field), _line(field))
+                fields[_scalar(key)] = (_scalar(field), _line(field if _scalar(field) else key))
         yield _scalar(name), _line(name), fields
 
 
@@ -160,7 +165,7 @@ def _pairs(sync: ClockSync, node: Any, what: str) -> list[tuple[Any, Any]]:
 
 
 def _scalar(node: Any) -> str:
-    return str(node.value) if node.id == "scalar" else "…"
+    return str(node.value) if node.id == "scalar" else f"a {node.id}"
 
 
 def _line(node: Any) -> int:
@@ -171,13 +176,16 @@ def _clock(sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, i
     numbers: dict[str, int] = {}
     for key, (text, field_line) in fields.items():
         if key not in _FIELDS:
-            sync.fail(field_line, f"a clock has no {key}", f"it has {', '.join(_FIELDS)}")
+            quoted = "; a name with dots stands in quotes" if _is_toml(sync.path) else ""
+            sync.fail(field_line, f"a clock has no {key}", f"it has {', '.join(_FIELDS)}{quoted}")
+        if not text:
+            sync.fail(field_line, f"{key} has no value", _EXAMPLE)
         if not _INTEGER.fullmatch(text):
             sync.fail(field_line, f"{key} is not a whole number — {text}", _EXAMPLE)
         numbers[key] = int(text)
         limit = _LARGEST_DRIFT_PPB if key == "drift_ppb" else _LARGEST_NS
         if abs(numbers[key]) >= limit or (key == "uncertainty_ns" and numbers[key] < 0):
-            sync.fail(field_line, f"no clock has such a {key} — {text}")
+            sync.fail(field_line, f"{key} is beyond what clocks have — {text}", _EXAMPLE)
     if "offset_ns" not in numbers:
         sync.fail(line, f"{name} has no offset_ns", _EXAMPLE)
     return GivenClock(name, line, **numbers)

@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from msgflow.query.window import Run
 
 _CLOCKS = """
-SELECT run_id, count(DISTINCT coalesce(reference_clock_id, -clock_id))
+SELECT
+    run_id,
+    count(DISTINCT coalesce(reference_clock_id, -clock_id)),
+    run_id IN (SELECT run_id FROM main.diagnostic WHERE name = 'clock_not_synchronised')
 FROM main.clock
 WHERE list_contains($runs, run_id)
 GROUP BY run_id
@@ -25,11 +28,14 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
 
     Clocks that are corrected to the same one count as one.
     """
-    numbers = dict(connection.execute(_CLOCKS, {"runs": [run.run_id for run in runs]}).fetchall())
+    rows = connection.execute(_CLOCKS, {"runs": [run.run_id for run in runs]}).fetchall()
+    clocks = {
+        run_id: (number, "FILE" if in_vain else "messages") for run_id, number, in_vain in rows
+    }
     return [
         f"{'the run' if len(runs) == 1 else f'run {run.name} ({run.run_id})'} has"
-        f" {numbers[run.run_id]} clocks that are not synchronised: times between their hosts are"
-        " not comparable; msgflow clocks apply messages"
+        f" {clocks[run.run_id][0]} clocks that are not synchronised: times between their hosts are"
+        f" not comparable; msgflow clocks apply {clocks[run.run_id][1]}"
         for run in runs
-        if run.run_id in numbers
+        if run.run_id in clocks
     ]

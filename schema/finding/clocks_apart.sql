@@ -4,7 +4,7 @@
 --     hosts are off by at least that much; links are right all the same, as they compare stamps.
 -- cause: The hosts were not synchronised while recording.
 -- cure: Synchronise the clocks before recording (chrony, ptp4l), or correct them now:
---     msgflow clocks apply messages.
+--     msgflow clocks apply messages, or, where messages go one way only, msgflow clocks apply FILE.
 -- grain: one row per pair of hosts
 -- severity: warning
 -- needs: main.link_transport, main.publication, main.take, main.process, main.host, derive.counted

@@ -276,8 +276,8 @@ grown AS (
     WINDOW longer AS (PARTITION BY side, subject ORDER BY block_length)
 ),
 -- Blocks are long enough where they are twice that; the more values, the longer in any case. They
--- still miss what reaches beyond their ends: it halves with twice the length, and is added. How much
--- so few blocks vary is not known well: intervals are wider by as much as Student's t is.
+-- still miss what reaches beyond their ends: it halves with twice the length, and is added. How
+-- much so few blocks vary is not known well: intervals are wider by as much as Student's t is.
 block AS (
     SELECT
         side,

@@ -4,7 +4,8 @@
 --     inputs of their annotation had no message.
 -- grain: one row per finding
 -- needs: store.take, store.subscription, store.publication, store.link_transport,
---     derive.process_clock, derive.corrected_ns, derive.annotation_firing
+--     derive.process_clock, derive.corrected_ns, derive.annotation_firing,
+--     store.diagnostic
 WITH unmatched AS (
     SELECT t.run_id, t.trace_id, s.topic_name, t.source_timestamp_ns IS NULL AS has_no_stamp
     FROM store.take AS t
@@ -60,8 +61,14 @@ SELECT
     count(*),
     printf(
         'messages that seem to be received up to %.3f ms before they were published: the clocks '
-        || 'of the hosts are apart; msgflow clocks apply messages',
-        -min(latency_ns) / 1e6
+        || 'of the hosts are apart; msgflow clocks apply %s',
+        -min(latency_ns) / 1e6,
+        CASE
+            WHEN run_id IN (
+                SELECT run_id FROM store.diagnostic WHERE name = 'clock_not_synchronised'
+            ) THEN 'FILE'
+            ELSE 'messages'
+        END
     )
 FROM latency
 WHERE latency_ns < 0

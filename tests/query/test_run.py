@@ -196,19 +196,20 @@ def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -
 
 
 @pytest.mark.parametrize(
-    ("references", "run", "notes"),
+    ("references", "in_vain", "run", "notes"),
     [
-        ((None,), "first", []),
-        ((1, 1, 1), "first", []),
-        ((1, None, 1), "first", ["the run has 2 clocks"]),
-        ((1, 1, 3, 3), "first", ["the run has 2 clocks"]),
-        ((None, None, None), "all", ["run first (1) has 3 clocks"]),
-        ((None, None), "second", []),
+        ((None,), False, "first", []),
+        ((1, 1, 1), False, "first", []),
+        ((1, None, 1), False, "first", ["the run has 2 clocks"]),
+        ((1, 1, 3, 3), True, "first", ["the run has 2 clocks"]),
+        ((None, None, None), False, "all", ["run first (1) has 3 clocks"]),
+        ((None, None), False, "second", []),
     ],
 )
 def test_clocks_that_differ_are_named(
     connection: duckdb.DuckDBPyConnection,
     references: tuple[int | None, ...],
+    in_vain: bool,
     run: str,
     notes: list[str],
 ) -> None:
@@ -217,10 +218,13 @@ def test_clocks_that_differ_are_named(
     )
     connection.executemany("INSERT INTO clock VALUES (?, 1, ?)", enumerate(references, start=1))
     connection.execute("INSERT INTO clock VALUES (9, 2, NULL)")
+    connection.execute("CREATE TABLE diagnostic (run_id BIGINT, name VARCHAR)")
+    if in_vain:
+        connection.execute("INSERT INTO diagnostic VALUES (1, 'clock_not_synchronised')")
     query = QUERY.replace("-- param", "-- note: clocks\n-- param")
     rest = (
         " that are not synchronised: times between their hosts are not comparable;"
-        " msgflow clocks apply messages"
+        f" msgflow clocks apply {'FILE' if in_vain else 'messages'}"
     )
     result = run_query(connection, header(query), {}, run=run, internal=True)
     assert result.notes == [f"{note}{rest}" for note in notes]
