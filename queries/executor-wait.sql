@@ -19,8 +19,8 @@
 -- column: busy_worst_ns BIGINT [ns]   Longest that the executor can have been busy during one wait
 -- column: busy_total_min_ns BIGINT [ns]  Executor busy with others during all waits, at least
 -- column: busy_total_max_ns BIGINT [ns]  Executor busy with others during all waits, at most
--- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where the wait is known, at least
--- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where the wait is known, at most
+-- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where known, at least
+-- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile, by its share: the three with the most, with
 --     their node where it is another
 -- column: unknown BIGINT            Runs of which the beginning of the wait is not known

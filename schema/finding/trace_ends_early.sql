@@ -35,7 +35,9 @@ SELECT
     l.number AS count,
     printf(
         '%s until %.3f s after the last event of %s',
-        derive.counted(l.number, 'message'), (l.last_ns - s.last_seen_ns) / 1e9, coalesce(s.label, 'every process')
+        derive.counted(l.number, 'message'),
+        (l.last_ns - s.last_seen_ns) / 1e9,
+        coalesce(s.label, 'every process')
     ) AS detail
 FROM late AS l
 LEFT JOIN sender AS s ON l.run_id = s.run_id AND l.topic_name = s.topic_name

@@ -14,7 +14,9 @@ SELECT
     count(*) AS count,
     printf(
         '%s, %.3f s in all, the longest %.3f s',
-        derive.counted(count(*), 'pause'), sum(g.end_ns - g.start_ns) / 1e9, max(g.end_ns - g.start_ns) / 1e9
+        derive.counted(count(*), 'pause'),
+        sum(g.end_ns - g.start_ns) / 1e9,
+        max(g.end_ns - g.start_ns) / 1e9
     ) AS detail
 FROM main.loss_interval AS g
 JOIN main.trace AS t ON g.trace_id = t.trace_id
