@@ -224,6 +224,7 @@ SELECT
     c.callback_instance_id::VARCHAR, w.id IS NOT NULL, 'derive.link_transport'
 FROM simulated_callback_instance AS c
 LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
+WHERE c.end_ns IS NOT NULL
 UNION ALL
 -- Those that end; whether they must be found is not judged.
 SELECT
