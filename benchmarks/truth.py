@@ -62,6 +62,7 @@ RECORDINGS = {
     "truncated": Recording(cut_streams=1, unfinished_streams=1),
     "dual": Recording(start_ns=SECOND // 3, is_dual_session=True, clock_error_ns=3_000),
     "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
+    "chunk_missing": Recording(rotations=(SECOND // 3, SECOND // 2), missing_chunk=1),
     "per_process": Recording(buffers=Buffers.PER_PROCESS, clock_error_ns=3_000),
     "drift": Recording(realtime_offset_ns=300_000, slew_ppm=20),
     "behind": Recording(realtime_offset_ns=-200_000, slew_ppm=-20),
@@ -80,6 +81,9 @@ RECORDINGS = {
 # Faults do not depend on the layout but for stamps, of which these have all kinds.
 FAULTY_LAYOUTS = ("jazzy", "humble", "humble-fastdds")
 FAULTY_SYSTEMS = ("pipeline", "two_hosts")
+# What every system is recorded with once, since what it costs depends on what the system does.
+EVERY_LAYOUT = "jazzy"
+EVERY_FAULT = ("loss", "packets", "truncated", "rotated", "chunk_missing")
 # What comes and goes in these does so after a second.
 WHOLE = ("losses", "restarts", "container_restarts")
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
@@ -131,7 +135,11 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
             for recording in arguments.recording or RECORDINGS:
                 is_faulty = recording != PERFECT
                 is_asked_for = arguments.system or arguments.layout or arguments.recording
-                is_usual = not is_faulty or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
+                is_usual = (
+                    not is_faulty
+                    or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
+                    or (layout == EVERY_LAYOUT and recording in EVERY_FAULT)
+                )
                 if arguments.quick:
                     is_usual = (system, layout) in QUICK and recording in {PERFECT, "loss"}
                 elif is_asked_for:

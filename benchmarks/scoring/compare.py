@@ -109,7 +109,9 @@ def _open(database: Path) -> duckdb.DuckDBPyConnection:
 def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
     connection.execute(
         "CREATE TEMP TABLE built AS SELECT schema_name || '.' || view_name AS name "
-        "FROM duckdb_views() WHERE database_name = 'analysed' AND schema_name = 'derive'"
+        "FROM duckdb_views() WHERE database_name = 'analysed' AND schema_name = 'derive' "
+        "UNION SELECT schema_name || '.' || function_name FROM duckdb_functions() "
+        "WHERE database_name = 'analysed' AND schema_name = 'derive'"
     )
     for name in (source, "found", "score"):
         connection.execute((_SQL / f"{name}.sql").read_text())

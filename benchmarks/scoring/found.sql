@@ -17,6 +17,17 @@ instance AS (
     SELECT 'callback_instance', callback_instance_id, thread_id, start_ns
     FROM analysed.store.callback_instance
     UNION ALL
+    SELECT 'callback_end', callback_instance_id, thread_id, end_ns
+    FROM analysed.store.callback_instance
+    WHERE end_ns IS NOT NULL
+    UNION ALL
+    SELECT 'state_start', start_event_id, thread_id, start_ns
+    FROM analysed.store.executor_state
+    UNION ALL
+    SELECT 'state_end', start_event_id, thread_id, end_ns
+    FROM analysed.store.executor_state
+    WHERE end_ns IS NOT NULL
+    UNION ALL
     SELECT 'request_sent', request_id, sender_thread_id, sent_ns
     FROM analysed.store.request
     UNION ALL
@@ -35,6 +46,17 @@ link AS (
         false AS is_guess
     FROM instance
     WHERE kind IN ('publication', 'callback_instance')
+    UNION ALL
+    -- What a loss on other CPUs may have made of two says so.
+    SELECT 'callback_run', 'callback_run', 'callback_instance', callback_instance_id,
+        'callback_end', callback_instance_id, is_loss_affected
+    FROM analysed.store.callback_instance
+    WHERE end_ns IS NOT NULL
+    UNION ALL
+    SELECT 'executor_state', state, 'state_start', start_event_id, 'state_end', start_event_id,
+        false
+    FROM analysed.store.executor_state
+    WHERE end_ns IS NOT NULL
     UNION ALL
     -- The middleware's own takes carry no stamp; nobody subscribes to them.
     SELECT 'take', method, 'take', take_id, 'take', take_id, false

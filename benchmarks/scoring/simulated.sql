@@ -70,8 +70,18 @@ WITH clock_error AS (
     FROM simulated_trace
     GROUP BY host
 ),
+state AS (
+    SELECT s.*, concat_ws('/', host, pid, tid, start_ns) AS id FROM simulated_executor_state AS s
+),
 named AS (
     SELECT kind, id, host, pid, tid, ts_ns FROM truth_event
+    UNION ALL
+    SELECT 'callback_end', callback_instance_id::VARCHAR, host, pid, tid, end_ns
+    FROM simulated_callback_instance
+    UNION ALL
+    SELECT 'state_start', id, host, pid, tid, start_ns FROM state
+    UNION ALL
+    SELECT 'state_end', id, host, pid, tid, end_ns FROM state
     UNION ALL
     SELECT 'take', take_id::VARCHAR, host, pid, tid, start_ns
     FROM simulated_callback_instance
@@ -208,6 +218,20 @@ UNION ALL
 SELECT 'callback_instance', kind, id, kind, id, is_start, 'derive.link_transport'
 FROM recorded
 WHERE kind = 'callback_instance'
+UNION ALL
+SELECT
+    'callback_run', 'callback_instance', c.callback_instance_id::VARCHAR, 'callback_end',
+    c.callback_instance_id::VARCHAR, w.id IS NOT NULL, 'derive.link_transport'
+FROM simulated_callback_instance AS c
+LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
+WHERE c.end_ns IS NOT NULL
+UNION ALL
+-- Those that end; whether they must be found is not judged.
+SELECT
+    'executor_state', 'state_start', concat_ws('/', host, pid, tid, start_ns), 'state_end',
+    concat_ws('/', host, pid, tid, start_ns), false, 'derive.link_transport'
+FROM simulated_executor_state
+WHERE end_ns IS NOT NULL
 UNION ALL
 SELECT
     'transport', 'publication', publication_id::VARCHAR, 'take', take_id::VARCHAR, is_decided, needs

@@ -228,9 +228,19 @@ class Recorder:
                 str(first.relative_to(self._directory.parent)),
                 error,
             )
+        missing = None
+        if recording.missing_chunk:
+            missing = self._clock.elapsed(sorted(recording.rotations)[recording.missing_chunk - 1])
         ordered = sorted(breaks, key=lambda one: one.begin)
         continued = tuple(
-            replace(one, directory=next(paths)) if one.begin == one.end else one for one in ordered
+            replace(
+                one,
+                directory=next(paths),
+                is_missing=one.begin == missing,
+            )
+            if one.begin == one.end
+            else one
+            for one in ordered
         )
         return TraceWriter(
             first,

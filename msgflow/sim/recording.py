@@ -25,6 +25,7 @@ class Recording:
             `start_ns`; the one that starts then is `runtime`.
         pauses: recording is stopped and started again at these times.
         rotations: the trace is continued in a further chunk of the archive from these times on.
+        missing_chunk: which chunk is not there, counted from 1 behind the first; 0: all are.
         buffers: one trace per user, or one per process.
         clock_error_ns: the epoch offsets of the traces of one host differ by up to this much:
             those of processes, or that of the snapshot from that of the rest.
@@ -42,6 +43,7 @@ class Recording:
     is_dual_session: bool = False
     pauses: tuple[tuple[int, int], ...] = ()
     rotations: tuple[int, ...] = ()
+    missing_chunk: int = 0
     buffers: Buffers = Buffers.PER_USER
     clock_error_ns: int = 0
     lost_event_share: float = 0.0
@@ -62,6 +64,11 @@ class Recording:
             )
         if min(self.start_ns, self.cut_streams, self.unfinished_streams, self.clock_error_ns) < 0:
             raise UsageError("a negative time or count makes no sense", "give 0 or more")
+        if not 0 <= self.missing_chunk <= len(self.rotations):
+            raise UsageError(
+                f"there is no chunk {self.missing_chunk} behind the first",
+                "give one number of a rotation",
+            )
         if self.longest_loss < 1:
             raise UsageError("a loss takes at least one event", "give 1 or more")
         self._check_times()

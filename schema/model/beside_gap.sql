@@ -13,13 +13,13 @@ WITH last_gap AS (
 SELECT event_id, thread_id, true AS is_behind
 FROM staging.callback_gap
 WHERE is_between
-UNION ALL
+UNION
 SELECT p.previous_event_id, g.thread_id, false
 FROM staging.predecessor AS p
 JOIN staging.callback_gap AS g ON p.event_id = g.event_id
 WHERE g.is_between AND p.sequence = 'call' AND p.previous_event_id IS NOT NULL
-UNION ALL
-SELECT DISTINCT e.event_id, t.thread_id, false
+UNION
+SELECT e.event_id, t.thread_id, false
 FROM staging.event AS e
 JOIN staging.thread AS t ON e.event_id = t.last_event_id
 JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index

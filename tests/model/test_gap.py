@@ -107,3 +107,16 @@ def test_layers_around_a_loss_elsewhere_are_marked(system: RosSystem, analyse: A
         True,
         False,
     ]
+
+
+def test_several_events_behind_a_gap_look_back_to_one(system: RosSystem, analyse: Analyse) -> None:
+    """Into each of several ring buffers, after a loss within the call: still one publication."""
+    system.publisher(HERE, 0x10, "/a")
+    system.add("ros2:rclcpp_intra_publish", HERE, publisher_handle=0x10, message=0xA)
+    system.lose()
+    for buffer in (0xB1, 0xB2, 0xB3):
+        system.add(
+            "ros2:rclcpp_ring_buffer_enqueue", HERE, buffer=buffer, index=0, size=1, overwritten=0
+        )
+    model = analyse(system)
+    assert model.rows("SELECT publication_id, is_loss_affected FROM publication") == [(1, True)]

@@ -24,6 +24,7 @@ FAULTS = {
     "unfinished": Recording(unfinished_streams=2),
     "dual": Recording(start_ns=SECOND // 3, is_dual_session=True),
     "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
+    "chunk": Recording(rotations=(SECOND // 3, SECOND // 2), missing_chunk=1),
     "per_process": Recording(buffers=Buffers.PER_PROCESS),
 }
 CAUSES = {
@@ -32,6 +33,7 @@ CAUSES = {
     "packets": "packets",
     "pause": "pause",
     "unfinished": "truncation",
+    "chunk": "packets",
     "dual": "late start",
 }
 
@@ -84,7 +86,7 @@ def test_the_truth_names_exactly_what_is_missing(bt2, made, name):
     # LTTng counts what it discards while it records, and numbers packets.
     assert (discarded > 0) is (name == "loss")
     assert discarded <= len(rows)
-    assert (packets > 0) is (name == "packets")
+    assert (packets > 0) is (name in {"packets", "chunk"})
 
 
 def test_counters_rise_with_every_loss(made):
@@ -120,6 +122,21 @@ def test_a_rotated_trace_is_one_trace_in_chunks(made):
     assert [path.parts[-6] for path in directories] == ["archives"] * 3
     assert len({path.joinpath("metadata").read_bytes() for path in directories}) == 1
     assert all(any(path.glob("ros2_*")) for path in directories)
+
+
+def test_a_chunk_is_missing(made):
+    """What was in it, and nothing else."""
+    simulation = made("chunk")
+    kept = [path for path in made("rotated").trace_directories if not path.parts[-5].endswith("-2")]
+    ends = [path.parts[-5:] for path in simulation.trace_directories]
+    assert ends == [path.parts[-5:] for path in kept]
+    assert all((path / "metadata").exists() for path in simulation.trace_directories)
+    times = duckdb.sql(
+        f"SELECT min(ts_ns), max(ts_ns) FROM '{simulation.truth['unrecorded']}' "
+        "WHERE cause = 'packets'"
+    ).fetchall()
+    ((first, last),) = times
+    assert 0 < last - first <= SECOND // 2 - SECOND // 3
 
 
 def test_each_process_has_a_trace_and_a_clock_offset_of_its_own(bt2, tmp_path):
@@ -182,6 +199,7 @@ def test_faults_do_not_change_what_happens(made):
         ({"pauses": ((2, 4),), "rotations": (4,)}, "follow"),
         ({"pauses": ((2, 4), (4, 5))}, "follow"),
         ({"rotations": (3, 3)}, "follow"),
+        ({"rotations": (3,), "missing_chunk": 2}, "no chunk 2"),
         ({"start_ns": -1}, "negative"),
         ({"cut_streams": -1}, "negative"),
         ({"longest_loss": 0}, "at least one"),

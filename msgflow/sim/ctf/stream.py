@@ -30,12 +30,13 @@ _FOR_EVER = 1 << 62
 class Break:
     """Packets end at `begin`, the next ones begin at `end`; what happens between is not recorded.
 
-    With a `directory`, files are continued there.
+    With a `directory`, files are continued there; if that `is_missing`, to be deleted.
     """
 
     begin: int
     end: int
     directory: Path | None = None
+    is_missing: bool = False
 
 
 class Faults(Protocol):
@@ -100,6 +101,7 @@ class StreamWriter:
         self._breaks = deque(breaks)
         self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
         self._silent_until = 0
+        self._is_missing = False
         self._faults = faults
         self._ending = ending
         # Nothing was written before, so that the first event carries the whole clock value.
@@ -185,6 +187,7 @@ class StreamWriter:
             if due.directory is not None:
                 self._close()
                 self._open(due.directory)
+                self._is_missing = due.is_missing
         self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
 
     def _end_packet(self, end: int, ending: Ending | None = None) -> None:
@@ -228,7 +231,7 @@ class StreamWriter:
 
     def _kept(self, ending: Ending | None, *, is_full: bool) -> int | None:
         """How many events of the packet are recorded; None if the whole packet is missing."""
-        if ending is not None and ending.is_last_packet_missing:
+        if self._is_missing or (ending is not None and ending.is_last_packet_missing):
             return None
         if ending is not None and ending.is_last_packet_cut:
             return len(self._records) // 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -68,6 +69,7 @@ class TraceWriter:
         self.directory = directory
         chunks = (chunk.directory for chunk in breaks)
         self.directories = (directory, *(chunk for chunk in chunks if chunk is not None))
+        self._missing = [chunk.directory for chunk in breaks if chunk.is_missing]
         text = metadata_text(
             layout,
             uuid=identity.uuid,
@@ -98,6 +100,10 @@ class TraceWriter:
         """Complete the files; tracing stops at time `end`."""
         for stream in self.streams:
             stream.close(end)
+        for directory in self._missing:
+            if directory is not None:
+                shutil.rmtree(directory)
+        self.directories = tuple(one for one in self.directories if one not in self._missing)
 
 
 def _environment(identity: TraceIdentity, tracer_minor: int) -> dict[str, str | int]:
