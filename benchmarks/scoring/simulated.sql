@@ -122,6 +122,21 @@ unknown_process AS (
     FROM simulated_unrecorded
     WHERE event LIKE '%\_init' ESCAPE '\'
 ),
+-- Those among them whose pid and handles were used again: which life an event is of cannot be told.
+mixed_process AS (
+    SELECT DISTINCT host, pid
+    FROM simulated_subscription
+    SEMI JOIN unknown_process USING (host, pid)
+    GROUP BY host, pid, subscription_handle
+    HAVING count(*) > 1
+),
+-- Stamps that messages of several topics may share: only the topic tells them apart.
+shared_stamp AS (
+    SELECT source_timestamp_ns
+    FROM simulated_publication
+    GROUP BY source_timestamp_ns
+    HAVING count(*) > 1
+),
 -- Processes of which a ring buffer event is missing.
 unknown_buffer AS (
     SELECT DISTINCT host, pid
@@ -173,6 +188,18 @@ message AS (
                     (t.take_host, t.take_pid) NOT IN (SELECT (host, pid) FROM unknown_buffer)
                 WHEN is_rmw_stamped OR is_dds_stamped THEN
                     t.publication_id NOT IN (SELECT publication_id FROM twin WHERE is_equal)
+                    AND (t.publication_host, t.publication_pid)
+                        NOT IN (SELECT (host, pid) FROM mixed_process)
+                    AND (t.take_host, t.take_pid) NOT IN (SELECT (host, pid) FROM mixed_process)
+                    AND (
+                        s.source_timestamp_ns NOT IN (FROM shared_stamp)
+                        OR (
+                            (t.publication_host, t.publication_pid)
+                                NOT IN (SELECT (host, pid) FROM unknown_process)
+                            AND (t.take_host, t.take_pid)
+                                NOT IN (SELECT (host, pid) FROM unknown_process)
+                        )
+                    )
                 ELSE t.publication_id NOT IN (SELECT publication_id FROM twin)
                     AND (t.publication_host, t.publication_pid)
                         NOT IN (SELECT (host, pid) FROM unknown_process)
@@ -186,8 +213,10 @@ message AS (
     CROSS JOIN layout
     JOIN recorded AS p ON p.kind = 'publication' AND t.publication_id::VARCHAR = p.id
     JOIN recorded AS r ON r.kind = 'take' AND t.take_id::VARCHAR = r.id
+    JOIN simulated_publication AS s ON t.publication_id = s.publication_id
 ),
--- Nothing pairs across a gap: the next event that is missing on the host lies behind the callback.
+-- Nothing pairs across a gap: the next event that is missing on the host lies behind the callback,
+-- and there is none where a callback does not end.
 whole_callback AS (
     SELECT c.callback_instance_id::VARCHAR AS id
     FROM simulated_callback_instance AS c
@@ -195,7 +224,9 @@ whole_callback AS (
     ASOF LEFT JOIN (
         SELECT host, ts_ns FROM simulated_unrecorded WHERE cause <> 'late start'
     ) AS u ON c.host = u.host AND c.start_ns <= u.ts_ns
-    WHERE r.is_whole AND coalesce(u.ts_ns > c.end_ns, true)
+    WHERE r.is_whole
+        AND (u.ts_ns IS NULL OR coalesce(u.ts_ns > c.end_ns, false))
+        AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM mixed_process)
 ),
 -- Who is annotated says so once, and an input that is missing leaves an older one in its cache.
 told AS (
@@ -254,7 +285,11 @@ WHERE c.callback_instance_id IS NOT NULL
 UNION ALL
 SELECT
     c.kind, 'take', c.take_id::VARCHAR, 'publication', c.publication_id::VARCHAR,
-    t.is_whole AND p.is_whole, 'derive.link_causal_' || c.kind
+    -- That nothing came in between is sure only where nothing of the host is missing.
+    t.is_whole AND p.is_whole AND c.host NOT IN (
+        SELECT host FROM simulated_unrecorded WHERE cause <> 'late start'
+    ),
+    'derive.link_causal_' || c.kind
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
 JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id
