@@ -182,6 +182,8 @@ class _Painter:
         elif node["kind"] == "publication" and node["end_ns"] is not None:
             details.append(f"in {format_duration(node['end_ns'] - node['start_ns'])}")
         for vertex in (item.take, node):
+            if vertex is not None and vertex["missing"] == "copy":
+                details.append("copy of a message within the process")
             if vertex is not None and vertex["missing"] in _NOT_SEEN.get(vertex["kind"], {}):
                 why = f", {_reason(vertex)}" if vertex["missing"] == "publication" else ""
                 details.append(f"NA: {_NOT_SEEN[vertex['kind']][vertex['missing']]}{why}")

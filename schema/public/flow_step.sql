@@ -36,7 +36,8 @@
 -- column: host VARCHAR  Machine or container
 -- column: missing VARCHAR  What the trace does not show here: 'publication' that was taken, 'take'
 --     of the message, 'callback' it was taken for, 'sending' of the request or response,
---     'response' to the request, or the 'end' of the callback run
+--     'response' to the request, or the 'end' of the callback run; 'copy': nothing is missing, the
+--     message came through a ring buffer and this is its copy from the middleware
 -- column: reason VARCHAR  Why it is missing, as far as known
 -- column: cut_count BIGINT  Links that lead on from here beyond the limits
 -- column: internal_count BIGINT  Effects on ROS's own topics and services that are left out
@@ -173,6 +174,7 @@ described AS MATERIALIZED (
         NULL,
         CASE
             WHEN x.id IS NOT NULL THEN 'publication'
+            WHEN i.take_id IS NULL AND y.take_id IS NULL AND z.take_id IS NOT NULL THEN 'copy'
             WHEN i.take_id IS NULL AND y.take_id IS NULL THEN 'callback'
         END,
         x.reason
@@ -187,6 +189,14 @@ described AS MATERIALIZED (
         SELECT DISTINCT take_id FROM store.link_causal WHERE kind = 'take_adjacent'
     ) AS y
         ON t.take_id = y.take_id
+    LEFT JOIN (
+        SELECT DISTINCT l.take_id
+        FROM store.link_transport AS l
+        JOIN store.link_transport AS b
+            ON l.publication_id = b.publication_id AND l.subscription_id = b.subscription_id
+        WHERE l.method <> 'ring_buffer' AND b.method = 'ring_buffer'
+    ) AS z
+        ON t.take_id = z.take_id
     WHERE v.kind = 'take'
     UNION ALL
     SELECT

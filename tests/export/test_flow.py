@@ -66,6 +66,15 @@ def test_what_may_have_been_taken_is_not_called_untaken(
     assert "/camera  Subscription(/tracks)  not taken: before_subscription" in tree
 
 
+def test_the_copy_of_a_message_within_the_process_is_called_so(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    with database_of("copy_within_the_process", empty_database, tmp_path) as database:
+        tree = str(database.flow(publication_id=1, direction="forward"))
+    assert tree.count("copy of a message within the process") == 1
+    assert "NA: no callback was seen" not in tree
+
+
 def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> None:
     assert str(robot.flow("/image", direction="forward")).splitlines() == [
         "publication 1, /image; times count from 1970-01-01T00:00:00.000000110Z",
