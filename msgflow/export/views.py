@@ -101,7 +101,7 @@ class Selection:
             return None
         for name in _TIMES:
             if name in columns:
-                time = _SENT if name == "sent_ns" else name
+                time = _SENT if name == "sent_ns" and "taken_ns" in columns else name
                 return f"{time} >= $start_ns AND {time} < $end_ns"
         for thing, name in _THINGS:
             if f"{thing}_id" in columns:

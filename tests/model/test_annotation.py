@@ -42,7 +42,7 @@ def test_inputs_and_outputs_by_their_rcl_handles(system: RosSystem, analyse: Ana
         ("periodic_async", ["/a", "/b"], ["/c", "/d"]),
         ("partial_sync", ["/a"], ["/d"]),
     ]
-    assert findings(analysis) == []
+    assert findings(analysis) == [("contradictory_annotations", 1)]
 
 
 def test_repeated_equal_annotations_are_one(system: RosSystem, analyse: Analyse) -> None:

@@ -111,6 +111,7 @@ def test_a_gap_may_have_begun_before_the_message(intra: Intra, analyse: Analyse)
     taken.append(intra.dequeue(0))
     intra.system.add_packet(0, 10_000, cpu=0)
     intra.system.add_packet(0, middle, last_event=begin, discarded=3, cpu=3)
+    intra.system.add_packet(middle, 10_000, cpu=3)
     assert analyse(intra.system).rows(LINKS) == [
         (one, at, "ring_buffer") for one, at in zip(published, taken, strict=True)
     ]

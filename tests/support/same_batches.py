@@ -47,8 +47,16 @@ def read(*paths: Path, reader: str = "msgflow", **options: Any) -> Content:
 
 
 def _rows(batch: pa.RecordBatch) -> list[Any]:
-    """Return rows as tuples: two columns may have the same name."""
-    return list(zip(*(column.to_pylist() for column in batch.columns), strict=True))
+    """Return rows as tuples: two columns may have the same name.
+
+    Without the numbers of packets, which Babeltrace keeps to itself.
+    """
+    columns = [
+        column.to_pylist()
+        for name, column in zip(batch.schema.names, batch.columns, strict=True)
+        if name != "is_numbered"
+    ]
+    return list(zip(*columns, strict=True))
 
 
 def differences(ours: Content, theirs: Content) -> list[str]:

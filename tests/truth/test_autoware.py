@@ -50,7 +50,7 @@ def test_each_lidar_message_becomes_as_many_commands_as_it_really_did(runs: Any)
 def test_two_threads_do_what_one_did_one_after_the_other(runs: Any) -> None:
     database, _ = runs
     comparison = database.compare(
-        *autoware.NAMES, what="topics", skip_first=1.0, case="first", resamples=200
+        *autoware.NAMES, what="topics", skip_first=1.0, case="first", resamples=400
     )
     rows = {
         row["subject"]: row
@@ -61,7 +61,8 @@ def test_two_threads_do_what_one_did_one_after_the_other(runs: Any) -> None:
     waited = rows["/PointCloudFusion → /VoxelGridDownsampler"]
     assert waited["a_ns"] > 20_000_000
     assert waited["b_ns"] < 1_000_000
-    assert waited["verdict"] == "B is shorter"
     assert waited["effect"] == "large"
+    # Every cycle is like the one before: that makes few values that tell something new.
+    assert waited["verdict"] == "too few independent values"
     # What does not depend on that process takes as long as before.
     assert rows["/Lanelet2MapLoader → /LanePlanner"]["effect"] != "large"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.trace.ctf.scan import Scanned, scan, scan_packet
+from msgflow.trace.ctf.scan import Scanned, scan, scan_packet, whole
 from msgflow.trace.ctf.walk import FieldError
 
 if TYPE_CHECKING:
@@ -74,8 +74,13 @@ class _Lockstep:
         first = np.searchsorted(positions, begins).tolist()
         last = np.searchsorted(positions, ends).tolist()
         return [
-            Scanned(positions[first[lane] : last[lane]], self._problems.get(lane))
-            for lane in range(len(self._spans))
+            whole(
+                self._layout,
+                self._memory,
+                span,
+                Scanned(positions[first[lane] : last[lane]], self._problems.get(lane)),
+            )
+            for lane, span in enumerate(self._spans)
         ]
 
     def _walk(

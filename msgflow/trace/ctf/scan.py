@@ -71,4 +71,20 @@ def scan_packet(layout: StreamLayout, memory: Memory, span: Span, position: int)
             position += step
     if position > end:
         problem = (positions.pop(), BEYOND_END)
-    return Scanned(np.array(positions, np.int64), problem)
+    return whole(layout, memory, span, Scanned(np.array(positions, np.int64), problem))
+
+
+def whole(layout: StreamLayout, memory: Memory, span: Span, found: Scanned) -> Scanned:
+    """Return the events of a packet without a last one that reaches beyond its content.
+
+    Sizes that are known beforehand go from header to header, with the padding in between: where
+    padding is cut off, the end of the last event may be, too.
+    """
+    if span.limit == span.end or found.problem is not None or not found.positions.size:
+        return found
+    last = int(found.positions[-1])
+    try:
+        layout.next_event(memory.data, last, span)
+    except FieldError as error:
+        return Scanned(found.positions[:-1], (last, str(error)))
+    return found
