@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import duckdb
 
 from msgflow.db.connection import connect
+from msgflow.db.reading import reading_statements
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query
+from msgflow.query.failure import database_errors, in_words
 from msgflow.query.interrupt import interruptible
 from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs, run_query
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
+
+_T = TypeVar("_T")
 
 DEFAULT_LIMIT = 10_000
 # Of flows: messages in a row, and vertices.
@@ -88,11 +92,13 @@ class Database:
             DatabaseError: the file is missing, locked, foreign, or of another schema revision.
         """
         if self._connection is None:
-            connection = connect(self.path, read_only=True, memory_limit=self._memory_limit)
-            connection.execute("SET enable_external_access = false")
-            connection.execute("SET lock_configuration = true")
-            self._connection = connection
+            self._connection = connect(self.path, read_only=True, memory_limit=self._memory_limit)
         return self._connection
+
+    def _ask(self, work: Callable[[], _T]) -> _T:
+        """Return what `work` returns; Ctrl-C interrupts it."""
+        with database_errors(self.path):
+            return interruptible(self.connection, work)
 
     def ingest(
         self,
@@ -225,8 +231,7 @@ class Database:
         """
         header = load_query(name)
         connection = self.connection
-        return interruptible(
-            connection,
+        return self._ask(
             lambda: run_query(
                 connection,
                 header,
@@ -311,7 +316,7 @@ class Database:
                 internal=internal,
             )
 
-        return interruptible(connection, read)
+        return self._ask(read)
 
     def compare(
         self,
@@ -357,8 +362,7 @@ class Database:
         from msgflow.query.compare import compare
 
         connection = self.connection
-        return interruptible(
-            connection,
+        return self._ask(
             lambda: compare(
                 connection,
                 run_a,
@@ -378,27 +382,30 @@ class Database:
         )
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
-        """Run SQL, read-only, without access to other files, and return the last result.
+        """Run SQL that only reads, without access to other files, and return the last result.
 
         Args:
-            text: one or more statements.
+            text: one or more queries, or EXPLAIN of such.
             limit: most rows returned, all when None; a note says when there were more.
 
         Raises:
-            QueryError: the database could not run it.
+            QueryError: a statement might do more than read, or the database could not run it.
             DatabaseError: the file cannot be opened.
         """
-        if not text.strip().strip(";"):
-            raise UsageError("there is no SQL to run", 'msgflow sql "SELECT * FROM run"')
         connection = self.connection
         try:
-            return interruptible(connection, lambda: _capped(connection.sql(text), limit))
+            statements = reading_statements(connection, text)
+            if not statements:
+                raise UsageError("there is no SQL to run", 'msgflow sql "SELECT * FROM run"')
+            joined = "\n;\n".join(statements)
+            return interruptible(connection, lambda: _capped(connection.sql(joined), limit))
         except duckdb.Error as error:
-            raise _sql_error(error) from error
+            raise in_words(error, self.path) or _sql_error(error) from error
 
     def schema(self) -> QueryResult:
         """Return the public views: one row per column, with its type and meaning."""
-        return QueryResult(self.connection.sql(_SCHEMA).to_arrow_table())
+        connection = self.connection
+        return self._ask(lambda: QueryResult(connection.sql(_SCHEMA).to_arrow_table()))
 
     def list_queries(self) -> tuple[Header, ...]:
         """Return the named queries, sorted by name."""
@@ -406,14 +413,15 @@ class Database:
 
     def runs(self) -> tuple[Run, ...]:
         """Return the runs in the database, oldest first."""
-        return read_runs(self.connection)
+        connection = self.connection
+        return self._ask(lambda: read_runs(connection))
 
     def check(self) -> list[CheckResult]:
         """Audit the content: one result per check below `schema/check`."""
         from msgflow.db.check import run_checks
 
         connection = self.connection
-        return interruptible(connection, lambda: run_checks(connection))
+        return self._ask(lambda: run_checks(connection))
 
     def findings(self, *, run: str | int | None = None) -> list[Finding]:
         """Tell what is wrong with a recording: errors first, each with cause and cure.
@@ -426,7 +434,7 @@ class Database:
 
         connection = self.connection
         run_ids = [chosen.run_id for chosen in choose_runs(self.runs(), run)]
-        return interruptible(connection, lambda: find(connection, run_ids))
+        return self._ask(lambda: find(connection, run_ids))
 
     def export_parquet(
         self,
@@ -467,7 +475,7 @@ class Database:
             )
             return export_parquet(connection, Path(directory), selection, force=force)
 
-        return interruptible(connection, export)
+        return self._ask(export)
 
     def export_csv(
         self,
@@ -508,7 +516,7 @@ class Database:
             )
             return export_csv(connection, Path(directory), selection, force=force)
 
-        return interruptible(connection, export)
+        return self._ask(export)
 
 
 def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:

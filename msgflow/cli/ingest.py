@@ -130,6 +130,8 @@ def _print_report(report: IngestReport, database: Path) -> None:
     for diagnostic in report.diagnostics:
         if diagnostic.severity != "info":
             print_note(f"{diagnostic.name} ({diagnostic.count}): {diagnostic.detail}")
+    for warning in report.warnings:
+        print_note(warning)
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

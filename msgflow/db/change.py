@@ -9,6 +9,7 @@ import duckdb
 
 from msgflow.db.connection import connect
 from msgflow.errors import UsageError
+from msgflow.query.failure import database_errors
 from msgflow.query.interrupt import interruptible
 from msgflow.query.run import read_runs
 from msgflow.query.window import choose_runs
@@ -41,7 +42,10 @@ def change_runs(
         UsageError: no such run, or of `change`.
         DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
-    with contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con:
+    with (
+        database_errors(path),
+        contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con,
+    ):
         runs = choose_runs(read_runs(con), run)
         if not runs:
             raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shlex
 from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.objects import definition_hash, head_revision
+from msgflow.db.definition import remember, require_ours
+from msgflow.db.objects import definition_hash, head_revision, known_revisions
+from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
 from msgflow.errors import DatabaseError
+from msgflow.query.failure import database_errors, in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 # Older clients (DBeaver, Grafana, notebooks) read files of this storage version.
@@ -44,8 +46,13 @@ def connect(
     return con
 
 
-def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
+def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) -> None:
     """Attach an existing, current msgflow database for writing, and make it the current one.
+
+    Args:
+        con: a connection to another database.
+        path: the file.
+        is_new: this process has just created it: nobody else can have put anything into it.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.
@@ -53,10 +60,15 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
     quoted = str(path).replace("'", "''")
+    _require_file(path)
     with _opening(path):
         con.execute(f"ATTACH '{quoted}' AS target")
     con.execute("USE target")
+    if is_new:
+        remember(con)
+        return
     require_current(con, path)
+    remove_abandoned(path, is_ours_alone=True)
 
 
 def open_file(
@@ -64,9 +76,12 @@ def open_file(
 ) -> duckdb.DuckDBPyConnection:
     """Open a DuckDB file, or create it, whatever is in it.
 
+    The connection reaches no other file and no network, and its settings cannot be changed.
+
     Raises:
         DatabaseError: it is locked by another process, or no DuckDB file.
     """
+    _require_file(path)
     config: dict[str, str | bool | int | float | list[str]] = {}
     if memory_limit is not None:
         config["memory_limit"] = memory_limit
@@ -75,17 +90,45 @@ def open_file(
     with _opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
         _prepare(con)
-        return con
+        con.execute("SET temp_directory = ?", [str(spill_directory(path))])
+        con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
+        shut_in(con)
+        con.execute("SET lock_configuration = true")
+    remove_abandoned(path, is_ours_alone=not read_only)
+    return con
 
 
 def open_memory() -> duckdb.DuckDBPyConnection:
-    """Open a new database in memory."""
+    """Open a new database in memory, which may still attach files: see `shut_in`."""
     con = duckdb.connect(":memory:")
     _prepare(con)
     return con
 
 
+def shut_in(con: duckdb.DuckDBPyConnection, *, beside: Sequence[Path] = ()) -> None:
+    """Close the file system and the network to a connection, but for what it has open.
+
+    Args:
+        con: the connection; this cannot be taken back.
+        beside: directories that it may write to all the same.
+    """
+    if beside:
+        con.execute("SET allowed_directories = ?", [[str(path.absolute()) for path in beside]])
+    con.execute("SET enable_external_access = false")
+
+
+def _require_file(path: Path) -> None:
+    # DuckDB would wait for a pipe, and read a device to its end.
+    if path.exists() and not path.is_file():
+        what = "a directory" if path.is_dir() else "a pipe, socket or device"
+        raise DatabaseError(f"not a database file but {what} — {path}", "give a file with --db")
+
+
 def _prepare(con: duckdb.DuckDBPyConnection) -> None:
+    con.execute("SET autoinstall_known_extensions = false")
+    con.execute("SET autoload_known_extensions = false")
+    # A name that is no table is no variable of Python either.
+    con.execute("SET python_enable_replacements = false")
     # stdout is for data: DuckDB would draw its bar there when a statement takes long.
     con.execute("SET enable_progress_bar = false")
     # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with
@@ -105,15 +148,15 @@ def _opening(path: Path) -> Iterator[None]:
                 f"database is in use by another process — {path}",
                 "close the program that has it open, or give another file with --db",
             ) from error
-        if os.path.isdir(path):
-            raise DatabaseError(
-                f"not a database file but a directory — {path}", "give a file with --db"
-            ) from error
+        if (words := in_words(error, path)) is not None:
+            raise words from error
         raise DatabaseError(
             f"cannot open as a DuckDB database — {path}",
             "give another file with --db, or check its permissions",
         ) from error
-    except duckdb.Error as error:
+    except (duckdb.Error, UnicodeDecodeError) as error:
+        if (words := in_words(error, path)) is not None:
+            raise words from error
         raise DatabaseError(
             f"cannot open as a DuckDB database — {path}", "give another file with --db"
         ) from error
@@ -128,7 +171,7 @@ def recorded_revision(con: duckdb.DuckDBPyConnection) -> str | None:
     if row is None or row[0] != 3:
         return None
     revision = con.execute("SELECT version_num FROM store.alembic_version").fetchone()
-    return None if revision is None else str(revision[0])
+    return None if revision is None or revision[0] is None else str(revision[0])
 
 
 def is_empty(con: duckdb.DuckDBPyConnection) -> bool:
@@ -144,8 +187,10 @@ def is_empty(con: duckdb.DuckDBPyConnection) -> bool:
 def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     """Raise unless the database has the schema revision and the views of this msgflow.
 
+    Neither views nor macros are used for that: what is in a foreign file might do anything.
+
     Raises:
-        DatabaseError: it is foreign, newer, or has to be upgraded.
+        DatabaseError: it is foreign, damaged, newer, or has to be upgraded.
     """
     revision = require_known(con, path)
     hint = f"msgflow db upgrade --db {shlex.quote(str(path))}"
@@ -155,9 +200,11 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
             f"— {path}",
             hint,
         )
-    row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
-    if row is None or row[0] != definition_hash():
-        raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
+    with database_errors(path):
+        row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
+        if row is None or row[0] != definition_hash():
+            raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
+        require_ours(con, path)
 
 
 def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
@@ -166,14 +213,20 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
     Raises:
         DatabaseError: it is foreign or newer.
     """
-    revision = recorded_revision(con)
+    with database_errors(path):
+        revision = recorded_revision(con)
     if revision is None:
         raise DatabaseError(
             f"a DuckDB database, but not one of msgflow — {path}", "give another file with --db"
         )
+    if revision not in known_revisions() and revision <= head_revision():
+        raise DatabaseError(
+            f"database has a schema revision that no msgflow had: {revision[:40]!r} — {path}",
+            "give another file with --db",
+        )
     if revision > head_revision():
         raise DatabaseError(
-            f"database has schema revision {revision}, newer than this msgflow knows "
+            f"database has schema revision {revision[:40]}, newer than this msgflow knows "
             f"({head_revision()}) — {path}",
             "upgrade msgflow, or give another file with --db",
         )

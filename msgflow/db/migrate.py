@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 from contextlib import contextmanager, suppress
@@ -19,7 +20,9 @@ from msgflow.db.connection import (
     require_current,
     require_known,
 )
+from msgflow.db.definition import require_ours
 from msgflow.errors import DatabaseError
+from msgflow.query.failure import database_errors
 from msgflow.resources import resource_directory
 
 if TYPE_CHECKING:
@@ -59,8 +62,15 @@ def create(path: Path) -> None:
     """
     if path.exists():
         raise DatabaseError(f"a file is there already — {path}", "give another file with --db")
+    _replace_by_new(path)
+
+
+def _replace_by_new(path: Path) -> None:
     try:
-        with tempfile.TemporaryDirectory(prefix=".msgflow-", dir=path.parent) as directory:
+        with (
+            database_errors(path),
+            tempfile.TemporaryDirectory(prefix=".msgflow-", dir=path.parent) as directory,
+        ):
             fresh = Path(directory) / "new.duckdb"
             con = open_file(fresh, read_only=False)
             try:
@@ -102,19 +112,31 @@ def upgrade(path: Path) -> Upgrade:
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
-    con = open_file(path, read_only=False)
+    with database_errors(path):
+        with contextlib.closing(open_file(path, read_only=False)) as con:
+            before = None if is_empty(con) else require_known(con, path)
+            if before is not None:
+                views_changed = not _has_our_views(con, path)
+                _bring_to_head(con)
+        if before is None:
+            # One of our own, as its format depends on who made it.
+            _replace_by_new(path)
+            return Upgrade(None, objects.head_revision(), True, ())
+        # Definitions read from the file can be compared, those just written cannot.
+        with contextlib.closing(open_file(path, read_only=False)) as con:
+            require_current(con, path)
+            return Upgrade(before, objects.head_revision(), views_changed, _rederive(con))
+
+
+def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
+    row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
+    if row is None or row[0] != objects.definition_hash():
+        return False
     try:
-        before = None if is_empty(con) else require_known(con, path)
-        row = (
-            None
-            if before is None
-            else con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
-        )
-        views_changed = row is None or row[0] != objects.definition_hash()
-        _bring_to_head(con)
-        return Upgrade(before, objects.head_revision(), views_changed, _rederive(con))
-    finally:
-        con.close()
+        require_ours(con, path)
+    except DatabaseError:
+        return False
+    return True
 
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection) -> None:

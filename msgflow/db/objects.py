@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 # Folders whose objects live in the database; each may need only those to its left, and itself.
 VIEW_LAYERS = ("link", "flow", "stat", "public")
 
+# Of a database: tables, what is derived from them, and what users read.
+SCHEMAS = ("store", "derive", "main")
+
 
 @cache
 def load(layer: str) -> tuple[Header, ...]:
@@ -29,7 +32,9 @@ def load(layer: str) -> tuple[Header, ...]:
         ValueError: two objects need each other.
     """
     directory = resource_directory("schema") / layer
-    return sort(parse(path.read_text(), path) for path in sorted(directory.glob("*.sql")))
+    return sort(
+        parse(path.read_text(encoding="utf-8"), path) for path in sorted(directory.glob("*.sql"))
+    )
 
 
 def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
@@ -84,14 +89,20 @@ def _texts(layers: Sequence[str]) -> Iterable[str]:
     for layer in layers:
         for path in sorted((root / layer).glob("*.sql")):
             yield path.name
-            yield path.read_text()
+            yield path.read_text(encoding="utf-8")
 
 
 @cache
 def head_revision() -> str:
     """Return the newest schema revision: the number that the last migration begins with."""
+    return max(known_revisions())
+
+
+@cache
+def known_revisions() -> frozenset[str]:
+    """Return all schema revisions that there have been."""
     versions = resource_directory("migrations") / "versions"
-    return max(_revision(path) for path in versions.glob("[0-9]*_*.py"))
+    return frozenset(_revision(path) for path in versions.glob("[0-9]*_*.py"))
 
 
 def _revision(path: Path) -> str:
@@ -129,14 +140,14 @@ def drop(con: duckdb.DuckDBPyConnection) -> None:
         "SELECT schema_name, view_name FROM duckdb_views() WHERE NOT internal "
         "AND database_name = current_database() AND schema_name IN ('main', 'derive')"
     ).fetchall():
-        con.execute(f'DROP VIEW "{schema}"."{name}"')
+        con.execute(f"DROP VIEW {_quoted(schema)}.{_quoted(name)}")
     for schema, name, kind in con.execute(
         "SELECT DISTINCT schema_name, function_name, function_type FROM duckdb_functions() "
         "WHERE NOT internal AND database_name = current_database() "
         "AND function_type IN ('macro', 'table_macro')"
     ).fetchall():
         table = "TABLE " if kind == "table_macro" else ""
-        con.execute(f'DROP MACRO {table}"{schema}"."{name}"')
+        con.execute(f"DROP MACRO {table}{_quoted(schema)}.{_quoted(name)}")
 
 
 def _comment(con: duckdb.DuckDBPyConnection, header: Header) -> None:
@@ -149,6 +160,10 @@ def _comment(con: duckdb.DuckDBPyConnection, header: Header) -> None:
             f'COMMENT ON COLUMN {header.name}."{column.name}" IS '
             f"{_literal(column.description + unit)}"
         )
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
 
 
 def _literal(text: str) -> str:

@@ -17,16 +17,18 @@ from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migrate, objects
 from msgflow.db.check import run_checks
-from msgflow.db.connection import attach, open_memory
+from msgflow.db.connection import attach, open_memory, shut_in
 from msgflow.db.derive import derive
+from msgflow.db.spill import most_spilled
 from msgflow.db.store import delete, store
+from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
 from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.memory import Memory
-from msgflow.ingest.workspace import workspace
 from msgflow.links import declare_links, read_links
+from msgflow.query.failure import database_errors, in_words
 from msgflow.query.interrupt import interruptible, noted_interrupts
 from msgflow.query.window import is_run_name
 from msgflow.trace import archive
@@ -78,6 +80,7 @@ class IngestReport:
         diagnostics: what is worth knowing about the input.
         event_count: events read.
         stage_seconds: wall time by stage [s], in the order of the stages.
+        warnings: what went wrong after the run was stored, for people.
     """
 
     run_id: int
@@ -85,6 +88,7 @@ class IngestReport:
     diagnostics: tuple[Diagnostic, ...]
     event_count: int
     stage_seconds: Mapping[str, float]
+    warnings: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -146,7 +150,7 @@ def ingest(
     if database.is_symlink():
         database = Path(os.path.realpath(database))
     keep_freed_memory()
-    with noted_interrupts() as interrupts:
+    with noted_interrupts() as interrupts, database_errors(database):
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
         with trace_package.open(paths, reader=reader, strict=strict) as traces:
@@ -154,18 +158,22 @@ def ingest(
             hostnames = _hostnames(traces.traces, hosts or {})
             migrate.require_ingestable(database)
             with (
+                contextlib.nullcontext() if database.exists() else creating(database),
                 workspace(database) as directory,
                 _target(database, directory) as target,
                 contextlib.closing(open_memory()) as con,
             ):
                 memory = Memory(con, memory_limit)
                 con.execute("SET temp_directory = ?", [str(directory)])
+                con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(database)}B"])
                 con.execute("SET preserve_insertion_order = false")
                 if not target.is_new:
                     attach(con, target.path)
                     if name is not None and not replace:
                         _require_free_name(con, name)
                 staging.attach(con, directory / "raw.duckdb")
+                # Its settings stay open, for more memory, which nothing but our own SQL can reach.
+                shut_in(con, beside=[directory, *([keep_staging] if keep_staging else [])])
                 watch.enter("reading the traces")
                 with memory.loading(), staging.writing(con):
                     loaded = load_traces(
@@ -196,8 +204,26 @@ def ingest(
                 )
                 watch.enter("closing the database")
                 staging.leave(con)
-                con.execute("CHECKPOINT")
-        return IngestReport(*run, sum(loaded.event_counts.values()), watch.finish())
+                warnings = _finished(con, database, target)
+        events = sum(loaded.event_counts.values())
+        return IngestReport(*run, events, watch.finish(), warnings)
+
+
+def _finished(con: duckdb.DuckDBPyConnection, database: Path, target: _Target) -> tuple[str, ...]:
+    """Move what the log of the database holds into the file, and return what went wrong there."""
+    try:
+        con.execute("CHECKPOINT")
+    except duckdb.Error as error:
+        words = in_words(error, database)
+        if target.is_new or words is None:
+            raise
+        # The run is in the log, which the next one to open the database reads.
+        log = database.with_name(f"{database.name}.wal").name
+        return (
+            f"the run is stored, but in {log} as yet, which has to stay beside the database until"
+            f" a later command has moved it into the file: {words.message}",
+        )
+    return ()
 
 
 def _write(
@@ -215,7 +241,7 @@ def _write(
     with staging.writing(con), _created_meanwhile(target):
         model.build(con, memory, keep=keep_staging is not None)
     if target.is_new:
-        attach(con, target.path)
+        attach(con, target.path, is_new=True)
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 import duckdb
 
 from msgflow.errors import DatabaseError
+from msgflow.query.failure import is_of_the_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -59,6 +60,8 @@ class Memory:
             try:
                 return work()
             except duckdb.OutOfMemoryException as error:
+                if is_of_the_file(error):  # nor can more be spilled
+                    raise
                 if self._is_fixed or not self._double():
                     raise DatabaseError(
                         f"the traces need more memory than {self._limit}",

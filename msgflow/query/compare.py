@@ -12,6 +12,7 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
+from msgflow.query.failure import is_of_the_file
 from msgflow.query.header import Header, read
 from msgflow.query.result import QueryResult
 from msgflow.query.run import CUT_COLUMN, first_line, read_runs
@@ -249,6 +250,8 @@ def compare(
     try:
         table = connection.sql(_SQL, params=parameters).to_arrow_table()
     except duckdb.Error as error:
+        if is_of_the_file(error):
+            raise
         raise QueryError(f"the comparison failed: {first_line(error)}") from error
     result = QueryResult(table, _header(), (first, second))
     result.notes.extend(_one_sided(result, what, first, second))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
+from msgflow.query.failure import is_of_the_file
 from msgflow.query.run import first_line, read_runs
 from msgflow.query.topics import require_topic
 from msgflow.query.window import MINIMUM_NS, Run, choose_runs, format_epoch, time_point
@@ -167,6 +168,8 @@ def read_steps(
     try:
         return connection.sql(_STEPS, params=bindings).to_arrow_table()
     except duckdb.Error as error:
+        if is_of_the_file(error):
+            raise
         raise QueryError(f"the flow cannot be read: {first_line(error)}") from error
 
 

@@ -9,6 +9,7 @@ import duckdb
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import nearest
 from msgflow.query.clocks import clock_notes
+from msgflow.query.failure import is_of_the_file
 from msgflow.query.identities import require_identities
 from msgflow.query.result import QueryResult
 from msgflow.query.topics import require_topics
@@ -85,6 +86,8 @@ def run_query(
     try:
         table = connection.sql(header.body, params=bindings).to_arrow_table()
     except duckdb.Error as error:
+        if is_of_the_file(error):
+            raise
         raise QueryError(f"the query failed: {first_line(error)} — {header.name}") from error
     notes = [] if runs else ["the database holds no run yet"]
     if not internal and INTERNAL_COLUMN in table.column_names:

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from ingested import contents
 
+from msgflow.db.workspace import workspace
 from msgflow.ingest import ingest, load
 from msgflow.ingest import ingest as ingest_function
-from msgflow.ingest.workspace import workspace
 
 
 class Interruption(BaseException):
@@ -151,7 +151,7 @@ def test_without_file_locks_everything_works_but_cleaning(
     new_database: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on Windows: nobody can tell whether a workspace is still in use, so it stays."""
-    monkeypatch.setattr("msgflow.ingest.workspace.fcntl", None)
+    monkeypatch.setattr("msgflow.db.workspace.fcntl", None)
     other = new_database.with_name(".msgflow-ingest-other")
     other.mkdir()
     other.with_suffix(".lock").touch()

@@ -1,4 +1,4 @@
-"""A directory beside the database for what an ingest needs only while it runs."""
+"""A directory beside the database for what a command needs only while it runs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-_PREFIX = ".msgflow-ingest-"
+_PREFIX = ".msgflow-"
 _LOCK = ".lock"
 
 
@@ -27,16 +27,14 @@ _LOCK = ".lock"
 def workspace(beside: Path) -> Iterator[Path]:
     """Yield an empty directory in the directory of `beside`; it is gone afterwards.
 
-    What a killed ingest left behind is removed first: a lock file that nobody holds tells. Where
+    What a killed command left behind is removed first: a lock file that nobody holds tells. Where
     the system has no such locks, what was left stays.
 
     Raises:
         DatabaseError: the directory of the database cannot be written.
     """
     parent = beside.absolute().parent
-    for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}") if fcntl else ():
-        with contextlib.suppress(OSError), _locked(abandoned, wait=False):
-            shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
+    remove_abandoned_workspaces(parent)
     directory = parent / f"{_PREFIX}{uuid.uuid4().hex}"
     with contextlib.ExitStack() as stack:
         try:
@@ -44,12 +42,47 @@ def workspace(beside: Path) -> Iterator[Path]:
                 stack.enter_context(_locked(directory.with_suffix(_LOCK), wait=True))
             directory.mkdir()
         except OSError as error:
-            raise DatabaseError(
-                f"cannot write — {parent}: {error.strerror}",
-                "give a database in a directory that exists and can be written with --db",
-            ) from error
+            raise _cannot_write(parent, error) from error
         stack.callback(shutil.rmtree, directory, ignore_errors=True)
         yield directory
+
+
+def remove_abandoned_workspaces(parent: Path) -> None:
+    """Remove from a directory what killed commands have left there."""
+    for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}") if fcntl else ():
+        with contextlib.suppress(OSError), _locked(abandoned, wait=False):
+            shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
+
+
+@contextlib.contextmanager
+def creating(database: Path) -> Iterator[None]:
+    """Be the only one to create `database`, as far as the system has file locks.
+
+    Raises:
+        DatabaseError: another process is at it, or the directory cannot be written.
+    """
+    if not fcntl:
+        yield
+        return
+    path = database.absolute().with_name(f"{_PREFIX}{database.name}{_LOCK}")
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(_locked(path, wait=False))
+        except BlockingIOError as error:
+            raise DatabaseError(
+                f"another process is creating the database — {database}",
+                "wait for it, or give another file with --db",
+            ) from error
+        except OSError as error:
+            raise _cannot_write(path.parent, error) from error
+        yield
+
+
+def _cannot_write(parent: Path, error: OSError) -> DatabaseError:
+    return DatabaseError(
+        f"cannot write — {parent}: {error.strerror}",
+        "give a database in a directory that exists and can be written with --db",
+    )
 
 
 @contextlib.contextmanager

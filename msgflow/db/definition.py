@@ -1,0 +1,162 @@
+"""What a database says its tables, views and macros are, compared with what they have to be.
+
+A file from elsewhere can hold any SQL under our names, which would run with the first query. DuckDB
+renders definitions its own way, and what it read from a file not as what was just created: hence
+they are compared with those of a new file. To make one takes a third of a second, so what came out
+is kept in the user's cache, by the version of DuckDB and the files of `schema/`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import shlex
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.db import objects
+from msgflow.errors import DatabaseError
+from msgflow.resources import resource_directory
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+# By kind and name: the SHA-256 of the definition.
+Definitions = dict[str, str]
+
+_MOST_CACHED = 16
+
+# Keys are left out: where they stand in the statement differs, and none has SQL in it.
+_RENDERED = r"""
+SELECT 'view ' || schema_name || '.' || view_name AS name, sha256(sql) AS hash
+FROM duckdb_views()
+WHERE NOT internal AND database_name = current_database() AND schema_name IN ('main', 'derive')
+UNION ALL
+SELECT
+    'macro ' || schema_name || '.' || function_name,
+    sha256(string_agg(
+        concat_ws(chr(0), function_type, parameters::VARCHAR, macro_definition), chr(0)
+        ORDER BY function_type, parameters::VARCHAR, macro_definition
+    ))
+FROM duckdb_functions()
+WHERE NOT internal AND database_name = current_database()
+    AND schema_name IN ('store', 'main', 'derive')
+GROUP BY schema_name, function_name
+UNION ALL
+SELECT
+    'table ' || schema_name || '.' || table_name,
+    sha256(regexp_replace(sql, ',? PRIMARY KEY(\([^)]*\))?', '', 'g'))
+FROM duckdb_tables()
+WHERE database_name = current_database() AND schema_name = 'store'
+    AND table_name <> 'alembic_version'
+UNION ALL
+SELECT 'trigger ' || schema_name || '.' || trigger_name, sha256(coalesce(sql, ''))
+FROM duckdb_triggers()
+WHERE database_name = current_database()
+UNION ALL
+SELECT 'type ' || schema_name || '.' || type_name, ''
+FROM duckdb_types()
+WHERE NOT internal AND database_name = current_database()
+    AND schema_name IN ('store', 'main', 'derive')
+"""
+
+
+def rendered(con: duckdb.DuckDBPyConnection) -> Definitions:
+    """Return the definitions in the current database, without reading any of its tables."""
+    return dict(con.execute(_RENDERED).fetchall())
+
+
+def require_ours(con: duckdb.DuckDBPyConnection, path: Path) -> None:
+    """Raise unless tables, views and macros are those of this msgflow.
+
+    Raises:
+        DatabaseError: one is missing, changed, or not ours.
+    """
+    found, wanted = rendered(con), dict(expected())
+    if found == wanted:
+        return
+    names = sorted(name for name in found | wanted if found.get(name) != wanted.get(name))
+    name = min(names, key=lambda name: name.startswith(("view", "macro")))
+    how = (
+        "lacks a" if name not in found else "has a foreign" if name not in wanted else "has another"
+    )
+    # Views and macros are made anew by an upgrade, the rest is not.
+    can_upgrade = name.startswith(("view", "macro"))
+    raise DatabaseError(
+        f"the database is not as msgflow makes it: it {how} {name} — {path}",
+        f"msgflow db upgrade --db {shlex.quote(str(path))} makes views and macros anew"
+        if can_upgrade
+        else "ingest the traces into a new file",
+    )
+
+
+def remember(con: duckdb.DuckDBPyConnection) -> None:
+    """Keep the definitions of a database that this process has just made, and opened again."""
+    if _cached() is None:
+        _keep(rendered(con))
+
+
+@cache
+def expected() -> Mapping[str, str]:
+    """Return the definitions that a database of this msgflow has."""
+    found = _cached()
+    if found is None:
+        found = _made()
+        _keep(found)
+    return found
+
+
+def _made() -> Definitions:
+    from msgflow.db.connection import STORAGE_VERSION  # which needs this module
+
+    with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
+        path = Path(directory) / "new.duckdb"
+        config: dict[str, str | bool | int | float | list[str]] = {
+            "storage_compatibility_version": STORAGE_VERSION
+        }
+        with duckdb.connect(str(path), config=config) as con:
+            con.execute("CREATE SCHEMA store; CREATE SCHEMA derive")
+            con.execute(_tables())
+            for header in objects.views():
+                con.execute(objects.create_statement(header))
+        with duckdb.connect(str(path), read_only=True) as con:
+            return rendered(con)
+
+
+def _tables() -> str:
+    return (resource_directory("schema") / "tables.sql").read_text(encoding="utf-8")
+
+
+def _cache_file() -> Path:
+    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
+    key = hashlib.sha256(f"{objects.definition_hash()}\0{_tables()}\0{_RENDERED}".encode())
+    return root / "msgflow" / f"definitions-{duckdb.__version__}-{key.hexdigest()[:32]}.json"
+
+
+def _cached() -> Definitions | None:
+    try:
+        found = json.loads(_cache_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError, RuntimeError):  # the last: there is no home directory
+        return None
+    is_whole = isinstance(found, dict) and all(isinstance(hash_, str) for hash_ in found.values())
+    return found if is_whole else None
+
+
+def _keep(definitions: Definitions) -> None:
+    # Only a convenience: where nothing can be written, it is made again next time.
+    with contextlib.suppress(OSError, RuntimeError):
+        path = _cache_file()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        aside = path.with_suffix(f".{os.getpid()}.part")
+        aside.write_text(json.dumps(definitions), encoding="utf-8")
+        aside.replace(path)
+        kept = sorted(path.parent.glob("definitions-*"), key=lambda old: old.stat().st_mtime)
+        for old in kept[:-_MOST_CACHED]:
+            old.unlink()

@@ -1,0 +1,49 @@
+"""Temporary files that say whose they are, so that those of a killed process can be removed."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+from functools import cache
+from pathlib import Path
+
+# Where processes are known by number: until the next start of the machine, in this container.
+_NAMESPACE = ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid")
+_UNKNOWN = "0" * 12
+_MARK = re.compile(r"([0-9a-f]{12})-(\d+)-(\d+)")
+
+
+def mark() -> str:
+    """Return what this process puts into the names of its temporary files."""
+    return f"{_place()}-{os.getpid()}-{_start(os.getpid())}"
+
+
+def is_abandoned(text: str) -> bool:
+    """Tell whether the process with this mark certainly has ended.
+
+    Of one on another machine, in another container, or before a restart nobody can tell.
+    """
+    found = _MARK.fullmatch(text)
+    if found is None or found[1] != _place() or _place() == _UNKNOWN:
+        return False
+    return _start(int(found[2])) != int(found[3])
+
+
+@cache
+def _place() -> str:
+    try:
+        boot = Path(_NAMESPACE[0]).read_text(encoding="ascii")
+        space = os.readlink(_NAMESPACE[1])
+    except OSError:  # a system without /proc
+        return _UNKNOWN
+    return hashlib.sha256(f"{boot}{space}".encode()).hexdigest()[:12]
+
+
+def _start(pid: int) -> int:
+    """Return when a process started, in ticks since the machine did; 0 if there is none."""
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        status = Path(f"/proc/{pid}/stat").read_bytes()
+        return int(status.rpartition(b")")[2].split()[19])
+    return 0

@@ -1,0 +1,102 @@
+"""What DuckDB says when a file or its place is at fault, in our words."""
+
+from __future__ import annotations
+
+import errno
+import re
+import shutil
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.errors import DatabaseError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+_FULL = re.compile(r"no space left|disk quota|max_temp_directory_size|not enough space", re.I)
+_REFUSED = re.compile(r"permission denied|read-only file system|operation not permitted", re.I)
+# Base class of all: what DuckDB finds in blocks whose checksum is wrong has no class of its own.
+_DAMAGE = re.compile(
+    r"corrupt|checksum|deserializ|invalid unicode|could not read|failed to load metadata",
+    re.I,
+)
+_DAMAGED_KINDS = (duckdb.InternalException, duckdb.FatalException, duckdb.SerializationException)
+
+
+def is_of_the_file(error: BaseException) -> bool:
+    """Tell whether a database file or its place is at fault, rather than a statement."""
+    return _kind(error) is not None
+
+
+def in_words(error: BaseException, path: Path) -> DatabaseError | None:
+    """Return an error of the database at `path` in our words, None if a statement is at fault."""
+    kind = _kind(error)
+    if kind == "full":
+        return DatabaseError(
+            f"no space left on the disk of the database ({_free(path)} free) — {path}",
+            "free some, or put the database on another disk with --db; it is as it was before",
+        )
+    if kind == "refused":
+        return DatabaseError(
+            f"cannot write beside the database — {path}",
+            "check the permissions of its directory, or copy the database elsewhere",
+        )
+    if kind == "damaged":
+        return DatabaseError(
+            f"the database is damaged: {_first_line(error)} — {path}",
+            "restore the file from a copy, or ingest the traces into a new one",
+        )
+    return None
+
+
+@contextmanager
+def database_errors(path: Path) -> Iterator[None]:
+    """Raise what the file at `path`, or its place, is to blame for as a DatabaseError."""
+    try:
+        yield
+    except (duckdb.Error, OSError, UnicodeDecodeError) as error:
+        words = in_words(error, path)
+        if words is None:
+            raise
+        raise words from error
+
+
+def _kind(error: BaseException) -> str | None:
+    if isinstance(error, OSError):
+        # Others name their file, or are about the traces.
+        return "full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else None
+    if isinstance(error, UnicodeDecodeError):
+        return "damaged"
+    if not isinstance(error, duckdb.Error) or isinstance(error, duckdb.InterruptException):
+        return None
+    text = str(error)
+    is_memory = isinstance(error, duckdb.OutOfMemoryException)
+    if _FULL.search(text) and (
+        is_memory or isinstance(error, duckdb.IOException | duckdb.FatalException)
+    ):
+        return "full"
+    if isinstance(error, duckdb.IOException) and _REFUSED.search(text):
+        return "refused"
+    if isinstance(error, _DAMAGED_KINDS):
+        return "damaged"
+    if (type(error) is duckdb.Error or isinstance(error, duckdb.IOException)) and _DAMAGE.search(
+        text
+    ):
+        return "damaged"
+    return None
+
+
+def _first_line(error: BaseException) -> str:
+    line = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return line.removeprefix("INTERNAL Error: ").removeprefix("FATAL Error: ")[:200].rstrip(".")
+
+
+def _free(path: Path) -> str:
+    try:
+        free = shutil.disk_usage(path.absolute().parent).free
+    except OSError:
+        return "little"
+    return f"{free / 1_000_000:,.0f} MB"
