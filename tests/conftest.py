@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import duckdb
 import pytest
 
 from msgflow.db.migrate import create
+from msgflow.trace import bt2_library
 
 pytest_plugins = ["golden"]
 
@@ -25,6 +27,18 @@ def _surroundings(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         yield
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--without-bt2", action="store_true", help="as if bt2 were not installed")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--without-bt2"):
+        # An import of it fails then as where it is missing, and no other place is searched.
+        sys.modules["bt2"] = None  # type: ignore[assignment]
+        bt2_library.ROOTS = ()
+        bt2_library.PREFIXES = ()
 
 
 @pytest.fixture(scope="session")

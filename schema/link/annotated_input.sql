@@ -3,50 +3,81 @@
 -- description: The message that each cache held when an output of an annotation was published: the
 --     latest run of the input's callback (by effective end) that ended at or before the cut, or
 --     nested inside the publishing run and before the publication. The input whose own run
---     publishes is none of these. Runs that were under way at the cut, on other threads, could
---     have been it as well. Nothing is linked across a gap in the record of either thread.
+--     publishes is none of these. When a node reads its caches is not in the trace, so every other
+--     run that began before the publication, and ended after the one there at the cut began, could
+--     have been it as well. Where none was there at the cut, the last of those counts, and nothing
+--     is one more candidate. Nothing is linked across a gap in the record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 -- param: wanted_kind VARCHAR  Kind of the annotations
--- needs: derive.annotated_publication, derive.annotated_run, store.annotation_input,
---     store.callback_instance, store.thread_break, derive.exposed_trace,
---     derive.recording_gap
+-- needs: derive.annotated_publication, derive.annotated_run, derive.partial_sync_firing,
+--     store.annotation, store.annotation_input, store.callback_instance, store.thread_break,
+--     derive.exposed_trace, derive.recording_gap
 CREATE OR REPLACE MACRO derive.annotated_input(only_run, wanted_kind) AS TABLE
 WITH nesting AS (
     SELECT DISTINCT parent_id
     FROM store.callback_instance
     WHERE run_id = only_run AND parent_id IS NOT NULL
 ),
+-- None where caches are never emptied.
+firing AS MATERIALIZED (
+    SELECT annotation_id, callback_instance_id, first_event_id, emptied_event_id, kept_event_id
+    FROM derive.partial_sync_firing(only_run)
+    WHERE wanted_kind = 'partial_sync'
+),
+-- All that a firing publishes is made of the same messages, but for those that come meanwhile in
+-- runs nested in it.
 demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.publication_id, b.callback_instance_id AS publishing_id,
         b.trace_id, b.thread_id, b.start_ns, b.start_event_id, b.cut_event_id,
-        i.subscription_id
+        i.subscription_id,
+        CASE
+            WHEN n.parent_id IS NULL THEN coalesce(f.first_event_id, b.start_event_id)
+            ELSE b.start_event_id
+        END AS read_event_id,
+        coalesce(f.emptied_event_id, 0) AS emptied_event_id,
+        coalesce(f.kept_event_id, 0) AS kept_event_id
     FROM derive.annotated_publication(only_run) AS b
     JOIN store.annotation_input AS i ON b.annotation_id = i.annotation_id
+    LEFT JOIN firing AS f
+        ON b.annotation_id = f.annotation_id AND b.callback_instance_id = f.callback_instance_id
+    LEFT JOIN nesting AS n ON b.callback_instance_id = n.parent_id
     WHERE b.kind = wanted_kind AND b.subscription_id IS DISTINCT FROM i.subscription_id
+        AND (wanted_kind = 'periodic_async' OR f.annotation_id IS NOT NULL)
 ),
+-- The message of a run that fires is used by that firing.
 run AS MATERIALIZED (
     SELECT
-        run_id, subscription_id, callback_instance_id, thread_id, start_event_id,
-        effective_end_event_id
-    FROM derive.annotated_run(only_run)
+        i.annotation_id, r.subscription_id, r.callback_instance_id, r.thread_id, r.start_event_id,
+        r.effective_end_event_id
+    FROM store.annotation AS a
+    JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
+    JOIN derive.annotated_run(only_run) AS r ON i.subscription_id = r.subscription_id
+    ANTI JOIN firing AS f
+        ON a.annotation_id = f.annotation_id AND r.callback_instance_id = f.callback_instance_id
+    WHERE a.run_id = only_run AND a.kind = wanted_kind
 ),
 -- Runs that end together (in a gap) are one moment: the last to begin stands for it.
 ended AS (
     SELECT
-        run_id, subscription_id, effective_end_event_id,
-        arg_max(callback_instance_id, start_event_id) AS callback_instance_id
+        annotation_id, subscription_id, effective_end_event_id,
+        arg_max(callback_instance_id, start_event_id) AS callback_instance_id,
+        max(start_event_id) AS start_event_id,
+        sum(count(*)) OVER (
+            PARTITION BY annotation_id, subscription_id
+            ORDER BY effective_end_event_id ROWS UNBOUNDED PRECEDING
+        ) AS run_count
     FROM run
-    GROUP BY run_id, subscription_id, effective_end_event_id
+    GROUP BY annotation_id, subscription_id, effective_end_event_id
 ),
 ended_on_thread AS (
     SELECT
-        run_id, thread_id, subscription_id, effective_end_event_id,
+        annotation_id, thread_id, subscription_id, effective_end_event_id,
         arg_max(callback_instance_id, start_event_id) AS callback_instance_id,
         max(start_event_id) AS start_event_id
     FROM run
-    GROUP BY run_id, thread_id, subscription_id, effective_end_event_id
+    GROUP BY annotation_id, thread_id, subscription_id, effective_end_event_id
 ),
 nested AS (
     SELECT d.annotation_id, d.publication_id, d.subscription_id, e.callback_instance_id
@@ -57,89 +88,126 @@ nested AS (
         )
     ) AS d
     ASOF JOIN ended_on_thread AS e
-        ON d.run_id = e.run_id
+        ON d.annotation_id = e.annotation_id
         AND d.thread_id = e.thread_id
         AND d.subscription_id = e.subscription_id
-        AND d.start_event_id >= e.effective_end_event_id
+        AND d.read_event_id >= e.effective_end_event_id
     WHERE e.start_event_id > d.cut_event_id
 ),
 -- Publications of one run share their cut.
-cut AS MATERIALIZED (
-    SELECT DISTINCT run_id, subscription_id, thread_id, cut_event_id FROM demand
+cut AS (
+    SELECT DISTINCT
+        annotation_id, subscription_id, thread_id, cut_event_id, emptied_event_id
+    FROM demand
 ),
--- Where all runs of an input are on the publishing thread, none is under way at the cut unless
--- others are nested in it.
+at_cut AS MATERIALIZED (
+    SELECT
+        c.annotation_id, c.subscription_id, c.thread_id, c.cut_event_id, e.callback_instance_id,
+        e.start_event_id
+    FROM cut AS c
+    ASOF JOIN ended AS e
+        ON c.annotation_id = e.annotation_id
+        AND c.subscription_id = e.subscription_id
+        AND c.cut_event_id >= e.effective_end_event_id
+    WHERE e.effective_end_event_id > c.emptied_event_id
+),
+-- Where all runs of an input are on the publishing thread, one after the other, no other could
+-- have been the one that was there at the cut.
 alone AS (
-    SELECT run_id, subscription_id, min(thread_id) AS thread_id
+    SELECT run.annotation_id, run.subscription_id, min(run.thread_id) AS thread_id
     FROM run
-    GROUP BY run_id, subscription_id
-    HAVING min(thread_id) = max(thread_id)
+    JOIN store.callback_instance AS i
+        ON run.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
+    GROUP BY run.annotation_id, run.subscription_id
+    HAVING min(run.thread_id) = max(run.thread_id)
         AND NOT bool_or(
-            callback_instance_id IN (
+            i.parent_id IS NOT NULL
+            OR run.callback_instance_id IN (
                 SELECT parent_id FROM nesting
             )
         )
 ),
-shared_cut AS MATERIALIZED (
-    SELECT c.run_id, c.subscription_id, c.thread_id, c.cut_event_id
-    FROM cut AS c
-    ANTI JOIN alone AS a
-        ON c.run_id = a.run_id
-        AND c.subscription_id = a.subscription_id
-        AND c.thread_id = a.thread_id
-),
-step AS (
-    SELECT run_id, subscription_id, start_event_id AS event_id, 1 AS change
-    FROM run
-    WHERE subscription_id IN (SELECT subscription_id FROM shared_cut)
-    UNION ALL
-    SELECT run_id, subscription_id, effective_end_event_id, -1
-    FROM run
-    WHERE subscription_id IN (SELECT subscription_id FROM shared_cut)
-),
-under_way AS (
+there AS MATERIALIZED (
     SELECT
-        run_id, subscription_id, event_id,
-        sum(sum(change)) OVER (
-            PARTITION BY run_id, subscription_id ORDER BY event_id ROWS UNBOUNDED PRECEDING
-        ) AS run_count
-    FROM step
-    GROUP BY run_id, subscription_id, event_id
+        d.*, c.callback_instance_id, c.start_event_id AS input_start_event_id,
+        a.thread_id IS NOT NULL AND c.callback_instance_id IS NOT NULL AS is_certain
+    FROM demand AS d
+    LEFT JOIN at_cut AS c
+        ON d.annotation_id = c.annotation_id
+        AND d.subscription_id = c.subscription_id
+        AND d.thread_id = c.thread_id
+        AND d.cut_event_id = c.cut_event_id
+    LEFT JOIN alone AS a
+        ON d.annotation_id = a.annotation_id
+        AND d.subscription_id = a.subscription_id
+        AND d.thread_id = a.thread_id
 ),
-under_way_at_cut AS (
-    SELECT c.subscription_id, c.thread_id, c.cut_event_id, u.run_count
-    FROM shared_cut AS c
-    ASOF JOIN under_way AS u
-        ON c.run_id = u.run_id
-        AND c.subscription_id = u.subscription_id
-        AND c.cut_event_id >= u.event_id
-    WHERE u.run_count > 0
-),
-at_cut AS (
+-- Runs in the order in which they began, with the one that ends last of all so far.
+begun AS (
     SELECT
-        c.subscription_id, c.thread_id, c.cut_event_id, e.callback_instance_id,
-        coalesce(u.run_count, 0) AS run_count
-    FROM cut AS c
+        annotation_id, subscription_id, start_event_id,
+        row_number() OVER so_far AS run_count,
+        arg_max(callback_instance_id, effective_end_event_id) OVER so_far AS last_id,
+        max(effective_end_event_id) OVER so_far AS last_event_id
+    FROM run
+    WHERE (annotation_id, subscription_id) IN (
+        SELECT (annotation_id, subscription_id) FROM there WHERE NOT is_certain
+    )
+    WINDOW so_far AS (
+        PARTITION BY annotation_id, subscription_id
+        ORDER BY start_event_id ROWS UNBOUNDED PRECEDING
+    )
+),
+-- The last to end before the publication, else one that was under way then.
+possible AS (
+    SELECT
+        p.annotation_id, p.publication_id, p.subscription_id,
+        CASE
+            WHEN e.effective_end_event_id > p.since_event_id THEN e.callback_instance_id
+            ELSE p.last_id
+        END AS callback_instance_id,
+        p.since_event_id,
+        p.begun_count
+    FROM (
+        SELECT
+            t.annotation_id, t.publication_id, t.subscription_id, t.read_event_id,
+            greatest(t.input_start_event_id, t.kept_event_id) AS since_event_id,
+            b.run_count AS begun_count,
+            b.last_id
+        FROM (SELECT * FROM there WHERE NOT is_certain) AS t
+        ASOF JOIN begun AS b
+            ON t.annotation_id = b.annotation_id
+            AND t.subscription_id = b.subscription_id
+            AND t.read_event_id > b.start_event_id
+        WHERE b.last_event_id > greatest(t.input_start_event_id, t.kept_event_id)
+    ) AS p
     ASOF LEFT JOIN ended AS e
-        ON c.run_id = e.run_id
-        AND c.subscription_id = e.subscription_id
-        AND c.cut_event_id >= e.effective_end_event_id
-    LEFT JOIN under_way_at_cut AS u
-        ON c.subscription_id = u.subscription_id
-        AND c.thread_id = u.thread_id
-        AND c.cut_event_id = u.cut_event_id
+        ON p.annotation_id = e.annotation_id
+        AND p.subscription_id = e.subscription_id
+        AND p.read_event_id >= e.effective_end_event_id
+),
+counted AS (
+    SELECT
+        p.annotation_id, p.publication_id, p.subscription_id, p.callback_instance_id,
+        p.begun_count - coalesce(e.run_count, 0) AS run_count
+    FROM possible AS p
+    ASOF LEFT JOIN ended AS e
+        ON p.annotation_id = e.annotation_id
+        AND p.subscription_id = e.subscription_id
+        AND p.since_event_id >= e.effective_end_event_id
 ),
 cached AS (
     SELECT
         d.run_id, d.annotation_id, d.publication_id, d.publishing_id, d.subscription_id,
         d.trace_id, d.thread_id, d.start_ns, d.start_event_id,
-        coalesce(n.callback_instance_id, c.callback_instance_id) AS callback_instance_id,
-        1 + c.run_count AS candidate_count
-    FROM demand AS d
-    JOIN at_cut AS c
-        ON d.subscription_id = c.subscription_id
-        AND d.thread_id = c.thread_id
-        AND d.cut_event_id = c.cut_event_id
+        coalesce(n.callback_instance_id, d.callback_instance_id, p.callback_instance_id)
+            AS callback_instance_id,
+        coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT AS candidate_count
+    FROM there AS d
+    LEFT JOIN counted AS p
+        ON d.annotation_id = p.annotation_id
+        AND d.publication_id = p.publication_id
+        AND d.subscription_id = p.subscription_id
     LEFT JOIN nested AS n
         ON d.annotation_id = n.annotation_id
         AND d.publication_id = n.publication_id
@@ -153,8 +221,7 @@ found AS MATERIALIZED (
         i.trace_id AS input_trace_id,
         i.thread_id AS input_thread_id,
         i.start_ns AS input_start_ns,
-        i.start_event_id AS input_start_event_id,
-        i.effective_end_event_id AS input_end_event_id
+        i.start_event_id AS input_start_event_id
     FROM cached AS c
     JOIN store.callback_instance AS i
         ON c.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
@@ -205,7 +272,6 @@ SELECT
     f.publishing_id,
     f.subscription_id,
     f.callback_instance_id,
-    f.input_end_event_id,
     f.candidate_count::BIGINT AS candidate_count,
     x.publication_id IS NOT NULL AS is_loss_affected
 FROM found AS f

@@ -1,16 +1,17 @@
 -- name: derive.partial_sync_firing
 -- kind: macro
 -- description: Firings of partially synchronous annotations: runs of a callback of an input that
---     publish on an output. All publications of a run are one firing; it empties the caches. What
---     was published last by another firing, before it published first, is when they were emptied
---     before.
+--     publish on an output. All publications of a run are one firing; it empties the caches, at
+--     some moment from the start of the run to its first publication. What was published last by
+--     another firing, before it published first, is when they were emptied before; from the start of
+--     the last firing that had published when this one began, something may have been kept.
 -- grain: one row per annotation and run of a callback of one of its inputs that fires it
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.annotated_publication, store.annotation_input
 CREATE OR REPLACE MACRO derive.partial_sync_firing(only_run) AS TABLE
-WITH fired AS (
+WITH published AS (
     SELECT
-        b.run_id, b.annotation_id, b.callback_instance_id, b.start_event_id,
+        b.annotation_id, b.callback_instance_id, b.cut_event_id, b.start_event_id,
         lag(b.start_event_id) OVER (
             PARTITION BY b.annotation_id ORDER BY b.start_event_id
         ) AS previous_event_id
@@ -18,9 +19,25 @@ WITH fired AS (
     JOIN store.annotation_input AS i
         ON b.annotation_id = i.annotation_id AND b.subscription_id = i.subscription_id
     WHERE b.kind = 'partial_sync'
+),
+fired AS (
+    SELECT
+        annotation_id, callback_instance_id, cut_event_id,
+        min(start_event_id) AS first_event_id,
+        arg_min_null(previous_event_id, start_event_id) AS emptied_event_id
+    FROM published
+    GROUP BY annotation_id, callback_instance_id, cut_event_id
+),
+earlier AS (
+    SELECT
+        annotation_id, first_event_id,
+        max(cut_event_id) OVER (
+            PARTITION BY annotation_id ORDER BY first_event_id ROWS UNBOUNDED PRECEDING
+        ) AS kept_event_id
+    FROM fired
 )
 SELECT
-    run_id, annotation_id, callback_instance_id,
-    arg_min_null(previous_event_id, start_event_id) AS emptied_event_id
-FROM fired
-GROUP BY run_id, annotation_id, callback_instance_id
+    f.annotation_id, f.callback_instance_id, f.first_event_id, f.emptied_event_id, e.kept_event_id
+FROM fired AS f
+ASOF LEFT JOIN earlier AS e
+    ON f.annotation_id = e.annotation_id AND f.cut_event_id > e.first_event_id

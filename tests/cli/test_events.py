@@ -18,9 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import Result
 
-from msgflow.errors import TraceError
 from msgflow.sim import simulate
-from msgflow.trace import bt2_library
 
 Msgflow = Callable[..., Result]
 
@@ -28,10 +26,6 @@ Msgflow = Callable[..., Result]
 @pytest.fixture(scope="module")
 def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short trace of a pipeline."""
-    try:
-        bt2_library.load()
-    except TraceError as error:
-        pytest.skip(error.message)
     return simulate("pipeline", tmp_path_factory.mktemp("trace") / "robot", factor=0.1).directory
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
-from ingested import require_reader
 
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
@@ -18,7 +17,6 @@ _LENGTH = 0.01
 @pytest.fixture(scope="session")
 def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A very short trace, below a directory named robot."""
-    require_reader()
     return simulate(
         "pipeline", tmp_path_factory.mktemp("trace") / "robot", factor=_LENGTH
     ).directory
@@ -27,7 +25,6 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def other_trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Another one, of two hosts."""
-    require_reader()
     return simulate(
         "two_hosts", tmp_path_factory.mktemp("trace") / "pair", factor=_LENGTH, seed=1
     ).directory
@@ -68,7 +65,6 @@ def make_trace(tmp_path: Path) -> Any:
         name: str = "trace",
         **content: Any,
     ) -> Path:
-        require_reader()
         made = [
             Event(1_000 + 10 * number, event, values, **_context(content))
             for number, (event, values) in enumerate(events)

@@ -12,11 +12,10 @@ import pyarrow as pa
 import pytest
 
 import msgflow.trace
-from msgflow.errors import TraceError
 from msgflow.ingest import catalogue
 from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
-from msgflow.trace import COMMON_SCHEMA, bt2_library
+from msgflow.trace import COMMON_SCHEMA
 
 TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]", "INTEGER[]"}
 TRACEPOINT_KEYS = {
@@ -149,10 +148,6 @@ def test_the_alias_of_8_0_0() -> None:
 
 def test_every_recorded_event_is_listed_whole(shared_traces: Path) -> None:
     """Every event and every field that the recorded traces declare."""
-    try:
-        bt2_library.load()
-    except TraceError as error:
-        pytest.skip(error.message)
     known = catalogue.load().tracepoints
     with msgflow.trace.open([shared_traces]) as traces:
         assert {name for info in traces.traces for name in info.event_names} <= set(known)

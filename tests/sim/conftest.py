@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import Any
 import duckdb
 import pytest
 
+from msgflow.errors import TraceError
 from msgflow.sim import (
     Host,
     Node,
@@ -27,8 +26,8 @@ from msgflow.sim import (
     scenarios,
     simulate,
 )
+from msgflow.trace import bt2_library
 
-_DISTRIBUTION_PACKAGE = Path("/usr/lib/python3/dist-packages/bt2/__init__.py")
 _LENGTH = 0.15
 # Some things happen only later in a scenario.
 _LENGTHS = {
@@ -76,26 +75,11 @@ class Recording:
 
 @pytest.fixture(scope="session")
 def bt2() -> ModuleType:
-    """babeltrace 2's bindings, also from outside a virtual environment."""
+    """Babeltrace 2's bindings, also from outside a virtual environment."""
     try:
-        return importlib.import_module("bt2")
-    except ImportError:
-        pass
-    if not _DISTRIBUTION_PACKAGE.exists():
-        pytest.skip("bt2 is not installed (Debian package python3-bt2)")
-    spec = importlib.util.spec_from_file_location(
-        "bt2", _DISTRIBUTION_PACKAGE, submodule_search_locations=[str(_DISTRIBUTION_PACKAGE.parent)]
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["bt2"] = module
-    try:
-        spec.loader.exec_module(module)
-    except ImportError as error:
-        del sys.modules["bt2"]
-        pytest.skip(f"bt2 belongs to another Python: {error}")
-    return module
+        return bt2_library.load().bt2
+    except TraceError as error:
+        pytest.skip(error.message)
 
 
 def read_events(bt2: ModuleType, directory: Path) -> tuple[ReadEvent, ...]:

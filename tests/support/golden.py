@@ -25,6 +25,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
+import pyarrow as pa
 import pytest
 
 from msgflow.db.derive import derive
@@ -186,13 +187,21 @@ def insert(
         if not is_nullable and name not in names
     }
     types = {name: data_type for name, data_type, _ in columns}
-    used = [str(name) for name in names] + list(defaults)
-    places = ", ".join(
-        "unhex(?)" if types[name] == "BLOB" else f"CAST(? AS {types[name]})" for name in used
+    given = [str(name) for name in names]
+    values = [
+        f'unhex("{name}")' if types[name] == "BLOB" else f'CAST("{name}" AS {types[name]})'
+        for name in given
+    ] + [f"CAST('{text}' AS {types[name]})" for name, text in defaults.items()]
+    columns_of_text = [[row[place] for row in rows] for place in range(len(given))]
+    table_of_text = pa.table(
+        [pa.array(column, pa.string()) for column in columns_of_text], names=given
     )
-    statement = f"INSERT INTO store.{table} ({', '.join(used)}) VALUES ({places})"
-    for row in rows:
-        connection.execute(statement, [*row, *defaults.values()])
+    connection.register("given", table_of_text)
+    connection.execute(
+        f"INSERT INTO store.{table} ({', '.join(given + list(defaults))}) "
+        f"SELECT {', '.join(values)} FROM given"
+    )
+    connection.unregister("given")
 
 
 def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:

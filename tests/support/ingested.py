@@ -7,12 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
-import pytest
 
 from msgflow.db.connection import connect
-from msgflow.errors import TraceError
 from msgflow.ingest import ingest
-from msgflow.trace import bt2_library
 
 
 @dataclass(frozen=True)
@@ -37,14 +34,6 @@ def ingest_one(traces: Path, path: Path) -> Ingested:
     """Ingest the traces below a path into a new database."""
     ingest([traces], path)
     return Ingested(connect(path, read_only=True))
-
-
-def require_reader() -> None:
-    """Skip the test where traces cannot be read."""
-    try:
-        bt2_library.load()
-    except TraceError as error:
-        pytest.skip(error.message)
 
 
 def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one, require_reader
+from ingested import Ingested, ingest_one
 
 from msgflow.sim import scenarios, simulate
 from msgflow.sim.entity import SECOND
@@ -32,7 +32,6 @@ _WITH_GAPS = ("intra_process", "mixed_intra_process", "python", "layers", "servi
 @pytest.fixture(scope="session")
 def simulations(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Ingested]]:
     """Simulates and ingests a scenario; what is true of it are the views truth_<table>."""
-    require_reader()
     directory = tmp_path_factory.mktemp("simulated")
     with ExitStack() as opened:
 
@@ -68,7 +67,6 @@ def recordings(
     shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Ingested]]:
     """Ingests one of the recorded traces."""
-    require_reader()
     directory = tmp_path_factory.mktemp("recorded")
     with ExitStack() as opened:
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import autoware
 import pytest
-from ingested import require_reader
 
 import msgflow
 from msgflow.sim import Simulation, simulate
@@ -21,7 +20,6 @@ def runs(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Iterator[tuple[msgflow.Database, dict[int, Simulation]]]:
     """One database with both variants, four seconds each, and the simulations by run."""
-    require_reader()
     directory = tmp_path_factory.mktemp("autoware")
     with msgflow.open_db(directory / "autoware.duckdb") as database:
         simulations = {}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import ingest_one, require_reader
+from ingested import ingest_one
 
 from msgflow.sim import executor_thread, simulate
 from msgflow.sim.callbacks import TimerObject
@@ -75,7 +75,6 @@ class Witness:
 def test_inputs_arrive_within_their_bounds(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    require_reader()
     witness = Witness(monkeypatch)
     simulation = simulate(name, tmp_path / name, factor=_LENGTH)
     ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")

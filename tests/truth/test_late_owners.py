@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import ingest_one, require_reader
+from ingested import ingest_one
 
 from msgflow.sim import Recording, simulate
 from msgflow.sim.entity import MILLISECOND
@@ -28,7 +28,6 @@ CASES = {
 
 @pytest.mark.parametrize(("system", "layout"), CASES)
 def test_owners(system: str, layout: str, tmp_path: Path) -> None:
-    require_reader()
     simulation = simulate(
         system,
         tmp_path / "trace",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one, require_reader
+from ingested import Ingested, ingest_one
 from scoring import compare_simulated
 
 from msgflow.sim import layouts, simulate
@@ -47,7 +47,6 @@ OBJECTS = {
 @pytest.fixture(scope="module", params=list(layouts()))
 def named(request, tmp_path_factory):
     """The pipeline in each layout: its name, truth, database file and the database."""
-    require_reader()
     directory: Path = tmp_path_factory.mktemp("layout")
     name: str = request.param
     simulation = simulate("pipeline", directory / "trace", factor=0.03, layout=name)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import Ingested, require_reader
+from ingested import Ingested
 
 from msgflow.db.connection import connect
 from msgflow.db.derive import derive
@@ -55,7 +55,6 @@ def unstamped(
     shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[str], Path]:
     """Ingests a recording without its stamps of publications."""
-    require_reader()
     directory = tmp_path_factory.mktemp("unstamped")
 
     @cache

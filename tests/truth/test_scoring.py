@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import ingest_one, require_reader
+from ingested import ingest_one
 from scoring import compare_recorded, compare_simulated
 
 from msgflow.sim import Recording, simulate
@@ -19,7 +19,6 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "truth.py"
 
 @pytest.fixture(scope="module")
 def simulation(tmp_path_factory):
-    require_reader()
     directory = tmp_path_factory.mktemp("scoring")
     recording = Recording(lost_event_share=0.3)
     return simulate("two_hosts", directory / "trace", factor=0.1, recording=recording)
@@ -43,7 +42,6 @@ def _change(database, sql):
 
 
 def test_quick_comparison_is_faultless():
-    require_reader()
     done = subprocess.run(
         [sys.executable, SCRIPT, "--quick"], capture_output=True, text=True, check=False
     )
@@ -121,7 +119,6 @@ def test_a_row_twice_is_repeated(simulation, database):
 
 @pytest.fixture(scope="module")
 def losses(tmp_path_factory):
-    require_reader()
     directory = tmp_path_factory.mktemp("losses")
     simulation = simulate("losses", directory / "trace", factor=0.3)
     path = directory / "run.duckdb"
@@ -153,7 +150,6 @@ def test_a_wrong_reason_is_found(losses, tmp_path, truth):
 
 @pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_jazzy", "pingpong", "services"])
 def test_recorded_systems(shared_traces, tmp_path, name):
-    require_reader()
     path = tmp_path / "run.duckdb"
     ingest_one(shared_traces / name, path).connection.close()
     scores = compare_recorded(path, shared_traces / name / "truth.jsonl.gz")

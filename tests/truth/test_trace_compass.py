@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import Ingested, require_reader
+from ingested import Ingested
 
 from msgflow.db.connection import connect
 
@@ -54,7 +54,6 @@ def contents(directory: Path) -> dict[str, tuple[str, int]]:
 @pytest.fixture(scope="module")
 def session(shared_traces: Path, tmp_path_factory: pytest.TempPathFactory) -> Session:
     """Ingest and query, with no other option than the format."""
-    require_reader()
     directory = shared_traces / "tracecompass-ros2"
     here = tmp_path_factory.mktemp("here")
     before = contents(directory)
