@@ -70,7 +70,7 @@ link AS (
     FROM analysed.store.link_transport
     UNION ALL
     SELECT kind, kind, 'callback_instance', callback_instance_id, 'publication', publication_id,
-        false
+        candidate_count > 1
     FROM analysed.store.link_causal
     WHERE callback_instance_id IS NOT NULL
     UNION ALL

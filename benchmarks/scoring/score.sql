@@ -1,7 +1,7 @@
 -- Precision and recall by kind of link. A link that was found is right if it is true, whether or
 -- not the trace decides it; a true one that the trace decides and that was not found is missing.
--- Which of several messages with one stamp was taken is a guess, marked as such in the database,
--- and not judged.
+-- Which of several messages with one stamp was taken is a guess, and so is which of several runs
+-- filled a cache: marked as such in the database (candidate_count > 1), and not judged.
 CREATE OR REPLACE TEMP TABLE verdict AS
 SELECT
     f.number, f.kind, f.label, f.is_guess, f.from_id AS found_from_id, f.to_id AS found_to_id,

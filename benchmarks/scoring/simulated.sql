@@ -228,6 +228,26 @@ whole_callback AS (
         AND (u.ts_ns IS NULL OR coalesce(u.ts_ns > c.end_ns, false))
         AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM mixed_process)
 ),
+-- Which of several runs filled a cache is not in the trace. It is decided where the run that did
+-- ended before the publishing one began, and (partial_sync) no other of its callback ran from its
+-- start to the publication, or (periodic_async) ended after it and before the publishing one began.
+doubtful AS (
+    SELECT DISTINCT c.callback_instance_id, c.publication_id
+    FROM simulated_causal AS c
+    JOIN simulated_callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
+    JOIN simulated_publication AS b ON c.publication_id = b.publication_id
+    JOIN simulated_callback_instance AS r ON b.callback_instance_id = r.callback_instance_id
+    LEFT JOIN simulated_callback_instance AS o
+        ON i.host = o.host AND i.pid = o.pid AND i.callback_handle = o.callback_handle
+        AND i.callback_instance_id <> o.callback_instance_id
+        AND CASE c.kind
+            WHEN 'partial_sync' THEN
+                coalesce(o.end_ns > i.start_ns, true) AND o.start_ns < b.rcl_ns
+            ELSE o.end_ns > i.end_ns AND o.end_ns <= r.start_ns
+        END
+    WHERE c.kind IN ('periodic_async', 'partial_sync')
+        AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
+),
 -- Who is annotated says so once, and an input that is missing leaves an older one in its cache.
 told AS (
     SELECT t.host, d.event
@@ -276,6 +296,9 @@ SELECT
     AND (
         c.kind NOT IN ('periodic_async', 'partial_sync')
         OR (c.host, 'ros2:message_link_' || c.kind) IN (SELECT (host, event) FROM told)
+        AND (c.callback_instance_id, c.publication_id) NOT IN (
+            SELECT (callback_instance_id, publication_id) FROM doubtful
+        )
     ),
     'derive.link_causal_' || c.kind
 FROM simulated_causal AS c

@@ -16,6 +16,7 @@ from msgflow.sim.scenario import (
     layers,
     lives,
     nested,
+    reentrant,
     services,
     stamps,
     transforms,
@@ -49,6 +50,7 @@ def scenarios() -> Mapping[str, Scenario]:
         layers.layers(),
         annotated.periodic_async(),
         annotated.partial_sync(),
+        reentrant.reentrant(),
         autoware.autoware(),
         autoware.autoware_two_threads(),
     )

@@ -149,11 +149,14 @@ class MessageLink:
             a message of every input, and use each up.
         inputs: topics of subscriptions of the node.
         outputs: topics of its publishers.
+        is_late: a callback puts its message into the cache, and looks at the others, only when it
+            has computed; a timer when it publishes. Else both do when they begin.
     """
 
     kind: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    is_late: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in {"periodic_async", "partial_sync"}:

@@ -71,15 +71,24 @@ class CallbackLinks:
     inputs: tuple[LinkObject, ...]
     outputs: tuple[LinkObject, ...]
 
-    def begin(self, instance: CallbackInstance) -> dict[LinkObject, tuple[CallbackInstance, ...]]:
+    def gates(self, *, is_late: bool) -> tuple[LinkObject, ...]:
+        """Links that fire when there is a message of each input: at its begin, or late."""
+        return tuple(
+            link
+            for link in self.inputs
+            if link.description.kind == "partial_sync" and link.description.is_late is is_late
+        )
+
+    def fill(
+        self, instance: CallbackInstance, *, is_late: bool
+    ) -> dict[LinkObject, tuple[CallbackInstance, ...]]:
         """Put the message into the caches; returns the links that fire, with what they use."""
         fired = {}
-        for link in self.inputs:
+        for link in self.gates(is_late=is_late):
             assert self.topic is not None
-            if link.description.kind == "partial_sync":
-                completed = link.fire(self.topic, instance)
-                if completed is not None:
-                    fired[link] = completed
+            completed = link.fire(self.topic, instance)
+            if completed is not None:
+                fired[link] = completed
         return fired
 
     def may_publish(self, topic: str, fired: Iterable[LinkObject]) -> bool:
@@ -100,6 +109,7 @@ class CallbackLinks:
         topic: str,
         instance: CallbackInstance,
         fired: dict[LinkObject, tuple[CallbackInstance, ...]],
+        time: int,
     ) -> CallbackInstance:
         """The run of the callback, with all that its publication on a topic is made of."""
         causes = []
@@ -110,7 +120,7 @@ class CallbackLinks:
             if description.kind == "partial_sync":
                 used: Iterable[CallbackInstance] = fired.get(link, ())
             else:
-                used = link.latest(self.topic, instance.start)
+                used = link.latest(self.topic, time if description.is_late else instance.start)
             for each in used:
                 number = each.callback_instance_id
                 causes.append(Cause(description.kind, each, number in link.used))

@@ -230,13 +230,6 @@ def _check_links(node: Node) -> None:
             raise UsageError(
                 f"whatever input comes last has to publish — partial_sync of {node.full_name}"
             )
-        # What the callbacks do with the caches is in a certain order only if one runs at a time.
-        groups = {each.group for each in inputs}
-        reentrant = {group.name for group in node.groups if group.is_reentrant}
-        if len(groups) > 1 or groups & reentrant:
-            raise UsageError(
-                f"inputs have to exclude each other — partial_sync of {node.full_name}"
-            )
 
 
 def _check_topics(node: Node) -> None:

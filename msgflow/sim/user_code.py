@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.sim.entity import Work
 from msgflow.sim.intra import publish_intra
+from msgflow.sim.machine import settle
 from msgflow.sim.publish import CallbackInstance, publish
 
 if TYPE_CHECKING:
@@ -66,20 +67,43 @@ def _execute_linked(
     instance: CallbackInstance,
 ) -> Run:
     """Run user code that fills or uses caches; it may have to wait for other inputs."""
-    fired = links.begin(instance)
-    publishers = tuple(each for each in code.publishers if links.may_publish(each.topic, fired))
-    is_keeping = not publishers and links.is_gated([each.topic for each in code.publishers])
-    chosen = replace(
-        code,
-        work=_KEEPING if is_keeping else code.work,
-        publishers=publishers,
-        is_stepwise=code.is_stepwise or bool(publishers),
-    )
 
-    def cause(topic: str) -> CallbackInstance:
-        return links.cause(topic, instance, fired)
+    def cause(topic: str, time: int) -> CallbackInstance:
+        return links.cause(topic, instance, {}, time)
 
+    if links.gates(is_late=False) or links.gates(is_late=True):
+        return _fill_and_publish(thread, middleware, code, links, start, instance)
+    chosen = replace(code, is_stepwise=code.is_stepwise or bool(code.publishers))
     return _execute(thread, middleware, chosen, start, instance, cause)
+
+
+def _fill_and_publish(
+    thread: Thread,
+    middleware: Middleware,
+    code: UserCode,
+    links: CallbackLinks,
+    start: int,
+    instance: CallbackInstance,
+) -> Steps:
+    """Put a message into caches that fire; what other threads did before that is known then."""
+    time = yield thread.hold(start)
+    fired = links.fill(instance, is_late=False)
+    work = code.work
+    if links.gates(is_late=True):
+        time = yield thread.hold(time + _duration(thread, work))
+        fired |= links.fill(instance, is_late=True)
+        work = _KEEPING
+    publishers = tuple(each for each in code.publishers if links.may_publish(each.topic, fired))
+    if not publishers and links.is_gated([each.topic for each in code.publishers]):
+        work = _KEEPING
+
+    def cause(topic: str, time: int) -> CallbackInstance:
+        return links.cause(topic, instance, fired, time)
+
+    chosen = replace(
+        code, work=work, publishers=publishers, is_stepwise=code.is_stepwise or bool(publishers)
+    )
+    return (yield from settle(_execute(thread, middleware, chosen, time, instance, cause)))
 
 
 def _execute(
@@ -88,13 +112,10 @@ def _execute(
     code: UserCode,
     start: int,
     instance: CallbackInstance | None,
-    cause: Callable[[str], CallbackInstance] | None = None,
+    cause: Callable[[str, int], CallbackInstance] | None = None,
 ) -> Run:
-    random = thread.world.random
     work = code.work
-    duration = work.typical_ns + int(random() * work.spread_ns)
-    if work.slow_probability and random() < work.slow_probability:
-        duration += int((1 + random()) * work.slow_ns / 2)
+    duration = _duration(thread, work)
     time = start + 200 + duration * work.percent_before // 100
     rest = 200 + duration * (100 - work.percent_before) // 100
     if code.is_stepwise:
@@ -106,6 +127,14 @@ def _execute(
     return time + rest
 
 
+def _duration(thread: Thread, work: Work) -> int:
+    random = thread.world.random
+    duration = work.typical_ns + int(random() * work.spread_ns)
+    if work.slow_probability and random() < work.slow_probability:
+        duration += int((1 + random()) * work.slow_ns / 2)
+    return duration
+
+
 def _step(
     thread: Thread,
     middleware: Middleware,
@@ -113,12 +142,12 @@ def _step(
     time: int,
     rest: int,
     instance: CallbackInstance | None,
-    cause: Callable[[str], CallbackInstance] | None,
+    cause: Callable[[str, int], CallbackInstance] | None,
 ) -> Steps:
     for publisher in code.publishers:
         time = yield thread.hold(time)
         # What has ended before it began is known by now, on whatever thread it was.
-        caused_by = instance if cause is None else cause(publisher.topic)
+        caused_by = instance if cause is None else cause(publisher.topic, time)
         if publisher.intra is not None:
             time = yield from publish_intra(thread, middleware, publisher, time, caused_by)
         else:

@@ -5,8 +5,9 @@
 --     nested inside the publishing run and before the publication. The input whose own run
 --     publishes is none of these. When a node reads its caches is not in the trace, so every other
 --     run that began before the publication, and ended after the one there at the cut began, could
---     have been it as well. Where none was there at the cut, the last of those counts, and nothing
---     is one more candidate. Nothing is linked across a gap in the record of either thread.
+--     have been it as well. A firing needs a message of every input: where none was there at the
+--     cut, the last of those counts, and nothing is one more candidate. Nothing is linked across a
+--     gap in the record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 -- param: wanted_kind VARCHAR  Kind of the annotations
@@ -200,8 +201,11 @@ cached AS (
     SELECT
         d.run_id, d.annotation_id, d.publication_id, d.publishing_id, d.subscription_id,
         d.trace_id, d.thread_id, d.start_ns, d.start_event_id,
-        coalesce(n.callback_instance_id, d.callback_instance_id, p.callback_instance_id)
-            AS callback_instance_id,
+        coalesce(
+            n.callback_instance_id,
+            d.callback_instance_id,
+            CASE WHEN wanted_kind = 'partial_sync' THEN p.callback_instance_id END
+        ) AS callback_instance_id,
         coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT AS candidate_count
     FROM there AS d
     LEFT JOIN counted AS p

@@ -81,8 +81,8 @@ SELECT
     'info',
     count(*),
     'publications that an annotation explains, but for which some of its inputs had no message '
-    || '(none yet, none since the caches were emptied, or a gap lies in between): see '
-    || 'annotation_firing'
+    || 'when the callback that publishes began (none yet, none since the caches were emptied, one '
+    || 'that came only meanwhile, or a gap lies in between): see annotation_firing'
 FROM derive.annotation_firing
 WHERE linked_count < input_count
 GROUP BY run_id

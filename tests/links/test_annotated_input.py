@@ -27,6 +27,7 @@ def make_history(number: int, moments: Iterator[int]) -> History:
     outputs = [number * OUTPUTS + each for each in range(1, OUTPUTS + 1)]
     threads = [number * THREADS + each for each in range(1, random.randint(1, THREADS) + 1)]
     nests = random.choice((1, 1, 2, 3))
+    nestable = random.choice((inputs, inputs[-1:]))
     for _ in range(random.randint(1, 2)):
         annotation = (
             random.choice(("periodic_async", "partial_sync")),
@@ -40,7 +41,8 @@ def make_history(number: int, moments: Iterator[int]) -> History:
         thread = random.choice(threads)
         stack, action = stacks[thread], random.random()
         if action < 0.35 and len(stack) < nests:
-            run = Run(random.choice((*inputs, None)), thread, next(moments), tuple(stack))
+            subscription = random.choice((*(nestable if stack else inputs), None))
+            run = Run(subscription, thread, next(moments), tuple(stack))
             history.runs.append(run)
             stack.append(run)
         elif action < 0.6 and stack:

@@ -84,7 +84,9 @@ def _links(
             inside = [run for run in runs if b.run in run.outer and run.ended <= read]
             since = max((run.ended, run.start) for run in there)[1] if there else 0
             possible = [run for run in runs if run.start < read and run.ended > max(since, kept)]
-            chosen = inside or there or [run for run in possible if run.ended <= read] or possible
+            chosen = inside or there
+            if kind == "partial_sync" and not chosen:
+                chosen = [run for run in possible if run.ended <= read] or possible
             if not chosen:
                 continue
             latest = max(chosen, key=lambda run: run.ended)
