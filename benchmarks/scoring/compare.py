@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 _SQL = Path(__file__).parent
 _RECORDED_COLUMNS = """{
-    t: 'VARCHAR', id: 'VARCHAR', kind: 'VARCHAR', host: 'VARCHAR', vpid: 'INTEGER', vtid: 'INTEGER',
+    t: 'VARCHAR', id: 'VARCHAR', name: 'VARCHAR', kind: 'VARCHAR', host: 'VARCHAR',
+    vpid: 'INTEGER', vtid: 'INTEGER',
     ev: 'MAP(VARCHAR, BIGINT)', "start": 'BIGINT', "end": 'BIGINT', msg: 'VARCHAR', cb: 'VARCHAR',
     seen: 'INTEGER', "in": 'VARCHAR', "out": 'VARCHAR', type: 'VARCHAR', annot: 'INTEGER',
     flavour: 'VARCHAR', hosts: 'MAP(VARCHAR, STRUCT(hostname VARCHAR))'

@@ -32,11 +32,32 @@ WHERE moment IS NOT NULL;
 CREATE OR REPLACE TEMP TABLE truth_link AS
 WITH pub AS (FROM recorded WHERE t = 'pub'),
 take AS (FROM recorded WHERE t = 'take'),
-link AS (
-    SELECT
-        l.type, k.cb, l."out", l.seen = 1 AS is_seen
+callback AS (FROM recorded WHERE t = 'cb'),
+-- As in simulated.sql: other runs of the callback could have filled the cache.
+doubtful AS (
+    SELECT DISTINCT l."in", l."out"
     FROM recorded AS l
     JOIN take AS k ON l."in" = k.id
+    JOIN callback AS i ON k.cb = i.id
+    JOIN pub AS b ON l."out" = b.id
+    JOIN callback AS r ON b.cb = r.id
+    LEFT JOIN callback AS o
+        ON i.host = o.host AND i.vpid = o.vpid AND i.name = o.name AND i.id <> o.id
+        AND CASE l.type
+            WHEN 'partial_sync' THEN
+                coalesce(o."end" > i."start", true)
+                AND o."start" < list_min(map_values(b.ev))
+            ELSE o."end" > i."end" AND o."end" <= r."start"
+        END
+    WHERE l.t = 'link' AND l.type IN ('periodic_async', 'partial_sync')
+        AND (o.id IS NOT NULL OR coalesce(i."end" > r."start", true))
+),
+link AS (
+    SELECT
+        l.type, k.cb, l."out", l.seen = 1 AND d."in" IS NULL AS is_seen
+    FROM recorded AS l
+    JOIN take AS k ON l."in" = k.id
+    LEFT JOIN doubtful AS d ON l."in" = d."in" AND l."out" = d."out"
     WHERE l.t = 'link' AND l.annot = 1
 )
 SELECT

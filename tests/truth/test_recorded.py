@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from ingested import Ingested
+from scoring import compare_recorded
 
 Vertex = tuple[str, int]
 
@@ -128,6 +129,22 @@ def test_scores(
     agreement = scores.pop("exec")
     assert scores == dict.fromkeys(("pairs", "links", "e2e"), ("1.0000", "1.0000"))
     assert float(agreement[0]) >= 0.99
+
+
+def test_wrong_inputs_of_a_reentrant_node_are_marked(
+    recordings: Callable[[str], Ingested], shared_traces: Path
+) -> None:
+    ingested = recordings("mt_partial")
+    path = Path(ingested.rows("SELECT path FROM duckdb_databases() WHERE NOT internal")[0][0])
+    (score,) = (
+        score
+        for score in compare_recorded(path, shared_traces / "mt_partial" / "truth.jsonl.gz")
+        if score.kind == "partial_sync"
+    )
+    assert (score.wrong, score.missing, score.repeated) == (0, 0, 0)
+    assert score.misguessed > 100
+    assert score.found == score.happened == 994
+    assert ingested.rows("SELECT count(*) FROM annotation_firing WHERE NOT is_complete") < [(5,)]
 
 
 def test_scores_of_services(
