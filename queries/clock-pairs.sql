@@ -7,7 +7,8 @@
 -- column: run_id BIGINT                       Run
 -- column: from_hosts VARCHAR                  Hosts of the clock that sent
 -- column: to_hosts VARCHAR                    Hosts of the clock that received
--- column: message_count BIGINT                Messages of ROS, matched by their stamps alone
+-- column: message_count BIGINT                Messages of ROS matched by their stamps alone,
+--     requests and responses
 -- column: packet_count BIGINT                 Network packets that kernel traces saw on both ends
 -- column: shortest_message_ns BIGINT [ns]     Shortest way of a message, as corrected
 -- column: shortest_packet_ns BIGINT [ns]      Shortest way of a packet, as corrected

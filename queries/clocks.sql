@@ -17,8 +17,10 @@
 --     uncertainty of the offset holds throughout, or is not known
 -- column: reference_ns BIGINT [epoch ns]      Moment at which the offset alone is added, as the
 --     clock showed it
+-- column: greatest_uncertainty_ns BIGINT [ns]  Bound of the error of its times anywhere in the
+--     recording; at any time: main.clock_uncertainty
 -- column: uuid VARCHAR                        UUID of the clock (LTTng: boot identity)
--- needs: main.clock, main.host
+-- needs: main.clock, main.clock_uncertainty, main.host
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
     FROM main.host
@@ -34,9 +36,15 @@ SELECT
     c.drift_ppb,
     c.drift_uncertainty_ppb,
     c.reference_ns,
+    coalesce(k.greatest_ns, c.uncertainty_ns) AS greatest_uncertainty_ns,
     c.uuid
 FROM main.clock AS c
 LEFT JOIN named AS n ON c.clock_id = n.clock_id
 LEFT JOIN named AS r ON c.reference_clock_id = r.clock_id
+LEFT JOIN (
+    SELECT clock_id, max(uncertainty_ns) AS greatest_ns
+    FROM main.clock_uncertainty
+    GROUP BY clock_id
+) AS k ON c.clock_id = k.clock_id
 WHERE list_contains($runs, c.run_id)
 ORDER BY c.run_id, c.clock_id

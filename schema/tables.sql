@@ -76,6 +76,14 @@ CREATE TABLE store.clock (
     reference_clock_id    BIGINT                 -- Clock whose times its times become; NULL: not brought together with others -> clock.clock_id
 );
 
+-- One row per clock and moment; between two the bound is a straight line.
+CREATE TABLE store.clock_uncertainty (
+    run_id         BIGINT NOT NULL,              -- Run that the row belongs to -> run.run_id
+    clock_id       BIGINT NOT NULL,              -- The clock -> clock.clock_id
+    at_ns          BIGINT NOT NULL,              -- Moment, as the clock showed it [epoch ns]
+    uncertainty_ns BIGINT NOT NULL               -- Bound of the error of the correction at that moment [ns]
+);
+
 -- One row per machine or container.
 CREATE TABLE store.host (
     host_id  BIGINT PRIMARY KEY,                 -- Identity of the host

@@ -31,6 +31,12 @@ FROM (
 WHERE clock.clock_id = begun.clock_id
 """
 
+_SYNCHRONISED = """
+CREATE OR REPLACE TEMP TABLE clock_synchronised AS
+SELECT *, count(*) OVER (PARTITION BY reference_clock_id) > 1 AS is_connected
+FROM derive.clock_sync($run_id)
+"""
+
 # A clock that nothing connects with another one stays as it is.
 _FROM_MESSAGES = """
 UPDATE store.clock SET
@@ -42,11 +48,15 @@ UPDATE store.clock SET
         WHEN sync.has_packets THEN 'packets'
         ELSE 'messages'
     END
-FROM (
-    SELECT *, count(*) OVER (PARTITION BY reference_clock_id) AS number
-    FROM derive.clock_sync($run_id)
-) AS sync
-WHERE clock.clock_id = sync.clock_id AND sync.number > 1
+FROM clock_synchronised AS sync
+WHERE clock.clock_id = sync.clock_id AND sync.is_connected
+"""
+
+_BOUNDS = """
+INSERT INTO store.clock_uncertainty (run_id, clock_id, at_ns, uncertainty_ns)
+SELECT $run_id, sync.clock_id, bound.at_ns, bound.uncertainty_ns
+FROM clock_synchronised AS sync, unnest(sync.bounds) AS unnested (bound)
+ORDER BY sync.clock_id, bound.at_ns
 """
 
 _FINDINGS = """
@@ -107,14 +117,18 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
         UsageError: a file that does not fit the run.
     """
     con.execute(_FORGET, {"run_id": run_id})
+    con.execute("DELETE FROM store.clock_uncertainty WHERE run_id = ?", [run_id])
     con.execute(
         "DELETE FROM store.diagnostic WHERE run_id = ? "
         "AND name IN ('clock_not_synchronised', 'clock_uneven')",
         [run_id],
     )
     if sync.method == "messages":
-        con.execute(_FROM_MESSAGES, {"run_id": run_id})
+        con.execute(_SYNCHRONISED, {"run_id": run_id})
+        con.execute(_FROM_MESSAGES)
+        con.execute(_BOUNDS, {"run_id": run_id})
         con.execute(_FINDINGS, {"run_id": run_id})
+        con.execute("DROP TABLE temp.clock_synchronised")
     elif sync.method == "file":
         _set_given(con, run_id, sync)
 

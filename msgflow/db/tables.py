@@ -225,6 +225,20 @@ clock = _table(
     ),
 )
 
+clock_uncertainty = _table(
+    "clock_uncertainty",
+    "One row per clock and moment; between two the bound is a straight line",
+    _run(),
+    _reference("clock_id", "The clock", to="clock.clock_id", required=True),
+    _time("at_ns", "Moment, as the clock showed it", required=True),
+    _column(
+        "uncertainty_ns",
+        BigInteger,
+        "Bound of the error of the correction at that moment [ns]",
+        required=True,
+    ),
+)
+
 host = _table(
     "host",
     "One row per machine or container",

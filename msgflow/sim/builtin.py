@@ -19,6 +19,7 @@ from msgflow.sim.scenario import (
     reentrant,
     services,
     stamps,
+    traffic,
     transforms,
 )
 from msgflow.sim.system import Host, Node, Process, Scenario
@@ -46,6 +47,7 @@ def scenarios() -> Mapping[str, Scenario]:
         lives.restarts(),
         lives.container_restarts(),
         stamps.equal_stamps(),
+        traffic.host_chain(),
         layers.python(),
         layers.layers(),
         annotated.periodic_async(),

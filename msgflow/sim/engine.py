@@ -238,6 +238,7 @@ def _machine(
     identity_key: str,
     truth: Truth,
 ) -> Machine:
+    recording = host.recording or scenario.recording
     digest = sha256(f"{identity_key}/{host.hostname}".encode()).digest()
     boot = sha256(f"{identity_key}/{host.boot}".encode()).digest() if host.boot else digest
     identity = TraceIdentity(
@@ -254,8 +255,8 @@ def _machine(
         layouts()[scenario.layout],
         identity,
         host.cpu_count,
-        scenario.recording,
+        recording,
         truth,
         clock,
     )
-    return Machine(host.hostname, clock, recorder, scenario.recording, host.stamp_resolution_ns)
+    return Machine(host.hostname, clock, recorder, recording, host.stamp_resolution_ns)

@@ -138,6 +138,7 @@ class Host:
             clock, so that offset and drift are those of the first of them.
         stamp_resolution_ns: what source stamps are a multiple of: a coarse clock gives messages
             that follow each other closely the same stamp.
+        recording: how it is recorded; None: as the scenario says.
     """
 
     hostname: str
@@ -146,6 +147,7 @@ class Host:
     clock_drift_ppm: float = 0.0
     boot: str = ""
     stamp_resolution_ns: int = 1
+    recording: Recording | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,13 @@
 -- name: main.clock_pair
 -- description: What passed between hosts of two clocks and tells how far these are apart: messages
---     matched by their stamps alone, and network packets. The shortest ways both there and back
---     bound the error of a correction; a negative one shows clocks that are apart.
+--     matched by their stamps alone, requests, responses, and network packets. The shortest ways
+--     both there and back bound the error of a correction; a negative one shows clocks that are
+--     apart.
 -- grain: one row per pair of clocks and direction with messages or packets
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: from_clock_id BIGINT  Clock of the senders
 -- column: to_clock_id BIGINT  Clock of the receivers
--- column: message_count BIGINT  Messages of ROS
+-- column: message_count BIGINT  Messages, requests and responses of ROS
 -- column: packet_count BIGINT  Network packets that kernel traces saw on both ends
 -- column: shortest_message_ns BIGINT [ns]  Shortest way of a message, as corrected
 -- column: shortest_packet_ns BIGINT [ns]  Shortest way of a packet, as corrected

@@ -3,7 +3,7 @@
 -- description: What messages and packets cannot tell of the clocks: those that nothing connects
 --     with the others, and why, and those that do not run evenly.
 -- grain: one row per pair of clocks or clock
--- needs: store.host, derive.clock_pair, derive.clock_sync
+-- needs: store.host, store.clock, derive.clock_pair
 CREATE OR REPLACE MACRO derive.clock_finding(of_run) AS TABLE
 WITH clock_name AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS name
@@ -21,7 +21,9 @@ pair AS MATERIALIZED (
     JOIN clock_name AS o ON p.other_clock_id = o.clock_id
 ),
 sync AS MATERIALIZED (
-    SELECT clock_id, reference_clock_id FROM derive.clock_sync(of_run)
+    SELECT clock_id, coalesce(reference_clock_id, clock_id) AS reference_clock_id
+    FROM store.clock
+    WHERE run_id = of_run
 )
 SELECT
     'clock_not_synchronised' AS name,
@@ -38,11 +40,7 @@ SELECT
             p.other_name, p.name, p.received_count, p.sent_count
         )
     END
-    || CASE
-        WHEN p.received_count + p.received_packet_count > 0
-            AND p.sent_count + p.sent_packet_count > 0 THEN ', too few at the same time'
-        ELSE ', and only both together tell an offset'
-    END AS detail
+    || ', and only both together tell an offset' AS detail
 FROM pair AS p
 JOIN sync AS c ON p.clock_id = c.clock_id
 JOIN sync AS o ON p.other_clock_id = o.clock_id
@@ -51,7 +49,9 @@ UNION ALL
 SELECT
     'clock_not_synchronised',
     0,
-    printf('the clock of %s stays apart: it exchanges no message with the others', n.name)
+    printf(
+        'the clock of %s stays apart: no message between it and the others is known', n.name
+    )
 FROM clock_name AS n
 WHERE n.clock_id NOT IN (SELECT clock_id FROM pair UNION ALL SELECT other_clock_id FROM pair)
     AND (SELECT count(*) FROM clock_name) > 1

@@ -1,9 +1,15 @@
 -- name: derive.clock_way
--- description: What was sent on one clock and received on another: messages matched by their
---     stamps where there is no other candidate, which needs no comparison of the two clocks, and
---     network packets.
+-- description: What was sent on one clock and received on another, as far as it is known without
+--     comparing the two: messages matched by their stamps where there is no other candidate,
+--     service requests and responses, and network packets.
+--     A request or response may be reported long after it was sent, when its thread lost the CPU in
+--     between. So the time of sending is that of what certainly came before: the begin of the
+--     callback that sent the request, or the end of the service callback on the thread that sent
+--     the response (else its begin, or the take of the request). Requests that no callback sent do
+--     not count.
 -- grain: one row per message or packet between two clocks
--- needs: store.link_transport, store.publication, store.take, store.process, store.host,
+-- needs: store.link_transport, store.publication, store.take, store.request, store.response,
+--     store.link_request, store.callback_instance, store.thread, store.process, store.host,
 --     store.link_packet, store.trace
 WITH process_clock AS (
     SELECT p.process_id, h.clock_id
@@ -14,6 +20,11 @@ trace_clock AS (
     SELECT t.trace_id, h.clock_id
     FROM store.trace AS t
     JOIN store.host AS h ON t.host_id = h.host_id
+),
+thread_clock AS (
+    SELECT t.thread_id, c.clock_id
+    FROM store.thread AS t
+    JOIN process_clock AS c ON t.process_id = c.process_id
 )
 SELECT
     l.run_id, f.clock_id AS from_clock_id, o.clock_id AS to_clock_id, false AS is_packet,
@@ -23,8 +34,32 @@ JOIN store.publication AS b ON l.publication_id = b.publication_id
 JOIN store.take AS t ON l.take_id = t.take_id
 JOIN process_clock AS f ON b.process_id = f.process_id
 JOIN process_clock AS o ON t.process_id = o.process_id
-WHERE l.method IN ('exact', 'nearest')
+WHERE l.method IN ('exact', 'exact_stamp', 'nearest')
     AND l.candidate_count = 1
+    AND f.clock_id <> o.clock_id
+UNION ALL
+SELECT q.run_id, f.clock_id, o.clock_id, false, i.start_ns, q.taken_ns
+FROM store.request AS q
+JOIN store.link_request AS l ON q.request_id = l.request_id
+JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+JOIN thread_clock AS f ON q.sender_thread_id = f.thread_id
+JOIN thread_clock AS o ON q.receiver_thread_id = o.thread_id
+WHERE q.taken_ns IS NOT NULL AND f.clock_id <> o.clock_id
+UNION ALL
+SELECT
+    r.run_id, f.clock_id, o.clock_id, false,
+    CASE
+        WHEN i.end_ns <= r.sent_ns AND i.thread_id = r.sender_thread_id THEN i.end_ns
+        ELSE coalesce(i.start_ns, q.taken_ns)
+    END,
+    r.taken_ns
+FROM store.response AS r
+JOIN store.request AS q ON r.request_id = q.request_id
+LEFT JOIN store.callback_instance AS i ON r.callback_instance_id = i.callback_instance_id
+JOIN thread_clock AS f ON r.sender_thread_id = f.thread_id
+JOIN thread_clock AS o ON r.receiver_thread_id = o.thread_id
+WHERE r.taken_ns IS NOT NULL
+    AND coalesce(i.start_ns, q.taken_ns) IS NOT NULL
     AND f.clock_id <> o.clock_id
 UNION ALL
 SELECT l.run_id, f.clock_id, o.clock_id, true, l.sent_ns, l.received_ns

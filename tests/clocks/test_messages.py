@@ -11,6 +11,7 @@ import pytest
 from drifting_clocks import Clock, Delay, Way, fill_clocks
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from possible_lines import Bound, PossibleLines
 
 from msgflow.clocks import read_clock_sync, set_clocks
 
@@ -62,7 +63,7 @@ def require_truth(clocks: list[Clock], corrections: dict[int, tuple[object, ...]
 )
 @given(
     offset_ns=st.integers(-(10**17), 10**17),
-    drift_ppb=st.integers(-900_000, 900_000),
+    drift_ppb=st.integers(-199_900, 199_900),
     bases=st.tuples(st.integers(10, 5_000), st.integers(10, 5_000)),
     jitter=st.integers(0, 3_000),
     counts=st.tuples(st.integers(3, 400), st.integers(3, 400)),
@@ -96,11 +97,43 @@ def test_truth_lies_inside_what_is_stated(
             "min(CASE WHEN t.process_id = 1 THEN l.latency_ns END) "
             "FROM main.link_transport AS l JOIN main.take AS t ON l.take_id = t.take_id"
         ).fetchall()[0]
-        # Half the shortest round trip, once the drift is taken out, and shared by both ways. The
-        # drift is rounded to 1e-9, which is 10 ns in half of 20 s.
-        assert corrections[1][4] <= (forth + back_ns) / 2 + 0.02 * jitter * MICROSECOND + 12
+        # The line is a possible one. The drift is rounded to 1e-9, which is 10 ns in half of 20 s.
         assert forth >= -12
         assert back_ns >= -12
+        require_tight(connection, clocks, corrections[1])
+
+
+def require_tight(
+    connection: duckdb.DuckDBPyConnection, clocks: list[Clock], row: tuple[object, ...]
+) -> None:
+    """Host 2 is right at any time to within the bound, which is no wider than it has to be."""
+    _, at_ns, offset_ns, drift_ppb, *_ = row
+    bound = Bound(
+        connection.execute(
+            "SELECT at_ns, uncertainty_ns FROM main.clock_uncertainty WHERE clock_id = 2"
+        ).fetchall()
+    )
+    lines = PossibleLines(
+        *(
+            connection.execute(
+                f"SELECT {at}, {difference} FROM derive.clock_way "
+                f"WHERE from_clock_id = {sender} AND to_clock_id = {3 - sender}"
+            ).fetchall()
+            for at, difference, sender in (
+                ("received_ns", "sent_ns - received_ns", 1),
+                ("sent_ns", "received_ns - sent_ns", 2),
+            )
+        )
+    )
+    for share in range(11):
+        time = bound.begin_ns + (bound.end_ns - bound.begin_ns) * share // 10
+        drifted = drift_ppb * (time - at_ns) / 1e9  # type: ignore[operator]
+        chosen = offset_ns - lines.offset_ns + drifted  # type: ignore[operator]
+        lowest, highest = lines.range_at(time)
+        least = max(highest - chosen, chosen - lowest)
+        assert least - 3 <= bound.at(time) <= least + 4
+        offset, _ = clocks[1].correction(time, clocks[0])
+        assert abs(chosen - float(offset - lines.offset_ns)) <= bound.at(time) + 2
 
 
 def test_seven_milliseconds_and_twenty_ppm(connection: duckdb.DuckDBPyConnection) -> None:
@@ -160,7 +193,7 @@ def test_one_way_is_said_and_nothing_invented(connection: duckdb.DuckDBPyConnect
         assert finding(connection) == [
             (
                 "clock_not_synchronised",
-                "the clock of host-3 stays apart: it exchanges no message with the others",
+                "the clock of host-3 stays apart: no message between it and the others is known",
             ),
             (
                 "clock_not_synchronised",
@@ -205,24 +238,75 @@ def test_packets_one_way_are_said(connection: duckdb.DuckDBPyConnection) -> None
         ]
 
 
-def test_messages_at_different_times_are_too_few(connection: duckdb.DuckDBPyConnection) -> None:
+def worst(connection: duckdb.DuckDBPyConnection, clock_id: int = 2) -> int:
+    """The greatest bound of a clock [ns]."""
+    (row,) = connection.execute(
+        "SELECT max(uncertainty_ns) FROM main.clock_uncertainty WHERE clock_id = ?", [clock_id]
+    ).fetchall()
+    return int(row[0])
+
+
+def test_messages_at_different_times_tell_what_is_possible(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    """The first and the last lie a second and two apart, in which clocks drift by 200 ppm."""
+    clocks = [Clock(), Clock(7, 100_000)]
     ways = [
-        Way(0, 1, times(1, 50, 0, SECOND), delay(1e5, 1e4)),
-        Way(1, 0, times(1, 50, 2 * SECOND, 3 * SECOND), delay(1e5, 1e4)),
+        Way(0, 1, [0, SECOND], delay(1e5, 0)),
+        Way(1, 0, [2 * SECOND, 3 * SECOND], delay(1e5, 0)),
     ]
-    with synchronised(connection, [Clock(), Clock(7)], ways) as corrections:
-        assert corrections[1][0] is None
-        assert [detail for _, detail in finding(connection)] == [
-            "the clocks of host-1 and host-2 stay apart: 50 messages one way, 50 the other, too few"
-            " at the same time"
-        ]
+    with synchronised(connection, clocks, ways) as corrections:
+        require_truth(clocks, corrections)
+        require_tight(connection, clocks, corrections[1])
+        assert 150_000 < corrections[1][4] < 350_000  # type: ignore[operator]
 
 
-def test_one_message_each_way_is_too_few(connection: duckdb.DuckDBPyConnection) -> None:
+def test_one_message_each_way_tells_an_offset(connection: duckdb.DuckDBPyConnection) -> None:
+    clocks = [Clock(), Clock(7, 50_000)]
     ways = [Way(0, 1, [0], delay(1e5, 0)), Way(1, 0, [10], delay(1e5, 0))]
-    with synchronised(connection, [Clock(), Clock(7)], ways) as corrections:
-        assert corrections[1][0] is None
-        assert len(finding(connection)) == 1
+    with synchronised(connection, clocks, ways) as corrections:
+        require_truth(clocks, corrections)
+        assert corrections[1][3] == 0
+        assert corrections[1][5] == 200_000
+        assert 100_000 <= corrections[1][4] <= 100_050  # type: ignore[operator]
+
+
+def test_one_way_at_the_begin_leaves_no_impossible_drift(
+    connection: duckdb.DuckDBPyConnection,
+) -> None:
+    """Messages back in the first 79 ms of 30 s: what they say of the drift is noise."""
+    clocks = [Clock(), Clock(10**8, 40_000)]
+    ways = [
+        Way(0, 1, times(1, 3000, 0, 30 * SECOND), delay(2e5, 9e4)),
+        Way(1, 0, times(2, 16, 0, 79_000_000), delay(2e5, 9e4)),
+    ]
+    with synchronised(connection, clocks, ways) as corrections:
+        require_truth(clocks, corrections)
+        require_tight(connection, clocks, corrections[1])
+        # One way alone tells how the clocks drift apart if its shortest ways are equally long.
+        assert abs(corrections[1][3] + 40_000) < 5_000  # type: ignore[operator]
+        assert worst(connection) > 5 * corrections[1][4]  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("drift_ppb", "is_possible"), [(199_900, True), (-199_900, True), (201_000, False)]
+)
+def test_clocks_drift_apart_by_200_ppm_at_most(
+    connection: duckdb.DuckDBPyConnection, drift_ppb: int, is_possible: bool
+) -> None:
+    clocks = [Clock(), Clock(0, drift_ppb)]
+    ways = [
+        Way(0, 1, times(1, 400, 0, 60 * SECOND), delay(1_000, 10)),
+        Way(1, 0, times(2, 400, 0, 60 * SECOND), delay(1_000, 10)),
+    ]
+    with synchronised(connection, clocks, ways) as corrections:
+        assert abs(corrections[1][3]) <= 200_000  # type: ignore[operator]
+        assert [name for name, _ in finding(connection)] == (
+            [] if is_possible else ["clock_uneven"]
+        )
+        if is_possible:
+            require_truth(clocks, corrections)
+            require_tight(connection, clocks, corrections[1])
 
 
 def test_a_clock_that_was_set_is_said(connection: duckdb.DuckDBPyConnection) -> None:

@@ -176,6 +176,39 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         },
         [("alpha → beta", 1, "1 message received up to 2.000 ms before publication")],
     ),
+    "clocks_not_together": (
+        {
+            **TWO_HOSTS,
+            "publication": PUBLISHED + "1,1,1,5000,6000,7\n2,2,2,5000,6000,8\n",
+            "take": TAKEN + "1,1,2,6000,7,rmw\n2,1,1,5999,8,rmw\n",
+            "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
+        },
+        # The other way they are shown to be apart.
+        [("alpha → beta", 1, "1 message, from 0.000 ms to 0.000 ms as recorded")],
+    ),
+    "latency_uncertain": (
+        {
+            **TWO_HOSTS,
+            "clock": "clock_id,method,reference_clock_id,uncertainty_ns\n1,none,1,0\n"
+            "2,messages,1,5\n",
+            "clock_uncertainty": "clock_id,at_ns,uncertainty_ns\n2,0,1000\n2,10000,2000\n",
+            "publication": PUBLISHED
+            + "1,1,1,0,0,1\n2,1,1,0,0,2\n3,1,1,0,0,3\n4,2,2,0,0,4\n5,2,2,0,0,5\n",
+            # Two of three one way, one of two the other.
+            "take": TAKEN + "1,1,2,1000,1,rmw\n2,1,2,1100,2,rmw\n3,1,2,5000,3,rmw\n"
+            "4,1,1,999,4,rmw\n5,1,1,1000,5,rmw\n",
+            "link_transport": "publication_id,take_id,method\n"
+            "1,1,exact\n2,2,exact\n3,3,exact\n4,4,exact\n5,5,exact\n",
+        },
+        [
+            (
+                "alpha → beta",
+                2,
+                "2 of 3 messages took less than the bound of its error, which is up to 0.002 ms; "
+                "the median took 0.001 ms",
+            )
+        ],
+    ),
     "clock_jumps": (
         {
             "publication": PUBLISHED + "1,1,1,1000,1000,1000\n2,1,1,12000000000,12000000000,9\n",

@@ -218,6 +218,9 @@ def test_clocks_that_differ_are_named(
     )
     connection.executemany("INSERT INTO clock VALUES (?, 1, ?)", enumerate(references, start=1))
     connection.execute("INSERT INTO clock VALUES (9, 2, NULL)")
+    connection.execute("ALTER TABLE clock ADD COLUMN uncertainty_ns BIGINT")
+    connection.execute("CREATE TABLE host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR)")
+    connection.execute("CREATE TABLE clock_uncertainty (clock_id BIGINT, uncertainty_ns BIGINT)")
     connection.execute("CREATE TABLE diagnostic (run_id BIGINT, name VARCHAR)")
     if in_vain:
         connection.execute("INSERT INTO diagnostic VALUES (1, 'clock_not_synchronised')")
@@ -231,6 +234,40 @@ def test_clocks_that_differ_are_named(
     assert run_query(connection, header(QUERY), {}, run=run, internal=True).notes == []
     late = run_query(connection, header(query), {"channel": "/none"}, run=run)
     assert late.notes == []
+
+
+@pytest.mark.parametrize(
+    ("uncertainty_ns", "bounds", "wrong_by"),
+    [
+        (1_500_000, (), "known to ±1.500 ms at best and ±1.500 ms at worst"),
+        (1_500_000, (2_000_000, 1_400_000), "known to ±1.400 ms at best and ±2.000 ms at worst"),
+        (None, (), "off by as much as the file with their offsets is"),
+    ],
+)
+def test_how_far_corrected_clocks_can_be_wrong_is_said(
+    connection: duckdb.DuckDBPyConnection,
+    uncertainty_ns: int | None,
+    bounds: tuple[int, ...],
+    wrong_by: str,
+) -> None:
+    for statement in (
+        "CREATE TABLE clock (clock_id BIGINT, run_id BIGINT, reference_clock_id BIGINT, "
+        "uncertainty_ns BIGINT)",
+        "CREATE TABLE host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR)",
+        "CREATE TABLE clock_uncertainty (clock_id BIGINT, uncertainty_ns BIGINT)",
+        "CREATE TABLE diagnostic (run_id BIGINT, name VARCHAR)",
+        "INSERT INTO host VALUES (1, 1, 'alpha'), (2, 2, 'beta'), (3, 1, 'inside')",
+        "INSERT INTO clock VALUES (1, 1, 1, 0)",
+    ):
+        connection.execute(statement)
+    connection.execute("INSERT INTO clock VALUES (2, 1, 1, ?)", [uncertainty_ns])
+    for bound in bounds:
+        connection.execute("INSERT INTO clock_uncertainty VALUES (2, ?)", [bound])
+    query = QUERY.replace("-- param", "-- note: clocks\n-- param")
+    result = run_query(connection, header(query), {}, run="first", internal=True)
+    assert result.notes == [
+        f"times between alpha, inside and beta are {wrong_by}; msgflow clocks show"
+    ]
 
 
 @pytest.mark.parametrize("given", [1, "1", None])

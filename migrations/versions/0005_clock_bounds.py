@@ -1,0 +1,40 @@
+"""What is known of the error of the correction of a clock, at any time.
+
+Frozen: it does not follow later changes of msgflow/db/tables.py.
+"""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0005"
+down_revision = "0004"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    """Add the table; clocks that are corrected already have no rows until they are so anew."""
+    op.create_table(
+        "clock_uncertainty",
+        sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
+        sa.Column("clock_id", sa.BigInteger(), nullable=False, comment="The clock"),
+        sa.Column(
+            "at_ns",
+            sa.BigInteger(),
+            nullable=False,
+            comment="Moment, as the clock showed it [epoch ns]",
+        ),
+        sa.Column(
+            "uncertainty_ns",
+            sa.BigInteger(),
+            nullable=False,
+            comment="Bound of the error of the correction at that moment [ns]",
+        ),
+        schema="store",
+        comment="One row per clock and moment; between two the bound is a straight line",
+    )
+
+
+def downgrade() -> None:
+    """Drop the table."""
+    op.drop_table("clock_uncertainty", schema="store")

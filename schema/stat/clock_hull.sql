@@ -1,0 +1,99 @@
+-- name: derive.clock_hull
+-- kind: macro
+-- description: The corners of the convex hulls of what messages and packets say of two clocks, one
+--     hull for each direction: the lower envelope of the delays. A line between both hulls that is
+--     no steeper than clocks can drift apart is possible, any other is not.
+--     First goes what another point makes superfluous at every possible drift, then, again and
+--     again, what does not lie above the line through its neighbours.
+--     Times count from `base_ns`, and differences from `base_bound_ns`, which keeps them exact as
+--     DOUBLE.
+-- grain: one row per pair of clocks, direction and corner
+-- needs: derive.clock_bound, derive.clock_drift_limit
+CREATE OR REPLACE MACRO derive.clock_hull(of_run) AS TABLE
+WITH RECURSIVE bound AS MATERIALIZED (
+    SELECT clock_id, other_clock_id, is_packet, sense, at_ns, bound_ns
+    FROM derive.clock_bound(of_run)
+),
+base AS MATERIALIZED (
+    SELECT
+        clock_id, other_clock_id,
+        min(at_ns) AS base_ns,
+        max(at_ns) - min(at_ns) AS length_ns,
+        least(max(CASE WHEN sense < 0 THEN at_ns END), max(CASE WHEN sense > 0 THEN at_ns END))
+        - greatest(min(CASE WHEN sense < 0 THEN at_ns END), min(CASE WHEN sense > 0 THEN at_ns END))
+            AS overlap_ns,
+        coalesce(max(CASE WHEN sense < 0 THEN bound_ns END), min(-bound_ns)) AS base_bound_ns,
+        count(CASE WHEN sense < 0 AND NOT is_packet THEN 1 END) AS received_count,
+        count(CASE WHEN sense > 0 AND NOT is_packet THEN 1 END) AS sent_count,
+        count(CASE WHEN sense < 0 AND is_packet THEN 1 END) AS received_packet_count,
+        count(CASE WHEN sense > 0 AND is_packet THEN 1 END) AS sent_packet_count
+    FROM bound
+    GROUP BY clock_id, other_clock_id
+),
+placed AS MATERIALIZED (
+    SELECT
+        m.clock_id, m.other_clock_id, m.sense,
+        (m.at_ns - b.base_ns)::DOUBLE AS moment,
+        (m.bound_ns + m.sense * b.base_bound_ns)::DOUBLE AS bound,
+        derive.clock_drift_limit() * (m.at_ns - b.base_ns) AS drifted,
+        (m.at_ns - b.base_ns) // (b.length_ns // 256 + 1) AS stretch
+    FROM bound AS m
+    JOIN base AS b ON m.clock_id = b.clock_id AND m.other_clock_id = b.other_clock_id
+),
+stretches AS (
+    SELECT
+        clock_id, other_clock_id,
+        least(
+            count(DISTINCT CASE WHEN sense < 0 THEN stretch END),
+            count(DISTINCT CASE WHEN sense > 0 THEN stretch END)
+        ) AS stretches
+    FROM placed
+    GROUP BY clock_id, other_clock_id
+),
+telling AS (
+    SELECT clock_id, other_clock_id, sense, moment, bound
+    FROM placed
+    QUALIFY coalesce(
+        bound + drifted > max(bound + drifted) OVER (
+            PARTITION BY clock_id, other_clock_id, sense
+            ORDER BY bound - drifted DESC, bound + drifted DESC
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        ),
+        true
+    )
+),
+thinned (round, clock_id, other_clock_id, sense, moment, bound) AS (
+    SELECT 0, clock_id, other_clock_id, sense, moment, bound
+    FROM telling
+    UNION ALL
+    SELECT round + 1, clock_id, other_clock_id, sense, moment, bound
+    FROM (
+        SELECT
+            round, clock_id, other_clock_id, sense, moment, bound, is_above,
+            bool_and(is_above) OVER (PARTITION BY clock_id, other_clock_id, sense) AS is_done
+        FROM (
+            SELECT
+                round, clock_id, other_clock_id, sense, moment, bound,
+                coalesce(
+                    (bound - lag(bound) OVER along) / (moment - lag(moment) OVER along)
+                    > (lead(bound) OVER along - bound) / (lead(moment) OVER along - moment),
+                    true
+                ) AS is_above
+            FROM thinned
+            WINDOW along AS (PARTITION BY clock_id, other_clock_id, sense ORDER BY moment)
+        )
+    )
+    WHERE is_above AND NOT is_done
+),
+corner AS (
+    SELECT clock_id, other_clock_id, sense, moment, bound
+    FROM thinned
+    QUALIFY round = max(round) OVER (PARTITION BY clock_id, other_clock_id, sense)
+)
+SELECT
+    c.clock_id, c.other_clock_id, c.sense, c.moment, c.bound, b.base_ns, b.base_bound_ns,
+    b.overlap_ns, s.stretches, b.received_count, b.sent_count, b.received_packet_count,
+    b.sent_packet_count
+FROM corner AS c
+JOIN base AS b ON c.clock_id = b.clock_id AND c.other_clock_id = b.other_clock_id
+JOIN stretches AS s ON c.clock_id = s.clock_id AND c.other_clock_id = s.other_clock_id
