@@ -57,6 +57,11 @@ class Selection:
         """
         self.traces = traces
         self.lost_event_count = 0
+        for trace in traces.traces:
+            if not (trace.has_time or start is end is None):
+                raise UsageError(
+                    f"the events have no time stamps — {trace.path}", "leave out --start and --end"
+                )
         begins = [info.begin_ns for info in traces.traces if info.begin_ns is not None]
         whole = Run(0, "", min(begins, default=None))
         self._start_ns, self._end_ns = time_window([whole], start, end)

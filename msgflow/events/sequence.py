@@ -49,6 +49,10 @@ class Sequencer:
     def __init__(self, traces: Sequence[TraceInfo], rendering: Rendering) -> None:
         """Prepare to render events of these traces."""
         self._rendering = rendering
+        timeless = [str(trace.index) for trace in traces if not trace.has_time]
+        self._time = "ts_ns"
+        if timeless:
+            self._time = f"CASE WHEN trace_index NOT IN ({', '.join(timeless)}) THEN ts_ns END"
         self._connection = duckdb.connect(
             config={"autoinstall_known_extensions": False, "autoload_known_extensions": False}
         )
@@ -88,7 +92,9 @@ class Sequencer:
         return f"""
 SELECT event_id AS event_order, {self._rendering(name, payload)}
 FROM (
-    SELECT * REPLACE (nullif(vpid, {_WITHOUT}) AS vpid, nullif(vtid, {_WITHOUT}) AS vtid)
+    SELECT * REPLACE (
+        {self._time} AS ts_ns, nullif(vpid, {_WITHOUT}) AS vpid, nullif(vtid, {_WITHOUT}) AS vtid
+    )
     FROM {batch}
 )
 LEFT JOIN host USING (trace_index)"""
@@ -96,20 +102,26 @@ LEFT JOIN host USING (trace_index)"""
 
 def text_line(name: str, payload: pa.Schema) -> str:
     """Render an event as a line: time, host, process and thread, CPU, name, fields."""
+    # No chain of ||, which goes as deep as there are fields.
     fields = "".join(
-        f" || {literal(f' {field.name}=')} || "
+        f", {literal(f' {field.name}=')}, "
         + readable(column_name(position), field.type, is_hexadecimal=_is_hexadecimal(field))
         for position, field in enumerate(payload)
     )
     process = printable("nullif(procname, '')")
     return f"""
-    strftime(make_timestamp(ts_ns // 1000), '%Y-%m-%dT%H:%M:%S.%f')
-    || format('{{:03d}}Z ', ts_ns % 1000)
-    || coalesce({printable("hostname")}, '-') || ' '
-    || coalesce({process}, '-') || '/' || coalesce(CAST(vpid AS VARCHAR), '-')
-    || '/' || coalesce(CAST(vtid AS VARCHAR), '-')
-    || ' [' || coalesce(CAST(cpu_id AS VARCHAR), '-') || '] '
-    || {printable(literal(name))}{fields} AS line"""
+    concat(
+        coalesce(
+            strftime(make_timestamp(ts_ns // 1000), '%Y-%m-%dT%H:%M:%S.%f')
+            || format('{{:03d}}Z', ts_ns % 1000),
+            '-'
+        ),
+        ' ', coalesce({printable("hostname")}, '-'), ' ',
+        coalesce({process}, '-'), '/', coalesce(CAST(vpid AS VARCHAR), '-'),
+        '/', coalesce(CAST(vtid AS VARCHAR), '-'),
+        ' [', coalesce(CAST(cpu_id AS VARCHAR), '-'), '] ',
+        {printable(literal(name))}{fields}
+    ) AS line"""
 
 
 def json_line(name: str, payload: pa.Schema) -> str:

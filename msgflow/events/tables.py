@@ -106,8 +106,22 @@ class _Files:
 
 
 def _typed_row(name: str, payload: pa.Schema) -> str:
-    expressions = [column_name(position) for position in range(len(payload))]
+    expressions = []
+    for position, field in enumerate(payload):
+        expression = column_name(position)
+        if _has_empty_structure(field.type):  # which Parquet cannot hold
+            expression = f"CAST(to_json({exact(expression, field.type)}) AS VARCHAR)"
+        expressions.append(expression)
     return _row(name, payload, expressions)
+
+
+def _has_empty_structure(data_type: pa.DataType) -> bool:
+    if pa.types.is_list(data_type):
+        return _has_empty_structure(data_type.value_type)
+    if pa.types.is_struct(data_type):
+        inner = [field.type for field in data_type]
+        return not inner or any(map(_has_empty_structure, inner))
+    return False
 
 
 def _csv_row(name: str, payload: pa.Schema) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +84,7 @@ class Tracepoint:
         name: provider and event, such as 'ros2:rcl_publish'.
         description: one sentence.
         fields: its payload, over all versions.
+        aliases: other names that it has in traces.
         sequences: kinds of events on one thread that it belongs to.
         predecessors: what is staged about the events before it.
         label: what successors call it, None where none asks.
@@ -97,6 +98,7 @@ class Tracepoint:
     name: str
     description: str
     fields: tuple[Field, ...]
+    aliases: tuple[str, ...] = ()
     sequences: tuple[str, ...] = ()
     predecessors: tuple[Predecessor, ...] = ()
     label: str | None = None
@@ -166,6 +168,15 @@ class Catalogue:
 
     tracepoints: Mapping[str, Tracepoint]
 
+    @cached_property
+    def in_traces(self) -> Mapping[str, Tracepoint]:
+        """The tracepoints by every name that they have in traces."""
+        return {
+            name: tracepoint
+            for tracepoint in self.tracepoints.values()
+            for name in (tracepoint.name, *tracepoint.aliases)
+        }
+
     @property
     def of_threads(self) -> tuple[Tracepoint, ...]:
         """Those that happen in a thread of a process: all but the kernel's."""
@@ -183,7 +194,7 @@ class Catalogue:
 
     def arrow_schemas(self) -> dict[str, pa.Schema]:
         """Return the payload columns of all, which is the `wanted` of `TraceSet.batches`."""
-        return {name: tracepoint.arrow_schema() for name, tracepoint in self.tracepoints.items()}
+        return {name: tracepoint.arrow_schema() for name, tracepoint in self.in_traces.items()}
 
 
 @cache
@@ -198,10 +209,8 @@ def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
         Field(**{**field, "aliases": tuple(field.get("aliases", ()))}) for field in entry["fields"]
     )
     predecessors = tuple(_predecessor(text) for text in entry.get("predecessors", ()))
-    sequences = tuple(entry.get("sequences", ()))
-    return Tracepoint(
-        **{**entry, "fields": fields, "sequences": sequences, "predecessors": predecessors}
-    )
+    tuples = {name: tuple(entry.get(name, ())) for name in ("aliases", "sequences")}
+    return Tracepoint(**{**entry, **tuples, "fields": fields, "predecessors": predecessors})
 
 
 def _predecessor(text: str) -> Predecessor:

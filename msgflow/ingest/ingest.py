@@ -186,7 +186,7 @@ def ingest(
                         interrupts=interrupts,
                         progress=watch.reading,
                     )
-                judge.require_ros_events(traces.traces, loaded.event_counts)
+                judge.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, _fallback_name(paths))
                 run = interruptible(
                     con,
@@ -304,6 +304,16 @@ def _store(
             "info",
             loaded.duplicate_packet_count,
             "packets that several of the given traces hold were read once",
+        )
+    if loaded.repeated_packet_counts:
+        _add_diagnostic(
+            con,
+            run_id,
+            "repeated_packet",
+            "warning",
+            sum(loaded.repeated_packet_counts.values()),
+            "packets that one trace holds twice, such as those of a stream file copied beside "
+            "itself, were read once",
         )
     for diagnostic in loaded.diagnostics:
         _add_diagnostic(con, run_id, *diagnostic)

@@ -11,7 +11,7 @@ from msgflow.ingest.catalogue import load
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.trace import TraceInfo
+    from msgflow.trace import Damage, TraceInfo
 
 _SHOWN = 5
 
@@ -24,6 +24,12 @@ def require_ros_traces(traces: Sequence[TraceInfo]) -> None:
     Raises:
         TraceError: there are only kernel traces, no ROS 2 events, or no process context.
     """
+    for trace in traces:
+        if not trace.has_time:
+            raise TraceError(
+                f"the events have no time stamps — {trace.path}",
+                "record with LTTng or ros2_tracing; `msgflow events` lists what the trace has",
+            )
     ros = [trace for trace in traces if _ros_events(trace.event_names)]
     if not ros:
         if traces and all(trace.domain == "kernel" for trace in traces):
@@ -46,8 +52,12 @@ def require_ros_traces(traces: Sequence[TraceInfo]) -> None:
             )
 
 
-def require_ros_events(traces: Sequence[TraceInfo], counts: Mapping[tuple[int, str], int]) -> None:
-    """Raise unless at least one event that msgflow knows occurred.
+def require_ros_events(
+    traces: Sequence[TraceInfo],
+    counts: Mapping[tuple[int, str], int],
+    damages: Sequence[Damage],
+) -> None:
+    """Raise unless at least one event that msgflow knows was read.
 
     Raises:
         TraceError: it says what occurred instead.
@@ -58,6 +68,14 @@ def require_ros_events(traces: Sequence[TraceInfo], counts: Mapping[tuple[int, s
     if _ros_events(total):
         return
     found = _listed([f"{name} ({count:,})" for name, count in total.most_common()])
+    if damages:
+        first = damages[0]
+        more = f" and {len(damages) - 1:,} more damages" if len(damages) > 1 else ""
+        raise TraceError(
+            f"no ROS 2 event could be read, the trace is damaged: {first.message} — "
+            f"{first.file}, packet {first.position}, byte {first.offset}{more}",
+            "copy it again from where it was recorded, with metadata and all streams",
+        )
     raise TraceError(
         f"no ROS 2 event was recorded, the trace holds {found} — {_paths(traces)}",
         "start tracing before the ROS 2 system, and record as the user who runs it; if that was "

@@ -15,6 +15,7 @@ from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.ignored import diagnostics as ignored_diagnostics
 from msgflow.ingest.ignored import is_ignored
+from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
@@ -54,12 +55,14 @@ class Loaded:
     Attributes:
         event_counts: (trace index, event name) -> events read, wanted or not.
         duplicate_packet_count: packets that another trace of the input held already.
+        repeated_packet_counts: trace index -> packets that the same trace held already.
         replaced_runs: ids of the runs that hold some of these packets already.
-        diagnostics: name, severity, count and detail of what was left out on request.
+        diagnostics: name, severity, count and detail of what was left out.
     """
 
     event_counts: Mapping[tuple[int, str], int]
     duplicate_packet_count: int
+    repeated_packet_counts: Mapping[int, int]
     replaced_runs: frozenset[int]
     diagnostics: tuple[tuple[str, str, int, str], ...]
 
@@ -95,7 +98,7 @@ def load_traces(
     catalogue = load()
     wanted = {
         name: tracepoint.arrow_schema()
-        for name, tracepoint in catalogue.tracepoints.items()
+        for name, tracepoint in catalogue.in_traces.items()
         if not is_ignored(name, ignore)
     }
     sources = _sources(traces.traces, hostnames)
@@ -110,13 +113,14 @@ def load_traces(
 
     tables = _Tables(con, may_hold=may_hold, may_replace=replace)
 
-    def read(corrections: Corrections | None) -> None:
+    def read(corrections: Corrections | None) -> Implausible:
         batches = traces.batches(wanted, progress=report)
+        implausible = Implausible()
         sequences = Sequences(catalogue, _hosts(sources))
         con.begin()
         try:
             with Inserter(tables.add) as inserter:
-                for batch in _placed(batches, sequences, corrections):
+                for batch in _placed(batches, sequences, corrections, implausible):
                     interrupts.check()
                     inserter.put(batch)
             con.commit()
@@ -124,16 +128,17 @@ def load_traces(
             with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
                 con.rollback()
             raise
+        return implausible
 
-    read(None)
+    implausible = read(None)
     corrections = reconciled.find(con)
     if corrections:
         staging.empty(con)
-        read(corrections)
+        implausible = read(corrections)
     for (trace_index, name), count in traces.event_counts.items():
         con.execute(
             "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",
-            [trace_index, name, name in catalogue.tracepoints, count],
+            [trace_index, name, name in catalogue.in_traces, count],
         )
     for trace in traces.traces:
         con.execute(
@@ -154,16 +159,20 @@ def load_traces(
     return Loaded(
         dict(traces.event_counts),
         traces.duplicate_packet_count,
+        dict(traces.repeated_packet_counts),
         frozenset(tables.replaced),
-        tuple(ignored_diagnostics(ignore, traces.event_counts)),
+        (*ignored_diagnostics(ignore, traces.event_counts), *implausible.diagnostics()),
     )
 
 
 def _placed(
-    batches: Iterable[EventBatch], sequences: Sequences, corrections: Corrections | None
+    batches: Iterable[EventBatch],
+    sequences: Sequences,
+    corrections: Corrections | None,
+    implausible: Implausible,
 ) -> Iterator[tuple[str, pa.RecordBatch]]:
     """Yield (table, rows) of all batches, round by round."""
-    tracepoints = load().tracepoints
+    tracepoints = load().in_traces
     for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
         events = []
         for batch in of_round:
@@ -173,9 +182,10 @@ def _placed(
             if tracepoints[batch.name].is_kernel:
                 yield without_thread(tracepoints[batch.name], batch.batch)
                 continue
-            rows = batch.batch if corrections is None else corrections.applied(batch.batch)
+            rows = implausible.without(batch.name, batch.batch)
+            rows = rows if corrections is None else corrections.applied(rows)
             if rows.num_rows:
-                events.append((batch.name, rows))
+                events.append((tracepoints[batch.name].name, rows))
         if events:
             placed = sequences.place(events)
             yield "thread", placed.threads

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from msgflow.errors import TraceError
 from msgflow.trace import metadata
 from msgflow.trace.archive import is_archive
+from msgflow.trace.files import irregular, unreadable_error
 from msgflow.trace.model import TraceLocation
 
 if TYPE_CHECKING:
@@ -64,7 +65,19 @@ def stream_files(directory: Path) -> list[Path]:
     )
 
 
+def irregular_files(directory: Path) -> list[tuple[Path, str]]:
+    """List what in a trace directory is neither a file nor a directory, and what it is."""
+    found = ((entry, irregular(entry)) for entry in sorted(directory.iterdir()))
+    return [(entry, kind) for entry, kind in found if kind is not None]
+
+
 def _check_exists(path: Path) -> None:
+    kind = irregular(path)
+    if kind is not None:
+        raise TraceError(
+            f"not a trace but {kind} — {path}",
+            hint="give the directory that `ros2 trace` or `lttng` wrote",
+        )
     if not path.exists():
         raise TraceError(f"no such file or directory — {path}", hint=f"ls {path.parent}")
     if path.is_file():
@@ -105,10 +118,7 @@ def _locate(directory: Path) -> TraceLocation:
         files = stream_files(directory)
         size = sum(file.stat().st_size for file in files)
     except OSError as error:
-        raise TraceError(
-            f"cannot read the trace ({error.strerror}) — {error.filename}",
-            hint=f"sudo chown -R $USER {directory}",
-        ) from error
+        raise unreadable_error(error, directory) from error
     for path in files:
         if not os.access(path, os.R_OK):
             raise TraceError(

@@ -23,6 +23,7 @@ class ExclusiveTraceSet(TraceSet):
     def __init__(self) -> None:
         self.event_counts: Mapping[tuple[int, str], int] = {}
         self.duplicate_packet_count = 0
+        self.repeated_packet_counts: Mapping[int, int] = {}
         # Weak, so that an iteration which its consumer has dropped is over.
         self._running: weakref.ref[Generator[EventBatch, None, None]] | None = None
         self._closed = False

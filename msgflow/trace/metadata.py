@@ -10,6 +10,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.trace.files import read_regular
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,6 +22,8 @@ BYTE_ORDER_OF_MAGIC = {b"\x57\x1d\xd1\x75": "<", b"\x75\xd1\x1d\x57": ">"}
 # bytes that say nothing useful (the version in them is 1.8 even for CTF 2).
 HEADER_SIZE = 37
 SIZES_OFFSET = 24
+# Of the largest kernel traces it is a few megabytes.
+_MOST_BYTES = 64 << 20
 _RECORD_SEPARATOR = b"\x1e"
 _TSDL_BEGIN = (b"/* CTF 1.", b"trace", b"typealias", b"typedef", b"clock", b"env", b"struct")
 
@@ -32,6 +35,15 @@ class MetadataKind(Enum):
     JSON = "CTF 2"
 
 
+def content_of(directory: Path) -> bytes:
+    """Return the metadata file of the trace in this directory.
+
+    Raises:
+        OSError: it cannot be read, or is none that a tracer could have written.
+    """
+    return read_regular(directory / FILE_NAME, _MOST_BYTES)
+
+
 def kind_of(directory: Path) -> MetadataKind:
     """Tell the kind of metadata of the trace in this directory.
 
@@ -39,7 +51,7 @@ def kind_of(directory: Path) -> MetadataKind:
         TraceError: it is empty, cut off, or not CTF metadata at all.
         OSError: it cannot be read.
     """
-    content = (directory / FILE_NAME).read_bytes()
+    content = content_of(directory)
     if not content:
         raise TraceError(
             f"the trace's `metadata` is empty, the recording did not get started — {directory}",

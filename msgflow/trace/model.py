@@ -46,6 +46,7 @@ class TraceInfo:
         end_ns: time of the last packet's end, epoch nanoseconds, or None.
         has_process_context: every event carries both `vpid` and `vtid`.
         event_names: event classes declared in the metadata, sorted; they need not occur.
+        has_time: the events have times. Where they have none, `ts_ns` only gives their order.
     """
 
     index: int
@@ -62,6 +63,7 @@ class TraceInfo:
     end_ns: int | None
     has_process_context: bool
     event_names: tuple[str, ...]
+    has_time: bool = True
 
 
 def undeclared(path: Path, index: int) -> TraceInfo:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -31,7 +32,9 @@ class TraceSet(ABC):
         traces: what each trace declares, in order of path.
         event_counts: (trace index, event name) to the number of events read, wanted or not;
             only events that occur. Complete after `batches` has ended.
-        duplicate_packet_count: packets skipped because the set holds them twice.
+        duplicate_packet_count: packets skipped because another trace of the set holds them.
+        repeated_packet_counts: trace index to the packets skipped because that trace holds them
+            twice, such as those of a stream file copied beside itself.
         damages: what is damaged and was left out or read as far as possible. Complete after
             `batches` has ended.
     """
@@ -39,6 +42,7 @@ class TraceSet(ABC):
     traces: tuple[TraceInfo, ...]
     event_counts: Mapping[tuple[int, str], int]
     duplicate_packet_count: int
+    repeated_packet_counts: Mapping[int, int] = MappingProxyType({})
     damages: Sequence[Damage] = ()
 
     @abstractmethod

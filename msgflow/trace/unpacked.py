@@ -129,6 +129,7 @@ class UnpackedTraceSet(TraceSet):
     def _take_over(self) -> None:
         self.event_counts = self._traces.event_counts
         self.duplicate_packet_count = self._traces.duplicate_packet_count
+        self.repeated_packet_counts = self._traces.repeated_packet_counts
         self.damages = [
             dataclasses.replace(damage, file=self._unpacked.shown(damage.file))
             for damage in self._traces.damages

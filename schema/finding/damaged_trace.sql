@@ -16,4 +16,4 @@ SELECT
     d.detail
 FROM main.diagnostic AS d
 LEFT JOIN main.trace AS t ON d.trace_id = t.trace_id
-WHERE d.name = 'damaged_trace'
+WHERE d.name IN ('damaged_trace', 'implausible_value')

@@ -18,9 +18,10 @@ loss AS (
     SELECT
         g.trace_id,
         count(*) AS places,
-        sum(g.event_count)::BIGINT AS events,
+        CASE WHEN count(g.event_count) > 0
+            THEN least(sum(g.event_count), 9007199254740992)::BIGINT END AS events,
         max(g.event_count) AS largest,
-        sum(g.end_ns - g.start_ns)::BIGINT AS length_ns
+        sum(g.end_ns - g.start_ns) AS length_ns
     FROM main.loss_interval AS g
     LEFT JOIN damaged AS d ON g.trace_id = d.trace_id
     WHERE g.kind = 'loss' AND (g.event_count IS NOT NULL OR d.trace_id IS NULL)
@@ -44,7 +45,7 @@ SELECT
         l.length_ns / 1e9,
         -- About 100 bytes for an event, the next power of two that holds them, at least 1 MiB.
         (2 ** greatest(
-            ceil(log2((coalesce(l.largest, 0) + f.events) * 100 / 1048576)), 0
+            ceil(log2((coalesce(l.largest, 0)::DOUBLE + f.events) * 100 / 1048576)), 0
         ))::BIGINT
     ) AS detail
 FROM loss AS l

@@ -127,7 +127,10 @@ SELECT
     CASE kind WHEN 'loss' THEN 'discarded_events' WHEN 'packets' THEN 'lost_packets'
         ELSE 'pause' END,
     CASE kind WHEN 'pause' THEN 'warning' ELSE 'data_loss' END,
-    CASE kind WHEN 'loss' THEN coalesce(sum(event_count), count(*)) ELSE count(*) END::BIGINT,
+    CASE kind
+        WHEN 'loss' THEN least(coalesce(sum(event_count), count(*)), 9007199254740992)
+        ELSE count(*)
+    END::BIGINT,
     CASE kind
         WHEN 'loss' THEN printf(
             'events that the tracer discarded in %d place%s, %.3f s in all: use more or larger '

@@ -266,3 +266,14 @@ def test_one_clock_needs_no_packets(tmp_path: Path, ingest: Ingest) -> None:
     network.write()
     database = ingest(directory)
     assert not {"no_network_packets", "network_packets_unused"} & set(details(database))
+
+
+def test_the_name_that_older_tracers_give_a_received_packet(
+    make: Make, ingest: Ingest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("network.RECEIVED", "netif_receive_skb")
+    monkeypatch.setattr("kernel_traces.RECEIVED", "netif_receive_skb")
+    network = make()
+    traffic(network, 0.5)
+    network.write()
+    assert beta(ingest(network.directory))["method"] == "packets"

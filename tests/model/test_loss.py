@@ -6,6 +6,8 @@ import pytest
 from ros_system import RosSystem
 from staged_events import Analyse, Thread
 
+from msgflow.db.finding import find
+
 GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM loss_interval ORDER BY start_ns, cpu"
 
 
@@ -354,3 +356,15 @@ def test_a_lost_end_of_a_recursion_costs_one(system: RosSystem, analyse: Analyse
         system.start(thread, 0xC1)
         system.end(thread, 0xC1)
     assert analyse(system).value("SELECT count(*) - count(end_ns) FROM callback_instance") == 1
+
+
+def test_sums_of_what_packets_say_that_they_lost_fit(system: RosSystem, analyse: Analyse) -> None:
+    for begin in (0, 100, 200):
+        system.add_packet(begin, begin + 100, discarded=(1 << 63) - 1)
+    model = analyse(system)
+    assert model.rows("SELECT discarded_event_count FROM trace") == [(1 << 53,)]
+    assert model.rows("SELECT count FROM diagnostic WHERE name = 'discarded_events'") == [
+        (1 << 53,)
+    ]
+    found = find(model.connection, [1])
+    assert [f.count for f in found if f.name == "discarded_events"] == [1 << 53]

@@ -150,11 +150,16 @@ def test_stream_that_must_not_be_read(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_metadata_that_must_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trace = write_trace(tmp_path / "trace", CONTENT)
 
-    def refuse(path: Path) -> bytes:
+    def refuse(path: Path, flags: int) -> int:
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     fails([trace], "cannot read the trace .Permission denied. — .*metadata", "chown")
+
+
+def test_a_pipe_is_no_trace(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    fails([tmp_path / "pipe"], "not a trace but a pipe — .*pipe", "give the directory")
 
 
 def test_directory_that_must_not_be_read(tmp_path: Path) -> None:

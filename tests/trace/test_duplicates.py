@@ -10,6 +10,7 @@ from uuid import uuid4
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
+import msgflow.trace
 from msgflow.trace import PACKET, TraceSet
 
 Open = Callable[..., TraceSet]
@@ -113,3 +114,61 @@ def test_breaking_off_in_between(tmp_path: Path, open_traces: Open) -> None:
         for _ in traces.batches(batch_rows=2):
             break
         assert len(read(traces)[0]) == 18
+
+
+class TestOneTrace:
+    """A stream file copied beside itself."""
+
+    @staticmethod
+    def numbered(path: Path, count: int = 4) -> Path:
+        streams = {
+            cpu: [packet(10 * n, cpu=cpu, sequence=n) for n in range(count)] for cpu in (0, 1)
+        }
+        return write_trace(path, TraceContent({"ros2:x": {"n": "u64"}}, streams))
+
+    def test_is_read_once(self, tmp_path: Path) -> None:
+        trace = self.numbered(tmp_path / "a")
+        with msgflow.trace.open([trace]) as traces:
+            alone = read(traces)
+        shutil.copy(trace / "channel_1", trace / "channel_1 (copy)")
+        with msgflow.trace.open([trace]) as traces:
+            assert read(traces) == alone
+            assert traces.repeated_packet_counts == {0: 4}
+            assert traces.duplicate_packet_count == 0
+
+    def test_a_part_of_it(self, tmp_path: Path) -> None:
+        """Also where another trace has the packets, too."""
+        trace = self.numbered(tmp_path / "a")
+        shutil.copytree(trace, tmp_path / "b")
+        content = (trace / "channel_0").read_bytes()
+        (trace / "more").write_bytes(content[: len(content) // 2])
+        with msgflow.trace.open([tmp_path]) as traces:
+            events, packets = read(traces)
+            assert (len(events), len(packets)) == (24, 8)
+            assert traces.repeated_packet_counts == {0: 2}
+            assert traces.duplicate_packet_count == 8
+
+    @pytest.mark.parametrize("is_named", [True, False])
+    def test_without_numbers(self, tmp_path: Path, is_named: bool) -> None:
+        """Packets that are equal byte for byte; one that differs in one of them stays."""
+        trace = self.numbered(tmp_path / "a")
+        text = (trace / "metadata").read_text().replace("packet_seq_num", "other")
+        if not is_named:
+            text = text.replace("uint64_t stream_instance_id", "uint64_t other")
+        (trace / "metadata").write_text(text)
+        content = bytearray((trace / "channel_0").read_bytes())
+        content[-1] ^= 1
+        (trace / "more").write_bytes(content)
+        with msgflow.trace.open([trace]) as traces:
+            events, _ = read(traces)
+            assert len(events) == 24 + 3
+            assert traces.repeated_packet_counts == {0: 3}
+
+    def test_an_empty_packet_in_front_is_none(self, tmp_path: Path) -> None:
+        """Rotation writes such: they begin together, and may have no numbers."""
+        streams = {0: [Packet(begin=0, end=0), packet(0), packet(10)]}
+        trace = write_trace(tmp_path / "a", TraceContent({"ros2:x": {"n": "u64"}}, streams))
+        with msgflow.trace.open([trace]) as traces:
+            events, packets = read(traces)
+            assert (len(events), len(packets)) == (6, 3)
+            assert not traces.repeated_packet_counts

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.declarations import MetadataError
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
 GIGA = 1_000_000_000
+LATEST_NS = 1 << 62
+"""Times are nearer than this to the epoch, 146 years: so differences of any two of them fit."""
+
+_HIGHEST_FREQUENCY = 1 << 63
+# Up to here what `Clock.to_ns_array` adds and multiplies fits into 64 bits.
+_HIGHEST_FAST_FREQUENCY = 9 * GIGA
 
 
 @dataclass(frozen=True)
@@ -30,6 +39,25 @@ class Clock:
     name: str | None = None
     uuid: str | None = None
 
+    def __post_init__(self) -> None:
+        if not 1 <= self.frequency < _HIGHEST_FREQUENCY:
+            raise MetadataError(f"a clock of {self.frequency} Hz makes no sense")
+
+    def plausible(self, notes: list[str]) -> Clock:
+        """Return the clock without its offset if that makes no sense, which is then noted."""
+        if abs(self.to_ns(0)) < LATEST_NS:
+            return self
+        name = "" if self.name is None else f" {self.name!r}"
+        notes.append(f"the offset of the clock{name} makes no sense: its times count from 0")
+        return replace(self, offset_seconds=0, offset_cycles=0)
+
+    @cached_property
+    def limits(self) -> tuple[int, int]:
+        """The first and last value whose times make sense."""
+        first = -((LATEST_NS - 1 + self.offset_seconds * GIGA) * self.frequency // GIGA)
+        last = (LATEST_NS - 1 - self.offset_seconds * GIGA) * self.frequency // GIGA
+        return max(first - self.offset_cycles, 0), min(last - self.offset_cycles, (1 << 64) - 1)
+
     def to_ns(self, value: int) -> int:
         """Return the time of a clock value in epoch nanoseconds, rounded down."""
         cycles = value + self.offset_cycles
@@ -42,6 +70,10 @@ class Clock:
         origin = self.offset_seconds * GIGA
         if self.frequency == GIGA:
             return (values + np.uint64((origin + self.offset_cycles) % 2**64)).view(np.int64)
+        if self.frequency > _HIGHEST_FAST_FREQUENCY:
+            cycles_of = values.astype(object) + self.offset_cycles
+            wrapped = (cycles_of * GIGA // self.frequency + origin) % 2**64
+            return wrapped.astype(np.uint64).view(np.int64)
         seconds, cycles = divmod(self.offset_cycles, self.frequency)
         whole, part = np.divmod(values, np.uint64(self.frequency))
         # Both parts are below one second: their sum fits, as does a billion times it for any

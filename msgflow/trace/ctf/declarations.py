@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.clock import Clock
 
 
+_SMALLEST_ID, _LARGEST_ID = -(1 << 63), (1 << 64) - 1
+
+
 class MetadataError(Exception):
     """The metadata cannot be understood; the message says why and where."""
 
@@ -27,7 +30,11 @@ class EventClass:
 
 @dataclass(eq=False)
 class StreamClass:
-    """One kind of stream (LTTng: channel) and its events."""
+    """One kind of stream (LTTng: channel) and its events.
+
+    Attributes:
+        has_time: its events have times; else `clock` only counts packets.
+    """
 
     id: int
     packet_context: Structure = field(default_factory=Structure)
@@ -35,13 +42,32 @@ class StreamClass:
     event_context: Structure = field(default_factory=Structure)
     clock: Clock | None = None
     events: dict[int, EventClass] = field(default_factory=dict)
+    has_time: bool = True
 
 
 @dataclass(eq=False)
 class TraceClass:
-    """All of a trace's metadata."""
+    """All of a trace's metadata.
+
+    Attributes:
+        notes: what was left out because it makes no sense.
+    """
 
     uuid: str | None = None
     environment: dict[str, int | str] = field(default_factory=dict)
     packet_header: Structure = field(default_factory=Structure)
     streams: dict[int, StreamClass] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def add_event(self, stream: StreamClass, event: EventClass) -> None:
+        """Add an event class to a stream class.
+
+        Raises:
+            MetadataError: there is one of its id.
+        """
+        if not _SMALLEST_ID <= event.id <= _LARGEST_ID:
+            self.notes.append(f"no event can have the id {event.id} of {event.name!r}: left out")
+            return
+        if event.id in stream.events:
+            raise MetadataError(f"there are two events {event.id} in stream {stream.id}")
+        stream.events[event.id] = event

@@ -27,13 +27,14 @@ def describe(
     """Return the description of a trace that has event data, and put its clocks on `base`.
 
     Raises:
-        TraceError: its events have no time.
+        TraceError: it declares no stream, or only some of its streams have times.
     """
     classes = list(trace.streams.values())
     used = [stream.layout.stream for stream in streams] or classes
     if not classes or any(stream.clock is None for stream in used):
         raise TraceError(
-            f"the events have no time stamps — {path}", hint="record with LTTng or ros2_tracing"
+            f"some of the streams have no time stamps — {path}",
+            hint="record with LTTng or ros2_tracing",
         )
     clock = used[0].clock
     assert clock is not None
@@ -62,6 +63,7 @@ def describe(
         event_names=tuple(
             sorted({event.name for stream in classes for event in stream.events.values()})
         ),
+        has_time=used[0].has_time,
     )
 
 

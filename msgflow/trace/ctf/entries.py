@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.losses import LossCounter, recording_of
+from msgflow.trace.ctf.repetitions import Repetitions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -55,20 +56,38 @@ class Entry:
         return self.stream.rank, self.position
 
 
+@dataclass(frozen=True)
+class Entries:
+    """What to read.
+
+    Attributes:
+        packets: in order of time.
+        copies: packets left out that another trace holds as well.
+        repeated: trace index to the packets left out that the same trace holds twice.
+    """
+
+    packets: list[Entry]
+    copies: int
+    repeated: Mapping[int, int]
+
+
 def entries_of(
     streams: Sequence[Stream],
     traces: Sequence[TraceInfo],
     begins: Mapping[Packet, tuple[int, int]],
-) -> tuple[list[Entry], int]:
-    """Return what to read in order of time, and how many packets are left out as copies.
+    report: Callable[[Entry, int, str], None],
+) -> Entries:
+    """Return what to read in order of time, copies left out.
 
     The same packet may be given twice (a copied directory, overlapping snapshots): same trace
-    uuid, stream class, stream instance and begin. The one of the first trace is read.
+    uuid, stream class, stream instance and begin. The one of the first trace is read. In one
+    trace, where packets may well begin at the same time, see `Repetitions`.
 
     Args:
         streams: of all traces.
         traces: what they declare.
         begins: for packets that do not say when they begin, the clock's value and the time.
+        report: called with packet, byte and message for counters that make no sense.
     """
     candidates = []
     for stream in streams:
@@ -91,17 +110,25 @@ def entries_of(
     entries = []
     counter = LossCounter()
     copies = 0
+    repetitions = Repetitions()
+    repeated: dict[int, int] = {}
     positions: dict[int, int] = {}
     for order_ns, rank, begin, stream, packet in candidates:
         info = traces[stream.trace_index]
         owner = owners.get((info.uuid or "", stream.class_id, stream.instance, begin))
         is_copy = owner is not None and owner != stream.trace_index
         recording = recording_of(stream, info.uuid, str(info.path))
-        discarded, lost = counter.losses(recording, stream, packet, not is_copy)
+        losses = counter.losses(recording, stream, packet, not is_copy)
         if is_copy:
             copies += 1
             continue
+        if repetitions.has(stream, packet):
+            repeated[stream.trace_index] = repeated.get(stream.trace_index, 0) + 1
+            continue
         position = positions.get(rank, 0)
         positions[rank] = position + 1
-        entries.append(Entry(stream, packet, position, begin, order_ns, discarded, lost))
-    return entries, copies
+        entry = Entry(stream, packet, position, begin, order_ns, losses.events, losses.packets)
+        entries.append(entry)
+        if losses.problem is not None:
+            report(entry, 0, losses.problem)
+    return Entries(entries, copies, repeated)

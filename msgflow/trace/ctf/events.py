@@ -17,10 +17,15 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from msgflow.trace.ctf.clock import Clock
     from msgflow.trace.ctf.entries import Entry
     from msgflow.trace.ctf.layout import StreamLayout
     from msgflow.trace.ctf.memory import Memory
     from msgflow.trace.ctf.slow import PacketWalk
+
+
+# Some tracers end packets too early, but not by a day.
+_SLACK_SECONDS = 86_400
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,57 @@ def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) 
     begins = np.array([entry.begin for entry in entries], np.uint64)
     headers = read_headers(layout, memory, positions, counts, begins)
     return Events(counts, headers.classes, headers.clock, headers.bodies, positions)
+
+
+def without_absurd(
+    layout: StreamLayout,
+    entries: Sequence[Entry],
+    events: Events,
+    report: Callable[[Entry, int, str], None],
+) -> Events:
+    """Return the events without those whose times are far from their packets.
+
+    `report` is called with the packet, the byte of the first of them, and a message.
+    """
+    clock = layout.stream.clock
+    assert clock is not None
+    limits = np.array([_limits(entry, clock) for entry in entries], np.uint64).reshape(-1, 2)
+    filled = np.flatnonzero(events.counts)
+    if not filled.size:
+        return events
+    first = (np.cumsum(events.counts) - events.counts)[filled]
+    is_early = np.minimum.reduceat(events.clock, first) < limits[filled, 0]
+    is_late = np.maximum.reduceat(events.clock, first) > limits[filled, 1]
+    if not (is_early | is_late).any():
+        return events
+    packets = np.repeat(np.arange(events.counts.size), events.counts)
+    good = (events.clock >= limits[packets, 0]) & (events.clock <= limits[packets, 1])
+    for place in np.unique(packets[~good]).tolist():
+        entry = entries[place]
+        rows = np.flatnonzero((packets == place) & ~good)
+        at = int(events.positions[rows[0]])
+        offset = at // BYTE if layout.header is None else at - entry.base
+        number = f"{rows.size} events" if rows.size > 1 else "an event"
+        report(entry, offset, f"{number} with a time that makes no sense: left out")
+    return Events(
+        np.bincount(packets[good], minlength=events.counts.size),
+        *(
+            values[good]
+            for values in (events.classes, events.clock, events.bodies, events.positions)
+        ),
+    )
+
+
+def _limits(entry: Entry, clock: Clock) -> tuple[int, int]:
+    """Return the first and last value of the clock that an event of a packet may have."""
+    header = entry.packet.header
+    first, last = clock.limits
+    slack = _SLACK_SECONDS * clock.frequency
+    if header.begin is not None:
+        first = max(first, header.begin - slack)
+    if header.end:
+        last = min(last, max(header.end, entry.begin) + slack)
+    return first, last
 
 
 def walk_of(layout: StreamLayout, memory: Memory, entry: Entry, base: int) -> PacketWalk:

@@ -13,8 +13,7 @@ from msgflow.trace.ctf.types import (
     aligned,
 )
 
-_MOST_ELEMENTS = 4096
-_MOST_LEAVES = 100_000
+_MOST_STEPS = 100_000
 
 
 class DynamicError(Exception):
@@ -51,32 +50,43 @@ def lay_out(
         path: names of the structures around it.
 
     Raises:
-        DynamicError: it is not always the same.
+        DynamicError: it is not always the same, or has too many parts to go through.
     """
-    position = aligned(position, declared.align)
-    match declared:
-        case Integer() | Real():
-            if leaves is not None:
-                leaves.append(Leaf(path, declared, position))
-            return position + declared.size
-        case Array() if is_dense(declared.element):
-            if leaves is not None:
-                leaves.append(Leaf(path, declared, position))
-            return position + declared.length * _dense_size(declared.element)
-        case Array():
-            if declared.length > _MOST_ELEMENTS:
-                raise DynamicError
-            for number in range(declared.length):
-                position = lay_out(declared.element, position, leaves, (*path, str(number)))
-                if leaves is not None and len(leaves) > _MOST_LEAVES:
-                    raise DynamicError
-            return position
-        case Structure():
-            for member in declared.members:
-                position = lay_out(member.type, position, leaves, (*path, member.name))
-            return position
-        case _:
+    return _Layout(leaves).end(declared, position, path)
+
+
+class _Layout:
+    def __init__(self, leaves: list[Leaf] | None) -> None:
+        self._leaves = leaves
+        # Of arrays in arrays there may be as many elements as atoms in the world.
+        self._steps = 0
+
+    def end(self, declared: Type, position: int, path: tuple[str, ...]) -> int:
+        self._steps += 1
+        if self._steps > _MOST_STEPS:
             raise DynamicError
+        position = aligned(position, declared.align)
+        match declared:
+            case Integer() | Real():
+                if self._leaves is not None:
+                    self._leaves.append(Leaf(path, declared, position))
+                return position + declared.size
+            case Array() if is_dense(declared.element):
+                if self._leaves is not None:
+                    self._leaves.append(Leaf(path, declared, position))
+                return position + declared.length * _dense_size(declared.element)
+            case Array():
+                if declared.length > _MOST_STEPS:
+                    raise DynamicError
+                for number in range(declared.length):
+                    position = self.end(declared.element, position, (*path, str(number)))
+                return position
+            case Structure():
+                for member in declared.members:
+                    position = self.end(member.type, position, (*path, member.name))
+                return position
+            case _:
+                raise DynamicError
 
 
 def is_dense(element: Type) -> bool:

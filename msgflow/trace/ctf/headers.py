@@ -132,7 +132,8 @@ class _Reader:
             return layout.classes[layout.only_id].number
         is_selector = form.id == layout.header.selector
         ids = selector[rows] if is_selector else self.gather(form.id, rows)
-        known = np.array(sorted(layout.classes), np.uint64)
+        possible = range(form.id.mask + 1)
+        known = np.array(sorted(i for i in layout.classes if i in possible), np.uint64)
         numbers = np.array([layout.classes[int(i)].number for i in known], np.uint32)
         if known.size and int(known[-1]) < 1 << 16:
             table = np.zeros(int(known[-1]) + 1, np.uint32)

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from typing import TYPE_CHECKING, Final, NamedTuple
+
+from msgflow.trace.files import UnsuitableFileError, read_regular
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+DIRECTORY: Final = "index"
+"""Name of the directory beside the streams that has the indexes."""
+
+_SUFFIX: Final = ".idx"
 _MAGIC: Final = 0xC1F1DCC1
 _HEADER: Final = struct.Struct(">IIII")
 _ENTRY: Final = struct.Struct(">5Q")
 _LONGEST_ENTRY: Final = 4096
+_SHORTEST_LIMIT: Final = 1 << 20
 
 
 class IndexEntry(NamedTuple):
@@ -24,11 +32,29 @@ class IndexEntry(NamedTuple):
     end: int
 
 
+def path_of(stream_file: Path) -> Path:
+    """Return where the index of a stream file lies, if it has one."""
+    return stream_file.parent / DIRECTORY / f"{stream_file.name}{_SUFFIX}"
+
+
+def orphans(directory: Path) -> list[Path]:
+    """List the indexes in a trace directory whose stream files are missing."""
+    indexes = sorted((directory / DIRECTORY).glob(f"*{_SUFFIX}"))
+    return [path for path in indexes if not os.path.lexists(directory / path.stem)]
+
+
 def entries(stream_file: Path) -> dict[int, IndexEntry]:
-    """Return what the index of this file says, by offset; nothing if it is missing or no index."""
-    path = stream_file.parent / "index" / f"{stream_file.name}.idx"
+    """Return what the index of this file says, by offset; nothing if it is missing or no index.
+
+    Raises:
+        UnsuitableFileError: it is no file, or longer than an index of this file could be.
+    """
     try:
-        content = path.read_bytes()
+        # An entry is shorter than its packet.
+        most = max(stream_file.stat().st_size, _SHORTEST_LIMIT)
+        content = read_regular(path_of(stream_file), most)
+    except UnsuitableFileError:
+        raise
     except OSError:
         return {}
     if len(content) < _HEADER.size:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 from uuid import UUID
 
@@ -14,6 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _SEPARATOR = "\x1e"
+# Beyond everything that can make sense, and short enough to be shown.
+_LARGEST = 1 << 80
+_MOST_DIGITS = 30
+_LONE_HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def parse(text: str) -> TraceClass:
@@ -41,9 +46,10 @@ def parse(text: str) -> TraceClass:
                 trace.environment = environment
                 trace.packet_header = types.structure(fragment, "packet-header-field-class")
             case "clock-class":
+                clock = _clock(fragment, trace.notes)
                 for key in ("id", "name"):
                     if key in fragment:
-                        clocks.setdefault(str(fragment[key]), _clock(fragment))
+                        clocks.setdefault(str(fragment[key]), clock)
             case "data-stream-class":
                 stream = _stream_class(fragment, types, clocks)
                 if stream.id in trace.streams:
@@ -53,10 +59,7 @@ def parse(text: str) -> TraceClass:
                 stream_id = integer_of(fragment, "data-stream-class-id", 0)
                 if stream_id not in trace.streams:
                     raise MetadataError(f"there is no stream class {stream_id}")
-                event = _event_class(fragment, types)
-                if event.id in trace.streams[stream_id].events:
-                    raise MetadataError(f"there are two events {event.id} in stream {stream_id}")
-                trace.streams[stream_id].events[event.id] = event
+                trace.add_event(trace.streams[stream_id], _event_class(fragment, types))
             case other:
                 raise MetadataError(f"unknown fragment {other!r}")
     return trace
@@ -67,12 +70,31 @@ def _fragments(text: str) -> Iterator[dict[str, Any]]:
         if not part.strip():
             continue
         try:
-            fragment = json.loads(part)
+            fragment = json.loads(part, parse_int=_integer)
         except ValueError as error:
             raise MetadataError(f"fragment {number} is no JSON ({error})") from error
         if not isinstance(fragment, dict):
             raise MetadataError(f"fragment {number} is no object")
-        yield fragment
+        yield _encodable(fragment) if _LONE_HALF.search(part) else fragment
+
+
+def _integer(digits: str) -> int:
+    if len(digits) <= _MOST_DIGITS:
+        return int(digits)
+    return -_LARGEST if digits.startswith("-") else _LARGEST
+
+
+def _encodable(value: Any) -> Any:
+    """Replace halves of characters, which no text in UTF-8 can hold."""
+    match value:
+        case str():
+            return value.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
+        case list():
+            return [_encodable(item) for item in value]
+        case dict():
+            return {_encodable(key): _encodable(item) for key, item in value.items()}
+        case _:
+            return value
 
 
 def _stream_class(
@@ -99,19 +121,19 @@ def _event_class(fragment: dict[str, Any], types: TypeReader) -> EventClass:
     )
 
 
-def _clock(fragment: dict[str, Any]) -> Clock:
-    offset = fragment.get("offset-from-origin", {})
-    frequency = integer_of(fragment, "frequency", None)
-    if frequency < 1 or not isinstance(offset, dict):
-        raise MetadataError("the frequency or offset of a clock makes no sense")
+def _clock(fragment: dict[str, Any], notes: list[str]) -> Clock:
+    # Before the final specification it was called `offset`.
+    offset = fragment.get("offset-from-origin", fragment.get("offset", {}))
+    if not isinstance(offset, dict):
+        raise MetadataError("the offset of a clock is no object")
     name = fragment.get("name")
     return Clock(
-        frequency=frequency,
+        frequency=integer_of(fragment, "frequency", None),
         offset_seconds=integer_of(offset, "seconds", 0),
         offset_cycles=integer_of(offset, "cycles", 0),
         name=None if name is None else str(name),
         uuid=_uuid(fragment.get("uid", fragment.get("uuid"))),
-    )
+    ).plausible(notes)
 
 
 def _uuid(value: Any) -> str | None:

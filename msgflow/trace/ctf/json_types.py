@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from msgflow.trace.ctf.declarations import MetadataError
@@ -21,6 +22,7 @@ from msgflow.trace.ctf.types import (
     Type,
     VariableInteger,
     Variant,
+    may_have,
 )
 
 _ORIGINS = {
@@ -71,7 +73,8 @@ class TypeReader:
             return self._aliases[declared]
         if not isinstance(declared, dict):
             raise MetadataError(f"{declared!r} is no field class")
-        kind = str(declared.get("type"))
+        # Before the final specification integers with mappings had types of their own.
+        kind = str(declared.get("type")).replace("signed-enumeration", "signed-integer")
         match kind:
             case (
                 "fixed-length-unsigned-integer"
@@ -82,7 +85,8 @@ class TypeReader:
             ):
                 return _integer(declared, kind)
             case "variable-length-unsigned-integer" | "variable-length-signed-integer":
-                return VariableInteger("unsigned" not in kind, _labels(declared), _roles(declared))
+                integer = VariableInteger("unsigned" not in kind, _labels(declared))
+                return replace(integer, roles=_roles(declared, integer))
             case "fixed-length-floating-point-number":
                 size = integer_of(declared, "length", None)
                 if size not in {32, 64}:
@@ -98,7 +102,8 @@ class TypeReader:
                 _check_encoding(declared)
                 return Sequence(_CHARACTER, _reference(declared, "length-field-location"))
             case "static-length-blob":
-                return Array(_BYTE, _length(declared), roles=_roles(declared))
+                blob = Array(_BYTE, _length(declared))
+                return replace(blob, roles=_roles(declared, blob))
             case "dynamic-length-blob":
                 return Sequence(_BYTE, _reference(declared, "length-field-location"))
             case "static-length-array":
@@ -126,7 +131,7 @@ class TypeReader:
                     else _TRUE,
                 )
             case _:
-                raise MetadataError(f"unknown field class {kind!r}")
+                raise MetadataError(f"unknown field class {declared.get('type')!r}")
 
     def _structure(self, declared: dict[str, Any]) -> Structure:
         members = [
@@ -159,16 +164,16 @@ def _integer(declared: dict[str, Any], kind: str) -> Integer:
     size = integer_of(declared, "length", None)
     if not 1 <= size <= _MOST_BITS:
         raise MetadataError(f"an integer of {size} bits makes no sense")
-    return Integer(
+    integer = Integer(
         size=size,
         align=_align(declared, "alignment"),
         big_endian=_is_big_endian(declared),
         signed=kind == "fixed-length-signed-integer",
         labels=_labels(declared),
-        roles=_roles(declared),
         arrow=_ARROW.get(kind, "integer"),
         base=integer_of(declared, "preferred-display-base", 10),
     )
+    return replace(integer, roles=_roles(declared, integer))
 
 
 def _is_big_endian(declared: dict[str, Any]) -> bool:
@@ -212,11 +217,11 @@ def _ranges(declared: Any) -> Ranges:
     return ranges
 
 
-def _roles(declared: dict[str, Any]) -> frozenset[str]:
+def _roles(declared: dict[str, Any], of_type: Type) -> frozenset[str]:
     roles = declared.get("roles", [])
     if not isinstance(roles, list):
         raise MetadataError(f"{roles!r} is no list of roles")
-    return frozenset(map(str, roles))
+    return frozenset(role for role in map(str, roles) if may_have(of_type, role))
 
 
 def _objects(declared: dict[str, Any], key: str) -> list[dict[str, Any]]:

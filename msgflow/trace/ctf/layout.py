@@ -149,7 +149,7 @@ class StreamLayout:
         for form in self.header.forms:
             if form.holds(event_id):
                 is_short = form.id == self.header.selector
-                return form if is_short and event_id <= self.header.selector.mask else None
+                return form if is_short and 0 <= event_id <= self.header.selector.mask else None
         return None
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,7 +12,23 @@ if TYPE_CHECKING:
 Recording = tuple[str, int, int]
 """Trace uuid (or path), stream class and stream instance: one counter, through all chunks."""
 
-_LARGEST = (1 << 63) - 1
+# More than any tracer can lose from one packet to the next: the counter itself is damaged.
+_MOST_LOST = 1 << 48
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What was lost.
+
+    Attributes:
+        events: in the packet; None: unknown.
+        packets: right before it.
+        problem: what makes no sense, if anything.
+    """
+
+    events: int | None
+    packets: int
+    problem: str | None
 
 
 class LossCounter:
@@ -23,13 +40,11 @@ class LossCounter:
 
     def __init__(self) -> None:
         self._counters: dict[Recording, int] = {}
-        self._previous: dict[int, Packet] = {}
+        self._of_stream: dict[int, int] = {}
         self._sequences: dict[Recording, int] = {}
 
-    def losses(
-        self, recording: Recording, stream: Stream, packet: Packet, counts: bool
-    ) -> tuple[int | None, int]:
-        """Return the events lost in a packet (None: unknown), and the packets lost before it.
+    def losses(self, recording: Recording, stream: Stream, packet: Packet, counts: bool) -> Losses:
+        """Return what was lost in a packet and before it.
 
         Args:
             recording: what the counters count for.
@@ -37,24 +52,26 @@ class LossCounter:
             packet: must come in order of time.
             counts: False for a copy of a packet, which only serves to be compared with.
         """
-        previous = self._previous.get(id(stream))
-        self._previous[id(stream)] = packet
-        lost = 0
         header = packet.header
+        lost, problem = 0, None
         if header.sequence is not None:
             expected = self._sequences.get(recording, -1) + 1
-            lost = min(max(header.sequence - expected, 0), _LARGEST)
+            lost = max(header.sequence - expected, 0)
             self._sequences[recording] = header.sequence
+            if lost > _MOST_LOST:
+                lost, problem = 0, f"the number {header.sequence} of the packet makes no sense"
+                self._sequences[recording] = expected
         if header.discarded is None:
-            return None if packet.is_cut else 0, lost
-        before = self._counters.get(recording, 0)
-        if previous is not None and previous.header.discarded is not None:
-            before = previous.header.discarded
+            return Losses(None if packet.is_cut else 0, lost, problem)
+        before = self._of_stream.get(id(stream), self._counters.get(recording, 0))
+        discarded: int | None = _rise(before, header.discarded, header.discarded_bits)
+        if discarded is not None and discarded > _MOST_LOST:
+            problem = f"the counter of lost events makes no sense: {header.discarded}"
+            return Losses(None, lost, problem)
+        self._of_stream[id(stream)] = header.discarded
         if counts:
             self._counters[recording] = header.discarded
-        if packet.is_cut:
-            return None, lost
-        return min(_rise(before, header.discarded, header.discarded_bits), _LARGEST), lost
+        return Losses(None if packet.is_cut else discarded, lost, problem)
 
 
 def recording_of(stream: Stream, uuid: str | None, path: str) -> Recording:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, tsdl
 from msgflow.trace.ctf.declarations import MetadataError
+from msgflow.trace.ctf.shape import check_shapes
 from msgflow.trace.metadata import (
     BYTE_ORDER_OF_MAGIC,
-    FILE_NAME,
     HEADER_SIZE,
     SIZES_OFFSET,
     MetadataKind,
+    content_of,
     kind_of,
 )
 
@@ -31,11 +32,13 @@ def read(directory: Path) -> TraceClass:
     """
     kind = kind_of(directory)
     try:
-        text = _text((directory / FILE_NAME).read_bytes())
-        return json_metadata.parse(text) if kind is MetadataKind.JSON else tsdl.parse(text)
+        text = _text(content_of(directory))
+        trace = json_metadata.parse(text) if kind is MetadataKind.JSON else tsdl.parse(text)
+        check_shapes(trace)
     except (MetadataError, RecursionError) as error:
         reason = str(error) if isinstance(error, MetadataError) else "too deeply nested"
         raise damaged_error(directory, reason) from error
+    return trace
 
 
 def damaged_error(directory: Path, reason: str) -> TraceError:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.trace.ctf.events import Events, find_events, read_events
+from msgflow.trace.ctf.events import Events, find_events, read_events, without_absurd
 from msgflow.trace.ctf.loading import Loader
 
 if TYPE_CHECKING:
@@ -104,6 +104,12 @@ def _load(
     report: Callable[[Entry, int, str], None],
 ) -> Batch:
     entries = sorted([*held, *new], key=lambda entry: entry.place)
+    is_held = set(map(id, held))
+
+    def report_once(entry: Entry, offset: int, message: str) -> None:
+        if id(entry) not in is_held:
+            report(entry, offset, message)
+
     for entry in loader.load(entries):
         report(entry, 0, "the file has become shorter, the packet is gone")
         entry.events = np.empty(0, np.int64)
@@ -114,12 +120,12 @@ def _load(
         of_layout = list(group)
         find_events(layout, memory, [e for e in of_layout if e.events is None], report)
         events = read_events(layout, memory, of_layout)
+        events = without_absurd(layout, of_layout, events, report_once)
         parts.append(events)
         clock = layout.stream.clock
         assert clock is not None
         times.append(clock.to_ns_array(events.clock))
     counts = np.concatenate([part.counts for part in parts])
-    is_held = set(map(id, held))
     cpus = [entry.packet.header.cpu for entry in entries]
     return Batch(
         memory=memory,

@@ -5,7 +5,9 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
+from uuid import UUID
 
+from msgflow.trace.ctf.declarations import MetadataError
 from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
 from msgflow.trace.ctf.types import (
     BYTE,
@@ -64,6 +66,7 @@ class PacketHeader:
         discarded: events lost in the stream so far.
         discarded_bits: size of that counter.
         cpu: the CPU it was written on.
+        foreign: uuid of the trace that it belongs to, if that is not the uuid of the metadata.
     """
 
     stream: StreamClass
@@ -77,6 +80,7 @@ class PacketHeader:
     discarded: int | None
     discarded_bits: int
     cpu: int | None
+    foreign: str | None
 
 
 class HeaderReader:
@@ -87,12 +91,20 @@ class HeaderReader:
     """
 
     def __init__(self, trace: TraceClass) -> None:
+        """Look at the headers that a trace declares.
+
+        Raises:
+            MetadataError: one is too long.
+        """
         self._trace = trace
+        self._uuid = None if trace.uuid is None else UUID(trace.uuid).bytes
         self._plans: dict[int, _Plan | None] = {}
         self._start = _plan(trace.packet_header, 0)
         contexts = [self._plan_of(stream) for stream in trace.streams.values()]
         ends = [_LONGEST_HEADER if plan is None else plan.end // BYTE + 1 for plan in contexts]
         self.size = max(ends, default=_LONGEST_HEADER)
+        if self.size > _LONGEST_HEADER:
+            raise MetadataError(f"the headers of packets have {self.size:,} bytes")
 
     def read(self, data: bytes) -> PacketHeader:
         """Read the header at the begin of `data`.
@@ -108,11 +120,15 @@ class HeaderReader:
         if plan is None:
             return self._walk(data)
         found |= plan.read(data)
-        return _header(stream, found, plan.end, plan.discarded_bits)
+        return self._header(stream, found, plan.end, plan.discarded_bits)
 
-    def pattern(self) -> bytes | None:
-        """Return bytes with which every packet begins, None if there are none to rely on."""
-        if self._start is None or self._trace.uuid is None:
+    def pattern(self, uuid_text: str | None = None) -> bytes | None:
+        """Return bytes with which every packet begins, None if there are none to rely on.
+
+        `uuid_text` is the uuid in the packets, where it is not that of the metadata.
+        """
+        uuid_text = uuid_text or self._trace.uuid
+        if self._start is None or uuid_text is None:
             return None
         places = self._start.places
         if MAGIC_ROLE not in places or UUID_ROLE not in places:
@@ -120,7 +136,7 @@ class HeaderReader:
         magic, uuid = places[MAGIC_ROLE], places[UUID_ROLE]
         if (magic.first, magic.last, uuid.first) != (0, 4, 4):
             return None
-        return MAGIC.to_bytes(4, magic.order) + bytes.fromhex(self._trace.uuid.replace("-", ""))
+        return MAGIC.to_bytes(4, magic.order) + bytes.fromhex(uuid_text.replace("-", ""))
 
     def _plan_of(self, stream: StreamClass) -> _Plan | None:
         plan = None if self._start is None else _plan(stream.packet_context, self._start.end)
@@ -130,9 +146,6 @@ class HeaderReader:
     def _check(self, found: dict[str, Any]) -> StreamClass:
         if found.get(MAGIC_ROLE, MAGIC) != MAGIC:
             raise FieldError("no packet begins here, the magic number is missing")
-        uuid = found.get(UUID_ROLE)
-        if uuid is not None and self._trace.uuid not in {None, _uuid_text(uuid)}:
-            raise FieldError(f"the packet belongs to another trace, {_uuid_text(uuid)}")
         streams = self._trace.streams
         class_id = found.get(STREAM_CLASS_ROLE)
         if class_id is None and len(streams) == 1:
@@ -150,25 +163,27 @@ class HeaderReader:
         found = dict(walker.found)
         if isinstance(context.get(_CPU), int):
             found[_CPU] = context[_CPU]
-        return _header(stream, found, walker.position, 64)
+        return self._header(stream, found, walker.position, 64)
 
-
-def _header(
-    stream: StreamClass, found: dict[str, Any], events_at: int, discarded_bits: int
-) -> PacketHeader:
-    return PacketHeader(
-        stream=stream,
-        instance=found.get(STREAM_ROLE),
-        size_bits=found.get(PACKET_SIZE_ROLE),
-        content_bits=found.get(CONTENT_SIZE_ROLE),
-        events_at=events_at,
-        begin=found.get(TIME_ROLE),
-        end=found.get(END_ROLE),
-        sequence=found.get(SEQUENCE_ROLE),
-        discarded=found.get(DISCARDED_ROLE),
-        discarded_bits=discarded_bits,
-        cpu=found.get(_CPU),
-    )
+    def _header(
+        self, stream: StreamClass, found: dict[str, Any], events_at: int, discarded_bits: int
+    ) -> PacketHeader:
+        uuid = found.get(UUID_ROLE)
+        is_foreign = uuid is not None and self._uuid is not None and uuid != self._uuid
+        return PacketHeader(
+            stream=stream,
+            instance=found.get(STREAM_ROLE),
+            size_bits=found.get(PACKET_SIZE_ROLE),
+            content_bits=found.get(CONTENT_SIZE_ROLE),
+            events_at=events_at,
+            begin=found.get(TIME_ROLE),
+            end=found.get(END_ROLE),
+            sequence=found.get(SEQUENCE_ROLE),
+            discarded=found.get(DISCARDED_ROLE),
+            discarded_bits=discarded_bits,
+            cpu=found.get(_CPU),
+            foreign=_uuid_text(uuid) if uuid is not None and is_foreign else None,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ class PacketRows:
             if count and batch.clock[end - count] < entry.begin:
                 self._report(entry, 0, "an event is earlier than the begin of its packet")
             last = int(batch.clock[end - 1]) if count else None
-            last_ns = int(batch.ts_ns[end - 1]) if count else None
+            last_ns = int(batch.ts_ns[end - 1]) if count and entry.stream.has_time else None
             self._rows.append(self._row(entry, count, last, last_ns))
 
     def take(self, most: int, number: int) -> Iterator[EventBatch]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import index
 from msgflow.trace.ctf.rising import misplaced
 from msgflow.trace.ctf.types import BYTE
 from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.files import UnsuitableFileError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -18,7 +19,13 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
 
 _CHUNK = 1 << 20
-_LATEST_NS = (1 << 63) - 1
+# A buffer of a tracer is far smaller; a packet is read as a whole.
+_LARGEST_CONTENT = 1 << 30
+# Smaller holes may be zeros that somebody's copy did not write.
+_SMALLEST_HOLE = 1 << 16
+_LARGEST_CPU = (1 << 31) - 1
+_HOLE = "the file has a hole within this packet, it was not copied whole"
+_BLOCK = 512
 _CUT = "the file ends within this packet, it was cut off or is still being written"
 
 
@@ -88,9 +95,16 @@ class _Hopping:
         self._descriptor = descriptor
         self._reader = reader
         self._report = report
-        self._file_size = os.fstat(descriptor).st_size
-        self._index = index.entries(path)
-        self._pattern = reader.pattern()
+        status = os.fstat(descriptor)
+        self._file_size = status.st_size
+        self._is_sparse = status.st_blocks * _BLOCK < status.st_size
+        self._foreign: set[str] = set()
+        self._patterns = [pattern for pattern in [reader.pattern()] if pattern is not None]
+        try:
+            self._index = index.entries(path)
+        except UnsuitableFileError as error:
+            self._index = {}
+            report(index.path_of(path), 0, 0, f"the index is not used: {error.strerror}")
 
     def run(self) -> Iterator[Packet]:
         offset = number = 0
@@ -122,7 +136,13 @@ class _Hopping:
             raise FieldError(
                 f"a packet of {size_bits} bits with {content_bits} used bits makes no sense"
             )
+        if content_bits > _LARGEST_CONTENT * BYTE:
+            raise FieldError(f"a packet of {content_bits // BYTE:,} bytes is too large to be read")
         self._check_times(header)
+        self._check_uuid(header, offset, number)
+        if header.cpu is not None and not 0 <= header.cpu <= _LARGEST_CPU:
+            self._report(self._path, number, offset, f"there is no CPU {header.cpu}: left out")
+            header = replace(header, cpu=None)
         if size > rest:
             is_last = self._next_begin(offset) == self._file_size
             if not is_last or header.events_at > rest * BYTE:
@@ -131,20 +151,64 @@ class _Hopping:
             there = min(content_bits, rest * BYTE)
             return Packet(self._path, number, offset, rest, there, header, is_cut=True)
         size = self._without_swallowed(offset, size, content_bits, number)
+        there = self._bits_before_hole(offset, content_bits)
+        if there < content_bits:
+            if there < header.events_at:
+                raise FieldError(_HOLE)
+            self._report(self._path, number, offset, f"{_HOLE}; what is in front of it is read")
+            return Packet(self._path, number, offset, size, there, header, is_cut=True)
         return Packet(self._path, number, offset, size, content_bits, header)
 
     def _check_times(self, header: PacketHeader) -> None:
         clock = header.stream.clock
-        for value in (header.begin, header.end):
-            if clock is not None and value is not None and clock.to_ns(value) > _LATEST_NS:
+        if clock is None:
+            return
+        first, last = clock.limits
+        for value in (header.begin, header.end or None):
+            if value is not None and not first <= value <= last:
                 raise FieldError("the time of the packet makes no sense")
         if header.begin is not None and header.end and header.end < header.begin:
             raise FieldError("the packet ends before it begins")
 
+    def _check_uuid(self, header: PacketHeader, offset: int, number: int) -> None:
+        """Say once that a uuid is not that of the metadata; read on, as Babeltrace does."""
+        if header.foreign is None or header.foreign in self._foreign:
+            return
+        pattern = self._reader.pattern(header.foreign)
+        if pattern is not None and not self._foreign:
+            self._patterns.append(pattern)
+        self._foreign.add(header.foreign)
+        self._report(
+            self._path,
+            number,
+            offset,
+            f"the packet belongs to another trace, {header.foreign}: read nevertheless, as this "
+            "metadata says",
+        )
+
+    def _bits_before_hole(self, offset: int, content_bits: int) -> int:
+        """Return how much of a packet's content is in front of the first large hole of the file."""
+        if not self._is_sparse:
+            return content_bits
+        at, end = offset, offset + (content_bits + BYTE - 1) // BYTE
+        while at < end:
+            hole = os.lseek(self._descriptor, at, os.SEEK_HOLE)
+            at = self._next_data(hole)
+            if min(at, end) - hole >= _SMALLEST_HOLE:
+                return min((hole - offset) * BYTE, content_bits)
+        return content_bits
+
+    def _next_data(self, offset: int) -> int:
+        """Return the first offset from this one on that is in no hole, or the file's end."""
+        try:
+            return os.lseek(self._descriptor, offset, os.SEEK_DATA)
+        except OSError:
+            return self._file_size
+
     def _without_swallowed(self, offset: int, size: int, content_bits: int, number: int) -> int:
         """Return where a packet really ends whose unused end holds the next one."""
         used = (content_bits + BYTE - 1) // BYTE
-        if self._pattern is None or size - used < len(self._pattern):
+        if not self._patterns or size - used < len(self._patterns[0]):
             return size
         found = self._find(offset + used, offset + size)
         if found is None:
@@ -159,7 +223,7 @@ class _Hopping:
         known = [begin for begin in self._index if offset < begin < self._file_size]
         if known:
             return min(known)
-        if self._pattern is not None:
+        if self._patterns:
             found = self._find(offset + 1, self._file_size)
             if found is not None:
                 return found
@@ -167,13 +231,15 @@ class _Hopping:
 
     def _find(self, begin: int, end: int) -> int | None:
         """Return the first offset in a part of the file at which a packet seems to begin."""
-        assert self._pattern is not None
-        overlap = len(self._pattern) - 1
+        overlap = len(self._patterns[0]) - 1
         while begin + overlap < end:
-            content = os.pread(self._descriptor, min(_CHUNK, end - begin), begin)
-            found = content.find(self._pattern)
-            if found >= 0:
-                return begin + found
+            if self._is_sparse:
+                # No packet begins with zeros.
+                begin = self._next_data(begin)
+            content = os.pread(self._descriptor, max(min(_CHUNK, end - begin), 0), begin)
+            found = [at for pattern in self._patterns if (at := content.find(pattern)) >= 0]
+            if found:
+                return begin + min(found)
             if len(content) <= overlap:
                 break
             begin += len(content) - overlap

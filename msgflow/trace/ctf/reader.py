@@ -6,16 +6,21 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
+from msgflow.trace.ctf.declarations import MetadataError
 from msgflow.trace.ctf.describe import describe
 from msgflow.trace.ctf.entries import entries_of
+from msgflow.trace.ctf.index import orphans
 from msgflow.trace.ctf.iteration import Iteration
 from msgflow.trace.ctf.layout import StreamLayout
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.probe import begins_of
 from msgflow.trace.ctf.scan import BEYOND_END
 from msgflow.trace.ctf.streams import streams_of
-from msgflow.trace.discovery import stream_files
+from msgflow.trace.ctf.timeless import give_order, is_timeless, numbers_of
+from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.exclusive import ExclusiveTraceSet
+from msgflow.trace.files import unreadable_error
+from msgflow.trace.metadata import FILE_NAME
 from msgflow.trace.model import Damage, undeclared
 from msgflow.trace.time_base import TimeBase
 
@@ -55,9 +60,15 @@ class CtfTraceSet(ExclusiveTraceSet):
 
     def _open(self, location: TraceLocation, index: int) -> TraceInfo:
         path = location.path
-        declared = metadata.read(path)
+        try:
+            declared = metadata.read(path)
+        except OSError as error:
+            raise unreadable_error(error, path) from error
         if not location.size_bytes:
             return undeclared(path, index)
+        if is_timeless(declared):
+            for stream_class in declared.streams.values():
+                give_order(stream_class)
         layouts = {}
         for stream_class in declared.streams.values():
             number = sum(len(layout.classes) for layout in self._layouts)
@@ -71,13 +82,18 @@ class CtfTraceSet(ExclusiveTraceSet):
         def report(file: Path, position: int, offset: int, message: str) -> None:
             self._report(Damage(index, file, position, offset, message))
 
+        for note in declared.notes:
+            report(path / FILE_NAME, 0, 0, note)
         try:
+            for file, kind in irregular_files(path):
+                report(file, 0, 0, f"{kind}, no file: left out")
+            for file in orphans(path):
+                report(file, 0, 0, f"the stream {file.stem} is missing, only its index is there")
             streams = streams_of(stream_files(path), HeaderReader(declared), layouts, report)
+        except MetadataError as error:
+            raise metadata.damaged_error(path, str(error)) from error
         except OSError as error:
-            raise TraceError(
-                f"cannot read the trace ({error.strerror}) — {error.filename or path}",
-                hint=f"sudo chown -R $USER {path}",
-            ) from error
+            raise unreadable_error(error, path) from error
         for stream in streams:
             stream.rank = len(self._streams)
             self._streams.append(stream)
@@ -91,12 +107,15 @@ class CtfTraceSet(ExclusiveTraceSet):
     ) -> Generator[EventBatch, None, None]:
         self.damages = list(self._found_early)
         if self._begins is None:
-            self._begins = {}
+            self._begins = numbers_of(s for s in self._streams if not s.has_time)
             for stream in self._streams:
-                self._begins |= begins_of(stream)
-        entries, self.duplicate_packet_count = entries_of(self._streams, self.traces, self._begins)
+                if stream.has_time:
+                    self._begins |= begins_of(stream)
+        entries = entries_of(self._streams, self.traces, self._begins, self._report_in_packet)
+        self.duplicate_packet_count = entries.copies
+        self.repeated_packet_counts = entries.repeated
         iteration = Iteration(
-            self._layouts, entries, wanted, progress, batch_rows, self._report_in_packet
+            self._layouts, entries.packets, wanted, progress, batch_rows, self._report_in_packet
         )
         try:
             yield from iteration.run()

@@ -40,6 +40,11 @@ class Stream:
         return self.layout.stream.id
 
     @property
+    def has_time(self) -> bool:
+        """Its events have times."""
+        return self.layout.stream.has_time
+
+    @property
     def trace_index(self) -> int:
         """Place of its trace in the set."""
         return self.layout.trace_index

@@ -31,6 +31,7 @@ from msgflow.trace.ctf.types import (
     Structure,
     Type,
     Variant,
+    may_have,
 )
 
 if TYPE_CHECKING:
@@ -163,13 +164,15 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
         raise MetadataError("there is no `trace` block")
     outer = {Scope.PACKET_HEADER: Structure()}
     _add(outer, blocks.trace, Scope.PACKET_HEADER)
-    clocks = {str(block.values.get("name", "")): _clock(block) for block in blocks.clocks}
-    only_clock = next(iter(clocks.values())) if len(clocks) == 1 else None
     trace = TraceClass(
         uuid=_uuid(blocks.trace),
         environment=dict(blocks.environment),
         packet_header=outer[Scope.PACKET_HEADER],
     )
+    clocks = {
+        str(block.values.get("name", "")): _clock(block, trace.notes) for block in blocks.clocks
+    }
+    only_clock = next(iter(clocks.values())) if len(clocks) == 1 else None
     scopes: dict[int, dict[Scope, Structure]] = {}
     # A trace may have a single stream that is not worth a block.
     for block in blocks.streams or [_Block()]:
@@ -200,9 +203,7 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
             specific_context=event_scopes[Scope.SPECIFIC_CONTEXT],
             payload=event_scopes[Scope.PAYLOAD],
         )
-        if event.id in trace.streams[stream_id].events:
-            raise MetadataError(f"there are two events {event.id} in stream {stream_id}")
-        trace.streams[stream_id].events[event.id] = event
+        trace.add_event(trace.streams[stream_id], event)
     return trace
 
 
@@ -230,7 +231,7 @@ def _with_role(name: str, declared: Type, roles: Mapping[str, str]) -> Type:
                 for choice in declared.choices
             )
             return replace(declared, choices=choices)
-        case Integer() | Array() if name in roles:
+        case Integer() | Array() if name in roles and may_have(declared, roles[name]):
             return replace(declared, roles=declared.roles | {roles[name]})
         case _:
             return declared
@@ -258,18 +259,15 @@ def _mapped_clocks(declared: Type) -> list[str]:
             return []
 
 
-def _clock(block: _Block) -> Clock:
-    frequency = block.integer("freq", Clock.frequency)
-    if frequency < 1:
-        raise MetadataError(f"a clock of {frequency} Hz makes no sense")
+def _clock(block: _Block, notes: list[str]) -> Clock:
     name = block.values.get("name")
     return Clock(
-        frequency=frequency,
+        frequency=block.integer("freq", Clock.frequency),
         offset_seconds=block.integer("offset_s", 0),
         offset_cycles=block.integer("offset", 0),
         name=None if name is None else str(name),
         uuid=_uuid(block),
-    )
+    ).plausible(notes)
 
 
 def _uuid(block: _Block) -> str | None:

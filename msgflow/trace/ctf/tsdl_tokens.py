@@ -21,6 +21,9 @@ _TOKEN = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
+# Beyond everything that can make sense, and short enough to be shown.
+_LARGEST = 1 << 80
+_MOST_DIGITS = 30
 _ESCAPE = re.compile(r"\\(?:([0-7]{1,3})|x([0-9a-fA-F]+)|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "a": "\a", "b": "\b", "f": "\f", "v": "\v"}
 
@@ -96,12 +99,16 @@ class TokenStream:
         return self.take().value
 
     def number(self) -> int:
-        """Take an integer, with its sign."""
+        """Take an integer, with its sign; beyond 80 bits, all are one."""
         negative = False
         while self.token.value in {"-", "+"}:
             negative ^= self.take().value == "-"
         if self.token.kind == "character":
-            value = ord(_unescaped(self.take().value.lstrip("L")[1:-1]) or "\0")
+            text = _unescaped(self.token.value.lstrip("L")[1:-1])
+            if len(text) > 1:
+                raise self.error(f"{self.token.value:.20} is more than one character")
+            self.take()
+            value = ord(text or "\0")
         elif self.token.kind == "number":
             value = _integer(self.take().value)
         else:
@@ -125,11 +132,10 @@ class TokenStream:
 def _integer(digits: str) -> int:
     digits = digits.rstrip("uUlL")
     if digits[:2].lower() in {"0x", "0b"}:
-        return int(digits, 0)
-    return int(
-        digits,
-        8 if digits[0] == "0" and digits.isdigit() and set(digits) <= set("01234567") else 10,
-    )
+        return min(int(digits, 0), _LARGEST)
+    is_octal = digits[0] == "0" and set(digits) <= set("01234567")
+    digits = digits.lstrip("0")
+    return _LARGEST if len(digits) > _MOST_DIGITS else int(digits or "0", 8 if is_octal else 10)
 
 
 def _unescaped(text: str) -> str:

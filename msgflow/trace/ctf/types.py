@@ -22,6 +22,7 @@ SEQUENCE_ROLE = "packet-sequence-number"
 EVENT_CLASS_ROLE = "event-record-class-id"
 
 BYTE = 8
+_UUID_BYTES = 16
 
 
 class Scope(IntEnum):
@@ -191,6 +192,16 @@ class Optional:
 
 
 Type = Integer | VariableInteger | Real | String | Array | Sequence | Structure | Variant | Optional
+
+
+def may_have(declared: Type, role: str) -> bool:
+    """Tell whether a field of this type can be what the role says."""
+    if role != UUID_ROLE:
+        return isinstance(declared, Integer | VariableInteger)
+    if not isinstance(declared, Array) or declared.length != _UUID_BYTES:
+        return False
+    element = declared.element
+    return isinstance(element, Integer) and element.size == BYTE == element.align
 
 
 def is_character(element: Type) -> bool:

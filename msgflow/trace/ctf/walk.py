@@ -52,6 +52,7 @@ class Walker:
         self._end = min(end, len(data) * BYTE)
         self._scopes: dict[Scope, dict[str, Any]] = {}
         self._frames: list[dict[str, Any]] = []
+        self._empty_elements = 0
         self._readers: dict[type, Callable[[Any], Any]] = {
             Integer: self._integer,
             VariableInteger: self._variable_integer,
@@ -71,6 +72,7 @@ class Walker:
             FieldError: it does not fit or makes no sense.
         """
         if scope is Scope.EVENT_HEADER:
+            self._empty_elements = 0
             for inner in (Scope.EVENT_CONTEXT, Scope.SPECIFIC_CONTEXT, Scope.PAYLOAD):
                 self._scopes.pop(inner, None)
         values: dict[str, Any] = {}
@@ -154,7 +156,13 @@ class Walker:
         element = field_type.element
         begin = self._take(0, field_type.align)
         smallest = _smallest_size(element)
-        if length > ((self._end - begin) // smallest if smallest else _MOST_EMPTY_ELEMENTS):
+        if smallest:
+            room = (self._end - begin) // smallest
+        else:
+            # Nothing in the packet bounds how many there are, in one array and in arrays of such.
+            room = _MOST_EMPTY_ELEMENTS - self._empty_elements
+            self._empty_elements += length
+        if length > room:
             raise FieldError(f"{length} elements do not fit into the packet")
         if field_type.is_text:
             self.position = begin + length * BYTE
@@ -163,7 +171,7 @@ class Walker:
         elements = [self._read(element) for _ in range(length)]
         if isinstance(field_type, Array):
             for role in field_type.roles:
-                self.found[role] = bytes(elements)
+                self.found[role] = bytes(element & 0xFF for element in elements)
         return elements
 
     def _structure(self, field_type: Structure) -> dict[str, Any]:

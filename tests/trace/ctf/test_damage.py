@@ -104,9 +104,9 @@ def test_stream_of_a_few_bytes(trace: Path, size: int) -> None:
     assert not content.rows
 
 
-@pytest.mark.parametrize("field", [0, 4, 20])
+@pytest.mark.parametrize("field", [0, 20])
 def test_packet_header_that_is_damaged(trace: Path, field: int) -> None:
-    """Magic number, uuid and stream class: reading goes on at the next packet."""
+    """Magic number and stream class: reading goes on at the next packet."""
     size = packet_size(trace)
     change(trace, lambda content: struct.pack_into("<I", content, 5 * size + field, 0xDEADBEEF))
     content = read(trace)
@@ -200,13 +200,28 @@ def test_file_that_does_not_belong_there(trace: Path) -> None:
     assert sum(read_packets(content).values()) == PACKETS * EVENTS
 
 
+def test_uuid_that_is_not_that_of_the_metadata(trace: Path) -> None:
+    """Such a packet is read, as Babeltrace reads it."""
+    size = packet_size(trace)
+    change(trace, lambda content: struct.pack_into("<I", content, 5 * size + 4, 0xDEADBEEF))
+    content = read(trace)
+    ((position, offset, message),) = told(content)
+    assert (position, offset) == (5, 5 * size)
+    assert "another trace, efbeadde-2222-3333-4444-555555555555: read nevertheless" in message
+    assert read_packets(content) == dict.fromkeys(range(PACKETS), EVENTS)
+
+
 def test_metadata_of_another_trace(trace: Path) -> None:
+    """It is told once of a file, and where packets begin is found by the uuid that they have."""
     text = (trace / "metadata").read_text()
     (trace / "metadata").write_text(text.replace("11111111-", "11111112-"))
+    size = packet_size(trace)
+    change(trace, lambda content: struct.pack_into("<I", content, 5 * size, 0))
     content = read(trace)
-    (damage,) = content.damages
-    assert "belongs to another trace, 11111111-2222-3333-4444-555555555555" in damage.message
-    assert not content.rows
+    first, second = content.damages
+    assert "belongs to another trace, 11111111-2222-3333-4444-555555555555" in first.message
+    assert (first.position, second.position) == (0, 5)
+    assert read_packets(content) == {n: EVENTS for n in range(PACKETS) if n != 5}
 
 
 class TestIndex:

@@ -22,6 +22,7 @@ from msgflow.trace.ctf.types import (
     String,
     Structure,
     Type,
+    VariableInteger,
     Variant,
 )
 
@@ -224,3 +225,41 @@ def test_json_in_packets_whose_header_says_one_point_eight(tmp_path: Path) -> No
     head = struct.pack("<I16sIII5B", 0x75D11D57, b"", 0, bits, bits, 0, 0, 0, 1, 8)
     (tmp_path / "metadata").write_bytes(head + text)
     assert isinstance(metadata.read(tmp_path), TraceClass)
+
+
+def test_json_before_the_final_specification() -> None:
+    """Integers with mappings had types of their own, and clocks an `offset`."""
+
+    def integer(kind: str, more: str = "") -> str:
+        return (
+            f'{{"type": "{kind}", "length": 8, "byte-order": "little-endian", "alignment": 8, '
+            f'"mappings": {{"a": [[0, 1], [5, 5]]}}{more}}}'
+        )
+
+    members = ", ".join(
+        f'{{"name": "{kind}", "field-class": {integer(kind)}}}'
+        for kind in (
+            "fixed-length-unsigned-enumeration",
+            "fixed-length-signed-enumeration",
+            "variable-length-unsigned-enumeration",
+            "variable-length-signed-enumeration",
+        )
+    )
+    trace = json_metadata.parse(
+        '\x1e{"type": "preamble", "version": 2}'
+        '\x1e{"type": "clock-class", "name": "c", "frequency": 1000000000, '
+        '"offset": {"seconds": 3, "cycles": 4}}'
+        '\x1e{"type": "data-stream-class", "id": 0, "default-clock-class-name": "c"}'
+        '\x1e{"type": "event-record-class", "payload-field-class": {"type": "structure", '
+        f'"member-classes": [{members}]}}}}'
+    )
+    stream = trace.streams[0]
+    labels = {"a": ((0, 1), (5, 5))}
+    assert [member.type for member in stream.events[0].payload.members] == [
+        Integer(8, 8, False, labels=labels),
+        Integer(8, 8, False, signed=True, labels=labels),
+        VariableInteger(False, labels),
+        VariableInteger(True, labels),
+    ]
+    assert stream.clock is not None
+    assert stream.clock.to_ns(1) == 3_000_000_005

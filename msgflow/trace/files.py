@@ -1,0 +1,79 @@
+"""Regular files of bounded size: what else bears the name of one must not hang or fill a reader."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_KINDS = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFDIR: "a directory",
+}
+
+
+class UnsuitableFileError(OSError):
+    """A file is of a kind or size that no tracer writes."""
+
+
+def read_regular(path: Path, most_bytes: int) -> bytes:
+    """Return the content of a regular file.
+
+    Raises:
+        UnsuitableFileError: it is a pipe, a device or the like, or longer than `most_bytes`.
+        OSError: it cannot be read.
+    """
+    # A pipe that nobody writes to would keep a blocking `open` waiting.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise UnsuitableFileError(errno.EINVAL, f"{_kind(status.st_mode)}, no file", str(path))
+        if status.st_size > most_bytes:
+            raise UnsuitableFileError(
+                errno.EFBIG,
+                f"{status.st_size:,} bytes, more than the {most_bytes:,} that make sense",
+                str(path),
+            )
+        return file.read(status.st_size)
+
+
+def irregular(path: Path) -> str | None:
+    """Say what this is if it is neither a regular file nor a directory, else None."""
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        return _unreachable(error) if path.is_symlink() else None
+    return None if stat.S_ISREG(mode) or stat.S_ISDIR(mode) else _kind(mode)
+
+
+def unreadable_error(error: OSError, directory: Path) -> TraceError:
+    """Return the error for a trace of which a file cannot be read, with what helps."""
+    if isinstance(error, UnsuitableFileError):
+        hint = "put the file there that was recorded: copy the trace again, with cp -rL"
+    elif error.errno in {errno.EACCES, errno.EPERM}:
+        hint = f"sudo chown -R $USER {directory}"
+    elif error.errno in {errno.ELOOP, errno.ENOENT}:
+        hint = "copy the trace again with cp -rL, which copies what links lead to"
+    else:
+        hint = "copy it again from where it was recorded"
+    return TraceError(
+        f"cannot read the trace ({error.strerror}) — {error.filename or directory}", hint=hint
+    )
+
+
+def _kind(mode: int) -> str:
+    return _KINDS.get(stat.S_IFMT(mode), "a special file")
+
+
+def _unreachable(error: OSError) -> str:
+    return "a link in a circle" if error.errno == errno.ELOOP else "a link that leads nowhere"

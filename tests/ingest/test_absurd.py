@@ -1,0 +1,147 @@
+"""One value that makes no sense ends no ingest, no check and no query."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mutations import packet_begins, streams
+
+from msgflow import open_db
+from msgflow.errors import TraceError
+from msgflow.ingest import ingest
+
+
+def copied(trace: Path, to: Path) -> Path:
+    shutil.copytree(trace, to / "robot")
+    return to / "robot"
+
+
+def directories(root: Path) -> list[Path]:
+    return sorted(path.parent for path in root.rglob("metadata"))
+
+
+def diagnostics(database: Path) -> dict[str, tuple[str, int, str]]:
+    with open_db(database) as opened:
+        rows = opened.sql("SELECT name, severity, count, detail FROM diagnostic").to_arrow()
+        # Whatever looks at all that was found.
+        opened.findings()
+        for name in ("e2e-latency", "data-quality", "info-runs"):
+            opened.query(name)
+    return {row["name"]: (row["severity"], row["count"], row["detail"]) for row in rows.to_pylist()}
+
+
+def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
+    with open_db(database) as opened:
+        return [tuple(row.values()) for row in opened.sql(sql).to_arrow().to_pylist()]
+
+
+def replace(root: Path, before: bytes, after: bytes) -> int:
+    """Replace bytes in all streams; return how often they occurred."""
+    count = 0
+    for directory in directories(root):
+        for path in streams(directory):
+            content = path.read_bytes()
+            count += content.count(before)
+            path.write_bytes(content.replace(before, after))
+    return count
+
+
+@pytest.mark.parametrize("stamp", [-(1 << 63), (1 << 63) - 1, 1 << 62, -(1 << 62)])
+def test_stamps(trace: Path, tmp_path: Path, new_database: Path, stamp: int) -> None:
+    ingest([trace], new_database)
+    taken = "SELECT source_timestamp_ns FROM take WHERE source_timestamp_ns > 0 ORDER BY taken_ns"
+    stamps = rows(new_database, taken)
+    good = struct.pack("<q", stamps[len(stamps) // 2][0])
+    changed = copied(trace, tmp_path)
+    assert replace(changed, good, struct.pack("<q", stamp)) >= 2
+    with open_db(new_database) as opened:
+        opened.ingest(changed, name="changed", replace=True)
+    severity, count, detail = diagnostics(new_database)["implausible_value"]
+    assert severity == "data_loss"
+    assert count >= 1
+    assert "that cannot be times: left out" in detail
+    assert len(rows(new_database, taken)) < len(stamps)
+
+
+def test_the_latest_stamp(trace: Path, tmp_path: Path, new_database: Path) -> None:
+    """One nanosecond less is a time."""
+    ingest([trace], new_database)
+    ((stamp,),) = rows(
+        new_database, "SELECT max(source_timestamp_ns) FROM take WHERE source_timestamp_ns > 0"
+    )
+    changed = copied(trace, tmp_path)
+    replace(changed, struct.pack("<q", stamp), struct.pack("<q", (1 << 62) - 1))
+    with open_db(new_database) as opened:
+        opened.ingest(changed, name="changed", replace=True)
+    assert "implausible_value" not in diagnostics(new_database)
+
+
+@pytest.mark.parametrize("counter", [(1 << 64) - 1, 1 << 63, (1 << 48) + 1, 1 << 48, 1 << 40])
+def test_counters_of_lost_events(
+    trace: Path, tmp_path: Path, new_database: Path, counter: int
+) -> None:
+    changed = copied(trace, tmp_path)
+    for path in streams(directories(changed)[0]):
+        content = bytearray(path.read_bytes())
+        struct.pack_into("<Q", content, packet_begins(bytes(content))[-1] + 72, counter)
+        path.write_bytes(content)
+    ingest([changed], new_database)
+    found = diagnostics(new_database)
+    assert ("damaged_trace" in found) == (counter > 1 << 48)
+    assert "discarded_events" in found or counter > 1 << 48
+
+
+def test_a_stream_copied_beside_itself(trace: Path, tmp_path: Path, new_database: Path) -> None:
+    ingest([trace], new_database)
+    counts = "SELECT count(*), sum(event_count)::BIGINT FROM publication CROSS JOIN trace"
+    alone = rows(new_database, counts)
+    new_database.unlink()
+    changed = copied(trace, tmp_path)
+    path = streams(directories(changed)[0])[0]
+    shutil.copy(path, path.with_name("copy of it"))
+    ingest([changed], new_database)
+    assert rows(new_database, counts) == alone
+    severity, count, detail = diagnostics(new_database)["repeated_packet"]
+    assert (severity, count) == ("warning", len(packet_begins(path.read_bytes())))
+    assert "copied beside" in detail
+
+
+def test_damage_is_the_reason_where_nothing_is_left(
+    trace: Path, tmp_path: Path, new_database: Path
+) -> None:
+    changed = copied(trace, tmp_path)
+    for directory in directories(changed):
+        for path in streams(directory):
+            content = path.read_bytes()
+            path.write_bytes(b"\0" * len(content))
+    with pytest.raises(
+        TraceError, match="could be read, the trace is damaged: no packet"
+    ) as caught:
+        ingest([changed], new_database)
+    assert "copy it again" in (caught.value.hint or "")
+    assert not new_database.exists()
+
+
+def test_a_stream_that_is_missing(trace: Path, tmp_path: Path, new_database: Path) -> None:
+    changed = copied(trace, tmp_path)
+    path = streams(directories(changed)[0])[0]
+    if not (path.parent / "index" / f"{path.name}.idx").exists():
+        (path.parent / "index").mkdir(exist_ok=True)
+        (path.parent / "index" / f"{path.name}.idx").write_bytes(b"")
+    path.unlink()
+    ingest([changed], new_database)
+    severity, _, detail = diagnostics(new_database)["damaged_trace"]
+    assert severity == "data_loss"
+    assert f"the stream {path.name} is missing, only its index is there" in detail
+
+
+def test_a_pipe_beside_the_streams(trace: Path, tmp_path: Path, new_database: Path) -> None:
+    changed = copied(trace, tmp_path)
+    os.mkfifo(directories(changed)[0] / "pipe")
+    ingest([changed], new_database)
+    assert "a pipe, no file: left out" in diagnostics(new_database)["damaged_trace"][2]
