@@ -9,7 +9,8 @@ WITH extent AS (
         max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) AS end_ns,
         sum(event_count)::BIGINT AS event_count,
         -- What a packet says may be anything; what is calculated with it must fit.
-        least(coalesce(sum(discarded_event_count), 0), 9007199254740992)::BIGINT AS discarded_event_count
+        least(coalesce(sum(discarded_event_count), 0), 9007199254740992)::BIGINT
+            AS discarded_event_count
     FROM staging.packet
     GROUP BY trace_index
 )
