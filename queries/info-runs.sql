@@ -17,7 +17,8 @@ WITH run_trace AS (
         run_id,
         count(*) AS trace_count,
         CAST(sum(event_count) AS BIGINT) AS event_count,
-        CAST(least(coalesce(sum(discarded_event_count), 0), 9007199254740992) AS BIGINT) AS discarded_event_count
+        CAST(least(coalesce(sum(discarded_event_count), 0), 9007199254740992) AS BIGINT)
+            AS discarded_event_count
     FROM main.trace
     GROUP BY run_id
 )
