@@ -1,6 +1,6 @@
 # `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
-# is installed into .venv, except what only the distribution has: python3-venv, and Babeltrace 2 for
-# the tests that compare with it. apt installs these where that is allowed.
+# is installed into .venv, except what only the distribution has: python3-venv, and for the tests
+# Babeltrace 2 to compare with and Chromium to look with. apt installs these where that is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -17,7 +17,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test bench truth babeltrace clean
+.PHONY: help demo test bench truth babeltrace chromium clean
 
 help:
 	@echo 'make demo   simulate a robot, ingest its trace, print end-to-end latency'
@@ -31,8 +31,9 @@ demo: $(VENV)/.installed
 	$(BIN)/msgflow simulate demo $(DEMO)/trace
 	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb
 	$(BIN)/msgflow query e2e-latency --db $(DEMO)/msgflow.duckdb
+	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 
-test: $(VENV)/.developed babeltrace
+test: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -65,6 +66,11 @@ babeltrace:
 	@$(APT); { $(HAS_BT2) && command -v babeltrace2 >/dev/null; } \
 		|| apt_install python3-bt2 babeltrace2 || true
 	@$(HAS_BT2) || echo "note: no bt2: the tests that compare with Babeltrace 2 are skipped" >&2
+
+chromium:
+	@$(APT); command -v chromium >/dev/null || apt_install chromium || true
+	@command -v chromium >/dev/null \
+		|| echo "note: no chromium: the tests that look at pages are skipped" >&2
 
 clean:
 	rm -rf $(VENV) $(DEMO)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
+    from msgflow.view.report import Report
 
 _T = TypeVar("_T")
 
@@ -37,6 +38,8 @@ DEFAULT_LIMIT = 10_000
 # Of flows: messages in a row, and vertices.
 DEFAULT_DEPTH = 32
 DEFAULT_VERTICES = 1_000
+# Of reports, bytes: what mail servers take.
+DEFAULT_REPORT_SIZE = 20_000_000
 
 _SCHEMA = """
 SELECT columns.table_name AS view, columns.column_name AS column, columns.data_type AS type,
@@ -378,6 +381,51 @@ class Database:
                 internal=internal,
                 max_depth=max_depth,
                 max_paths=max_paths,
+            ),
+        )
+
+    def report(
+        self,
+        path: str | Path,
+        *,
+        run: str | int | None = None,
+        compare: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        path_text: str | None = None,
+        max_size: int = DEFAULT_REPORT_SIZE,
+    ) -> Report:
+        """Write the pages of a run, with their data, into one file that any browser opens.
+
+        Args:
+            path: the file; one that exists is replaced.
+            run: a name or an id; the latest run when None.
+            compare: another run to compare it with.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time.
+            end: its end, likewise.
+            path_text: only paths with this text in them: a topic, or a node.
+            max_size: most bytes of the file; what does not fit is left out, which it says.
+
+        Raises:
+            UsageError: no such run or path, nothing in the window, or a size that is too small.
+            QueryError: the database could not run a query.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.view.report import write_report
+
+        connection = self.connection
+        return interruptible(
+            connection,
+            lambda: write_report(
+                connection,
+                Path(path),
+                run=run,
+                compare=compare,
+                start=start,
+                end=end,
+                through=path_text,
+                max_size=max_size,
             ),
         )
 

@@ -18,8 +18,10 @@ from msgflow.cli import (
     ingest,
     links,
     query,
+    report,
     simulate,
     sql,
+    ui,
 )
 from msgflow.cli.root import RootGroup
 from msgflow.version import __version__
@@ -36,6 +38,8 @@ app = typer.Typer(
 app.command("ingest")(ingest.command)
 app.add_typer(query.app, name="query")
 app.command("flow")(flow.command)
+app.command("ui")(ui.command)
+app.command("report")(report.command)
 app.command("compare")(compare.command)
 app.command("events")(events.command)
 app.command("sql")(sql.command)

@@ -24,8 +24,8 @@ _LEAKED = (
     ("Input should be ", "it has to be "),
 )
 COMMANDS = (
-    "ingest", "query", "flow", "compare", "sql", "info", "check", "events", "links", "clocks",
-    "export", "db", "simulate",
+    "ingest", "query", "flow", "ui", "report", "compare", "sql", "info", "check", "events", "links",
+    "clocks", "export", "db", "simulate",
 )  # fmt: skip
 
 

@@ -1,0 +1,99 @@
+"""`msgflow report`: the pictures of a run in one file, to keep or to mail."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    OUTPUT,
+    SELECTION,
+    DatabaseOption,
+    EndOption,
+    RunOption,
+    StartOption,
+)
+from msgflow.errors import UsageError
+
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(B|kB|KB|MB|GB)?")
+_UNITS = {None: 1, "B": 1, "kB": 1_000, "KB": 1_000, "MB": 1_000_000, "GB": 1_000_000_000}
+# Browsers take longer to unpack than anybody waits.
+_MOST = 1_000_000_000
+
+
+def command(
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.html",
+            help="File to write or replace",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = Path("msgflow.html"),
+    run: RunOption = None,
+    compare: Annotated[
+        str | None,
+        typer.Option(
+            "--compare",
+            metavar="NAME|ID",
+            help="Run to compare it with",
+            rich_help_panel=SELECTION,
+        ),
+    ] = None,
+    start: StartOption = None,
+    end: EndOption = None,
+    path: Annotated[
+        str | None,
+        typer.Option(
+            "--path",
+            metavar="TEXT",
+            help="Only paths with this text in them: a topic, or a node",
+            rich_help_panel=SELECTION,
+        ),
+    ] = None,
+    max_size: Annotated[
+        str,
+        typer.Option(
+            "--max-size",
+            metavar="SIZE",
+            help="Most bytes of the file, as 20MB; what does not fit is left out, which the page"
+            " says",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = "20MB",
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write the pages of a run into one file that any browser opens, without a server."""
+    from msgflow.cli.output import print_note, print_runs, print_status
+    from msgflow.database import Database
+
+    if output.suffix.lower() not in (".html", ".htm"):
+        raise UsageError(f"a report is a page: its name ends with .html — {output}", "-o FILE.html")
+    size = read_size(max_size)
+    with Database(database) as opened:
+        report = opened.report(
+            output, run=run, compare=compare, start=start, end=end, path_text=path, max_size=size
+        )
+    print_runs([report.run])
+    for note in report.notes:
+        print_note(note)
+    print_status(f"{report.size:,} bytes written to {report.path}: open it in a browser")
+
+
+def read_size(text: str) -> int:
+    """Return the bytes that '20MB' means.
+
+    Raises:
+        UsageError: it cannot be read, or is none or too much.
+    """
+    match = _SIZE.fullmatch(text.strip())
+    size = round(float(match[1]) * _UNITS[match[2]]) if match else 0
+    if not 0 < size <= _MOST:
+        raise UsageError(f"cannot read the size — {text}", "--max-size 20MB, at most 1GB")
+    return size

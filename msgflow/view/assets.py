@@ -1,0 +1,78 @@
+"""The front end as files: modules and style sheet, and how they are put into one file.
+
+The modules use what every browser has, so nothing builds them. For a report they are joined: each
+after those that it imports, without the words `import` and `export`. For that no two modules may
+use a name twice at their outermost level, which a test makes sure of.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from functools import cache
+from pathlib import Path
+from string import Template
+
+STATIC = Path(__file__).parent / "static"
+VENDOR = Path(__file__).parent / "vendor"
+ENTRY = "app.js"
+# Libraries of others, each a script that leaves one global name; see vendor/libraries.json.
+SCRIPTS = ("uPlot.iife.min.js", "dagre.min.js")
+SHEETS = ("uPlot.min.css",)
+_IMPORT = re.compile(r'^import\s+\{[^}]*\}\s+from\s+"\./([\w-]+\.js)";\n', re.MULTILINE)
+_EXPORT = re.compile(r"^export (?=(?:async function|function|class|const|let)\b)", re.MULTILINE)
+_SOURCE_MAP = re.compile(r"^//# sourceMappingURL=.*$", re.MULTILINE)
+
+
+@cache
+def modules() -> tuple[str, ...]:
+    """Return the names of the modules, each after those that it imports."""
+    ordered: list[str] = []
+
+    def visit(name: str) -> None:
+        if name in ordered:
+            return
+        for needed in _IMPORT.findall(text(name)):
+            visit(needed)
+        ordered.append(name)
+
+    visit(ENTRY)
+    return tuple(ordered)
+
+
+def text(name: str) -> str:
+    """Return a file of the front end."""
+    return (STATIC / name).read_text(encoding="utf-8")
+
+
+def vendored(name: str) -> str:
+    """Return a library, without the address of a map that is not here."""
+    return _SOURCE_MAP.sub("", (VENDOR / name).read_text(encoding="utf-8")).strip() + "\n"
+
+
+def joined() -> str:
+    """Return all modules as one."""
+    parts = [_EXPORT.sub("", _IMPORT.sub("", text(name))) for name in modules()]
+    return '"use strict";\n' + "\n".join(parts)
+
+
+def page(*, head: str, body: str = "", policy: str = "", attributes: str = "") -> str:
+    """Return the page around the front end.
+
+    Args:
+        head: how style sheets and scripts are included.
+        body: what follows the content.
+        policy: the Content-Security-Policy, where no header says it.
+        attributes: of the outermost element, beginning with a space.
+    """
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n' if policy else ""
+    return Template(text("page.html")).substitute(
+        head=head, body=body, policy=meta, attributes=attributes
+    )
+
+
+def source_hash(content: str) -> str:
+    """Return how a Content-Security-Policy names an inline script or style sheet."""
+    digest = hashlib.sha256(content.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"

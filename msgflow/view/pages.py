@@ -1,0 +1,390 @@
+"""What the pages ask for, answered from a database: by the server, and by a report in advance."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import OrderedDict
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import duckdb
+import pyarrow as pa
+
+from msgflow.db.finding import find
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
+from msgflow.query.clocks import clock_notes
+from msgflow.query.compare import compare
+from msgflow.query.run import read_runs, run_query
+from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs
+from msgflow.view.columns import encode
+from msgflow.view.page_query import page_query, run_page_query
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from msgflow.query.window import Run
+
+Params = dict[str, Any]
+
+# Named queries that pages show, with the numbers of `msgflow query`.
+NAMED = (
+    "e2e-latency", "path-breakdown", "reaction-time", "data-age", "executor-usage",
+    "executor-wait", "interference", "publication-rate", "transport-latency", "service-latency",
+    "indirect-links", "delivery", "info-hosts", "info-processes", "info-topics", "clocks",
+)  # fmt: skip
+# Bars that a window may have to be drawn one by one, and bins where it has more.
+MOST_BARS = 40_000
+MOST_BINS = 2_000
+# Bins of the whole run that wider ones are put together from.
+LEVEL_BINS = 8_192
+MOST_LINKS = 20_000
+_KEPT_BYTES = 32 * 2**20
+_KINDS = ("publication", "take", "callback_instance", "request", "response")
+_LARGEST = 2**62
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A run on the page: times are offsets from `origin_ns`.
+
+    Attributes:
+        run: the run.
+        origin_ns: its first event, epoch ns.
+        length_ns: from there to its last event.
+    """
+
+    run: Run
+    origin_ns: int
+    length_ns: int
+
+
+class Scratch:
+    """What is computed once per run and asked often: tables in memory, beside the database."""
+
+    def __init__(self) -> None:
+        self._connection = duckdb.connect(":memory:")
+        self._connection.execute(
+            "CREATE TABLE flow (run_id BIGINT, path_id BIGINT, root_kind VARCHAR, root_id BIGINT,"
+            " root_at BIGINT, take_id BIGINT, latency BIGINT, status VARCHAR,"
+            " is_loss_affected BOOLEAN)"
+        )
+        self._connection.execute(
+            "CREATE TABLE level (run_id BIGINT, row_key BIGINT, kind UTINYINT, id BIGINT,"
+            " start_at BIGINT, length BIGINT, flags UTINYINT, count BIGINT, busy BIGINT)"
+        )
+        self._locks: dict[tuple[str, int], threading.Lock] = {}
+        self._filled: set[tuple[str, int]] = set()
+        self._guard = threading.Lock()
+
+    def fill(self, table: str, run_id: int, read: Callable[[], pa.Table]) -> None:
+        """Put the rows of a run into a table, unless they are there."""
+        key = (table, run_id)
+        with self._guard:
+            lock = self._locks.setdefault(key, threading.Lock())
+        with lock:
+            if key in self._filled:
+                return
+            rows = read()
+            with self._connection.cursor() as cursor:
+                cursor.register("incoming", rows)
+                cursor.execute(
+                    f"INSERT INTO {table} BY NAME SELECT $run::BIGINT AS run_id, * FROM incoming",
+                    {"run": run_id},
+                )
+            self._filled.add(key)
+
+    def ask(self, name: str, values: Mapping[str, Any]) -> pa.Table:
+        """Return the rows of a page query over these tables."""
+        with self._connection.cursor() as cursor:
+            return run_page_query(cursor, name, values)
+
+    def close(self) -> None:
+        """Free the memory."""
+        self._connection.close()
+
+
+class Pages:
+    """Answers to what pages ask, each as bytes (see `columns`).
+
+    A pages object may be used by several threads, each with a connection of its own.
+
+    Args:
+        window: (begin, end) in epoch ns that everything is cut to; the whole of each run when None.
+        most_bars: bars that a window may have to be sent one by one.
+    """
+
+    def __init__(
+        self, window: tuple[int, int] | None = None, *, most_bars: int = MOST_BARS
+    ) -> None:
+        self._scratch = Scratch()
+        self._window = window or (MINIMUM_NS, MAXIMUM_NS)
+        self._most_bars = most_bars
+        self._kept: OrderedDict[str, bytes] = OrderedDict()
+        self._guard = threading.Lock()
+
+    def close(self) -> None:
+        """Free what is kept."""
+        self._scratch.close()
+
+    def answer(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
+        """Return what a page asks for.
+
+        Args:
+            connection: to the database, of this thread alone.
+            name: of the answer: a page query, 'query', 'finding', 'compare' or 'run'.
+            params: as the page gives them.
+
+        Raises:
+            UsageError: there is no such answer, run or value.
+            QueryError: the database could not run it.
+        """
+        key = json.dumps([name, params], sort_keys=True)
+        with self._guard:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]
+        content = self._find(connection, name, params)
+        with self._guard:
+            self._kept[key] = content
+            while sum(map(len, self._kept.values())) > _KEPT_BYTES and len(self._kept) > 1:
+                self._kept.popitem(last=False)
+        return content
+
+    def _find(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
+        if name in _PLAIN:
+            return self._plain(connection, name, params)
+        if name in _OF_PATH:
+            return self._of_path(connection, name, params)
+        if name in _ANSWERS:
+            return _ANSWERS[name](self, connection, params)
+        raise UsageError(f"pages have no such data — {name}")
+
+    def extent(self, connection: duckdb.DuckDBPyConnection, params: Params) -> Extent:
+        """Return the run that the page is about."""
+        runs = choose_runs(read_runs(connection), params.get("run"))
+        if len(runs) != 1:
+            raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+        ((start_ns, end_ns),) = connection.execute(
+            "SELECT start_ns, end_ns FROM main.run WHERE run_id = ?", [runs[0].run_id]
+        ).fetchall()
+        if start_ns is None:
+            return Extent(runs[0], 0, 0)
+        return Extent(runs[0], start_ns, max(end_ns - start_ns, 0))
+
+    def window(self, extent: Extent, params: Params) -> tuple[int, int]:
+        """Return (begin, end) in epoch ns that the page asks for, within what is to be shown."""
+        start = _whole(params, "start", 0)
+        end = _whole(params, "end", extent.length_ns + 1)
+        return (
+            max(extent.origin_ns + start, self._window[0]),
+            min(extent.origin_ns + end, self._window[1]),
+        )
+
+    def _run(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        return encode(run_page_query(connection, "run", {}), units=_units("run"))
+
+    def _query(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        name = str(params.get("name"))
+        if name not in NAMED:
+            raise UsageError(f"pages do not show such a query — {name}")
+        header = load_query(name)
+        extent = self.extent(connection, params)
+        has_window = "$start_ns" in header.body and self._window != (MINIMUM_NS, MAXIMUM_NS)
+        start, end = self._window if has_window else (None, None)
+        result = run_query(
+            connection, header, {}, run=str(extent.run.run_id), start=start, end=end,
+            internal=bool(params.get("internal")),
+        )  # fmt: skip
+        return encode(
+            result.to_arrow(),
+            meta={
+                "title": header.title,
+                "description": header.description,
+                "notes": result.notes,
+                "columns": {column.name: column.description for column in header.columns},
+                "command": f"msgflow query {name} --run {extent.run.name}",
+            },
+            origin_ns=extent.origin_ns,
+            units=result.units,
+        )
+
+    def _finding(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        findings = [asdict(found) for found in find(connection, [extent.run.run_id])]
+        fields = ("name", "severity", "title", "subject", "count", "detail", "description",
+                  "cause", "cure")  # fmt: skip
+        table = pa.table({field: [found[field] for found in findings] for field in fields})
+        notes = clock_notes(connection, [extent.run])
+        return encode(table, meta={"notes": notes, "command": "msgflow check"})
+
+    def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        comparison = compare(
+            connection, str(_whole(params, "other")), str(extent.run.run_id),
+            what=str(params.get("what", "paths")),
+        )  # fmt: skip
+        result = comparison.result
+        return encode(
+            result.to_arrow(),
+            meta={
+                "notes": result.notes,
+                "a": comparison.run_a.name,
+                "b": comparison.run_b.name,
+                "columns": {
+                    column.name: column.description
+                    for column in (result.header.columns if result.header else ())
+                },
+                "command": f"msgflow compare {comparison.run_a.name} {comparison.run_b.name}",
+            },
+            units=result.units,
+        )
+
+    def recorded(
+        self, connection: duckdb.DuckDBPyConnection, extent: Extent, window: tuple[int, int]
+    ) -> Params:
+        """Return the parameters that all queries of a window need."""
+        values = {
+            "run": extent.run.run_id,
+            "origin_ns": extent.origin_ns,
+            "start_ns": window[0],
+            "end_ns": window[1],
+        }
+        recorded: Params = run_page_query(connection, "recorded_window", values).to_pylist()[0]
+        return values | recorded
+
+    def _segments(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        window = self.window(extent, params)
+        width = max(window[1] - window[0], 1)
+        bin_ns = -(-width // MOST_BINS)
+        level_ns = extent.length_ns // LEVEL_BINS + 1
+        values = self.recorded(connection, extent, window)
+        # Whether a window is drawn one by one does not depend on what is known of the run already.
+        (count,) = run_page_query(connection, "segment_count", values)["count"].to_pylist()
+        meta: dict[str, Any] = {"start": window[0] - extent.origin_ns, "count": count}
+        meta["end"] = window[1] - extent.origin_ns
+        if count <= self._most_bars:
+            table = run_page_query(connection, "segments", values)
+        elif bin_ns < level_ns:
+            meta["bin"] = bin_ns
+            table = run_page_query(connection, "segments", values | {"bin_ns": bin_ns})
+        else:
+            meta["bin"] = -(-bin_ns // level_ns) * level_ns
+            self.fill_level(connection, extent)
+            table = self._scratch.ask("level", values | {"bin_ns": meta["bin"]})
+        return encode(table, meta=meta, units=_units("segments"))
+
+    def fill_level(self, connection: duckdb.DuckDBPyConnection, extent: Extent) -> None:
+        """Count the bars of the whole run in bins, once."""
+        level_ns = extent.length_ns // LEVEL_BINS + 1
+        whole = (extent.origin_ns, extent.origin_ns + extent.length_ns + 1)
+        self._scratch.fill(
+            "level",
+            extent.run.run_id,
+            lambda: run_page_query(
+                connection,
+                "segments",
+                self.recorded(connection, extent, whole) | {"bin_ns": level_ns},
+            ),
+        )
+
+    def _links(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        values = self.recorded(connection, extent, self.window(extent, params))
+        table = run_page_query(connection, "links", values | {"limit": MOST_LINKS + 1})
+        is_cut = table.num_rows > MOST_LINKS
+        return encode(table.slice(0, MOST_LINKS), meta={"is_cut": is_cut}, units=_units("links"))
+
+    def _edge(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        values = self.recorded(connection, extent, self.window(extent, params))
+        return encode(run_page_query(connection, "edge", values), units=_units("edge"))
+
+    def _flow(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        kind = params.get("kind")
+        if kind not in _KINDS:
+            raise UsageError(f"a flow begins with one of {', '.join(_KINDS)} — {kind}")
+        extent = self.extent(connection, params)
+        values = {
+            "origin_ns": extent.origin_ns,
+            "kind": kind,
+            "id": _whole(params, "id"),
+        }
+        table = run_page_query(connection, "flow", values)
+        return encode(table, units=_units("flow"))
+
+    def fill_flows(self, connection: duckdb.DuckDBPyConnection, extent: Extent) -> None:
+        """Find the flows of all paths of a run, once."""
+        values = {
+            "run": extent.run.run_id,
+            "origin_ns": extent.origin_ns,
+            "start_ns": self._window[0],
+            "end_ns": self._window[1],
+        }
+        self._scratch.fill(
+            "flow", extent.run.run_id, lambda: run_page_query(connection, "path_flow", values)
+        )
+
+    def ask(self, name: str, values: Params) -> pa.Table:
+        """Return the rows of a page query over what was filled."""
+        return self._scratch.ask(name, values)
+
+    def _plain(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        start_ns, end_ns = self.window(extent, params)
+        values = {
+            "run": extent.run.run_id,
+            "origin_ns": extent.origin_ns,
+            "start_ns": start_ns,
+            "end_ns": end_ns,
+        }
+        table = run_page_query(connection, name, values | _own(name, params, values))
+        return encode(table, units=_units(name))
+
+    def _of_path(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        self.fill_flows(connection, extent)
+        values: Params = {"run": extent.run.run_id}
+        table = self._scratch.ask(name, values | _own(name, params, values))
+        return encode(table, units=_units(name))
+
+
+_ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] = {
+    "run": Pages._run,
+    "query": Pages._query,
+    "finding": Pages._finding,
+    "compare": Pages._compare,
+    "segments": Pages._segments,
+    "links": Pages._links,
+    "edge": Pages._edge,
+    "flow": Pages._flow,
+}
+_PLAIN = ("row", "gap", "path", "executor_share", "executor_node", "neighbour")
+_OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")
+
+
+def _units(name: str) -> dict[str, str]:
+    return {column.name: column.unit for column in page_query(name).columns if column.unit}
+
+
+def _own(name: str, params: Params, given: Mapping[str, Any]) -> Params:
+    # What the page says of the parameters of the query that are not the page's frame.
+    own: Params = {}
+    for param in page_query(name).params:
+        if param.name in params and param.name not in given:
+            value = params[param.name]
+            own[param.name] = _whole(params, param.name) if param.type == "BIGINT" else str(value)
+    return own
+
+
+def _whole(params: Params, name: str, default: int | None = None) -> int:
+    value = params.get(name, default)
+    try:
+        number = int(value) if value is not None else None
+    except (TypeError, ValueError):
+        number = None
+    if number is None or abs(number) > _LARGEST:
+        raise UsageError(f"{name} is a whole number — {value}")
+    return number

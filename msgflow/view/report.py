@@ -1,0 +1,399 @@
+"""`msgflow report`: the pages in one file, with their data inside.
+
+What does not fit is left out by rules that the pages state: first single bars of the timeline, kept
+around the slowest flows of each path, with the whole run in bins beside them.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+from pyarrow import compute
+
+from msgflow.atomic import replacing
+from msgflow.errors import UsageError
+from msgflow.query.run import read_runs
+from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs, time_window
+from msgflow.view import assets
+from msgflow.view.columns import encode
+from msgflow.view.page_query import run_page_query
+from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.query.window import Run
+
+# Of these the pages show every path's pictures; of more those with the slowest flows.
+MOST_PATHS = 200
+# What a bar with its links takes in a file, found by measuring; what the file has proves it.
+_BYTES_PER_BAR = 16
+_LEVEL_SHARE = 0.25
+_STRETCHES = 12
+_POLICY = (
+    "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data:;"
+    " base-uri 'none'; form-action 'none'"
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report that was written.
+
+    Attributes:
+        path: the file.
+        size: bytes of it.
+        run: what it is about.
+        notes: what it leaves out, a sentence each.
+    """
+
+    path: Path
+    size: int
+    run: Run
+    notes: tuple[str, ...] = ()
+
+
+@dataclass
+class _Parts:
+    keys: list[dict[str, Any]] = field(default_factory=list)
+    buffers: list[bytes] = field(default_factory=list)
+
+    def add(self, key: str, content: bytes) -> None:
+        self.keys.append({"key": key, "length": len(content)})
+        self.buffers.append(content)
+
+    def pack(self, head: dict[str, Any]) -> bytes:
+        text = json.dumps(head | {"parts": self.keys}, ensure_ascii=False).encode()
+        content = b"".join([len(text).to_bytes(4, "little"), text, *self.buffers])
+        return gzip.compress(content, compresslevel=6, mtime=0)
+
+
+def write_report(
+    connection: duckdb.DuckDBPyConnection,
+    path: Path,
+    *,
+    run: str | int | None = None,
+    compare: str | int | None = None,
+    start: str | int | None = None,
+    end: str | int | None = None,
+    through: str | None = None,
+    max_size: int,
+    progress: Callable[[str], None] = lambda step: None,
+) -> Report:
+    """Write the pages of a run into one file that any browser opens.
+
+    Args:
+        connection: to a database with the public views.
+        path: the file; one that exists is replaced.
+        run: a name or an id; the latest run when None.
+        compare: another run to compare with; the page is left out when None.
+        start: begin of the time window: epoch ns, an offset from the run's start, or ISO time.
+        end: its end, likewise.
+        through: only paths with this text in them, and the rows of the timeline on these.
+        max_size: most bytes of the file.
+        progress: called with what is being done.
+
+    Raises:
+        UsageError: no such run or path, a window without events, or a size that is too small.
+        QueryError: the database could not run a query.
+    """
+    runs = choose_runs(read_runs(connection), run)
+    if len(runs) != 1:
+        raise UsageError(
+            "a report is about one run" if runs else "the database holds no run yet",
+            "choose one with --run" if runs else "msgflow ingest TRACE",
+        )
+    window = time_window(runs, start, end)
+    maker = _Maker(connection, str(runs[0].run_id), window, through, max_size, progress)
+    try:
+        content, notes = maker.make(None if compare is None else str(compare))
+    finally:
+        maker.pages.close()
+    with replacing(path) as temporary:
+        temporary.write_text(content, encoding="utf-8")
+    return Report(path, len(content.encode()), runs[0], tuple(notes))
+
+
+class _Maker:
+    def __init__(
+        self,
+        connection: duckdb.DuckDBPyConnection,
+        run: str,
+        window: tuple[int, int],
+        through: str | None,
+        max_size: int,
+        progress: Callable[[str], None],
+    ) -> None:
+        self.connection = connection
+        self.params: dict[str, Any] = {"run": run}
+        self.pages = Pages(window)
+        self.extent = self.pages.extent(connection, self.params)
+        self.window = window
+        self.through = through
+        self.max_size = max_size
+        self.progress = progress
+        self.notes: list[str] = []
+        self.parts = _Parts()
+
+    def answer(self, name: str, /, **params: Any) -> bytes:
+        return self.pages.answer(self.connection, name, self.params | params)
+
+    def keep(self, name: str, /, **params: Any) -> None:
+        known = "&".join(sorted(f"{key}={value}" for key, value in params.items()))
+        self.parts.add(f"{name}?{known}", self.answer(name, **params))
+
+    def make(self, compare: str | None) -> tuple[str, list[str]]:
+        extent = self.extent
+        begin = max(extent.origin_ns, self.window[0])
+        end = min(extent.origin_ns + extent.length_ns + 1, self.window[1])
+        if extent.length_ns and begin >= end:
+            raise UsageError(
+                "nothing was recorded in the time window",
+                f"the run lasts {extent.length_ns / 1e9:.3f} s: --start 0s",
+            )
+        if self.window != (MINIMUM_NS, MAXIMUM_NS):
+            self.notes.append(
+                f"Only {(begin - extent.origin_ns) / 1e9:.3f} s to"
+                f" {(end - extent.origin_ns) / 1e9:.3f} s of the run are in this report"
+                " (--start, --end)."
+            )
+        self.progress("tables")
+        self.runs(compare)
+        self.keep("finding")
+        for name in NAMED:
+            self.keep("query", name=name)
+        for name in ("row", "gap", "path", "executor_node", "executor_share"):
+            self.keep(name)
+        self.progress("paths")
+        chosen = self.paths()
+        if compare is not None:
+            self.progress("comparison")
+            self.compared(compare)
+        self.progress("timeline")
+        head = self.timeline((begin, end), chosen)
+        return self.page(head), self.notes
+
+    def runs(self, compare: str | None) -> None:
+        table = run_page_query(self.connection, "run", {})
+        wanted = [self.extent.run.run_id]
+        if compare is not None:
+            (other,) = choose_runs(read_runs(self.connection), compare)
+            if other.run_id == self.extent.run.run_id:
+                raise UsageError("a run is not compared with itself", "give another --compare")
+            wanted.insert(0, other.run_id)
+        rows = table.filter(compute.is_in(table["run_id"], pa.array(wanted)))
+        order = sorted(
+            range(rows.num_rows), key=lambda row: wanted.index(rows["run_id"][row].as_py())
+        )
+        self.parts.add("run", encode(rows.take(pa.array(order, pa.int64()))))
+
+    def paths(self) -> list[int]:
+        """Keep the pictures of paths; return the numbers of those kept."""
+        rows = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
+        numbers: list[int] = rows["path_id"].to_pylist()
+        if self.through is not None:
+            texts = rows["path"].to_pylist()
+            numbers = [n for n, text in zip(numbers, texts, strict=True) if self.through in text]
+            if not numbers:
+                raise UsageError(
+                    f"no path has this text — {self.through}", "msgflow query e2e-latency"
+                )
+            self.notes.append(
+                f"Pictures of {len(numbers)} of {rows.num_rows} paths are in this report, and the"
+                f" timeline has the rows on these: those with {self.through} (--path)."
+            )
+        if numbers:
+            self.pages.fill_flows(self.connection, self.extent)
+            worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
+            longest = dict(
+                zip(worst["path_id"].to_pylist(), worst["latency"].to_pylist(), strict=True)
+            )
+            if len(numbers) > MOST_PATHS:
+                self.notes.append(
+                    f"Pictures of {MOST_PATHS} of {len(numbers)} paths are in this report: those"
+                    " with the slowest flows. The table has all of them."
+                )
+                numbers = sorted(numbers, key=lambda n: -longest.get(n, -1))[:MOST_PATHS]
+        for number in numbers:
+            for name in ("path_histogram", "path_share", "path_point", "path_slowest"):
+                self.keep(name, path=number)
+        self.keep("path_slowest", limit=1)
+        return numbers
+
+    def compared(self, compare: str) -> None:
+        (other,) = choose_runs(read_runs(self.connection), compare)
+        for what in ("paths", "callbacks", "topics"):
+            self.keep("compare", other=other.run_id, what=what)
+        params = {"run": str(other.run_id)}
+        extent = self.pages.extent(self.connection, params)
+        for name in ("path", "row"):
+            self.parts.add(
+                f"{name}?@{other.run_id}", self.pages.answer(self.connection, name, params)
+            )
+        rows = run_page_query(self.connection, "path", {"run": extent.run.run_id})
+        for number in rows["path_id"].to_pylist()[:MOST_PATHS]:
+            self.parts.add(
+                f"path_share?path={number}@{other.run_id}",
+                self.pages.answer(self.connection, "path_share", params | {"path": number}),
+            )
+
+    def timeline(self, window: tuple[int, int], paths: list[int]) -> dict[str, Any]:
+        """Keep bars, arrows and links; return the head that says which."""
+        origin = self.extent.origin_ns
+        head: dict[str, Any] = {
+            "start": window[0] - origin,
+            "end": window[1] - origin,
+            "stretches": [],
+            "count": 0,
+        }
+        values = self.pages.recorded(self.connection, self.extent, window)
+        if not self.extent.length_ns:
+            self.stretch(0, window, None)
+            self.edges(window)
+            head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
+            head["notes"] = self.notes
+            return head
+        rows = self.rows_on(paths) if self.through is not None else None
+        (count,) = run_page_query(self.connection, "segment_count", values)["count"].to_pylist()
+        head["count"] = count
+        used = len(self.parts.pack({})) * 4 // 3 + 400_000
+        room = self.max_size - used
+        if room < 0:
+            raise UsageError(
+                f"the pages alone take {used:,} bytes, without the timeline",
+                "give a larger --max-size, or cut the report with --start, --end or --path",
+            )
+        if count * _BYTES_PER_BAR <= room or rows is not None:
+            self.stretch(0, window, rows)
+            self.edges(window)
+            head["stretches"] = [
+                {"start": window[0] - origin, "end": window[1] - origin, "whole": True}
+            ]
+        else:
+            self.thinned(head, window, room, count)
+        head["notes"] = self.notes
+        return head
+
+    def stretch(self, place: int, window: tuple[int, int], rows: list[int] | None) -> int:
+        values = self.pages.recorded(self.connection, self.extent, window)
+        table = run_page_query(self.connection, "segments", values)
+        links = run_page_query(self.connection, "links", values | {"limit": 2**40})
+        if rows is not None:
+            known = pa.array(rows, pa.int64())
+            table = table.filter(compute.is_in(table["row_key"], known))
+            links = links.filter(
+                compute.and_(
+                    compute.is_in(links["from_row"], known), compute.is_in(links["to_row"], known)
+                )
+            )
+        slim = table.select(["row_key", "kind", "id", "start_at", "length", "flags"])
+        self.parts.add(f"detail?place={place}", encode(slim))
+        self.parts.add(f"links?place={place}", encode(links))
+        return int(table.num_rows)
+
+    def edges(self, window: tuple[int, int]) -> None:
+        values = self.pages.recorded(self.connection, self.extent, window)
+        self.parts.add("edge?", encode(run_page_query(self.connection, "edge", values)))
+
+    def rows_on(self, paths: list[int]) -> list[int]:
+        """Return the rows of the timeline on some paths: their objects, timers and executors."""
+        chosen = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
+        chosen = chosen.filter(compute.is_in(chosen["path_id"], pa.array(paths, pa.int64())))
+        publishers = {one for several in chosen["publishers"].to_pylist() for one in several}
+        subscriptions = {one for several in chosen["subscriptions"].to_pylist() for one in several}
+        keys = {8 * one + 4 for one in publishers} | {8 * one + 1 for one in subscriptions}
+        rows = run_page_query(self.connection, "row", {"run": self.extent.run.run_id}).to_pylist()
+        nodes = {(row["process_id"], row["node"]) for row in rows if row["row_key"] in keys}
+        processes = {process for process, _ in nodes}
+        return [
+            row["row_key"]
+            for row in rows
+            if row["row_key"] in keys
+            or (row["kind"] == "timer" and (row["process_id"], row["node"]) in nodes)
+            or (row["kind"] == "thread" and row["process_id"] in processes)
+        ]
+
+    def thinned(self, head: dict[str, Any], window: tuple[int, int], room: int, count: int) -> None:
+        """Keep the run in bins, and single bars around the slowest flows."""
+        origin = self.extent.origin_ns
+        values = self.pages.recorded(self.connection, self.extent, window)
+        bins = LEVEL_BINS
+        while True:
+            bin_ns = (window[1] - window[0]) // bins + 1
+            table = run_page_query(self.connection, "segments", values | {"bin_ns": bin_ns})
+            level = encode(table, units={})
+            size = len(gzip.compress(level, compresslevel=1)) * 4 // 3
+            if size <= room * _LEVEL_SHARE or bins <= 256:
+                break
+            bins //= 2
+        self.parts.add("level?", level)
+        head["bin"] = bin_ns
+        room -= size
+        each = window[1] - window[0]
+        share = max(room, 0) / (count * _BYTES_PER_BAR)
+        number = _STRETCHES
+        length = max(int(each * share / number), 1)
+        middles = self.slow_moments()[:number] or [window[0] - origin + each // 2]
+        stretches: list[tuple[int, int]] = []
+        for middle in sorted(middles):
+            low = max(middle + origin - length // 4, window[0])
+            high = min(low + length, window[1])
+            if stretches and low <= stretches[-1][1]:
+                stretches[-1] = (stretches[-1][0], max(high, stretches[-1][1]))
+            else:
+                stretches.append((low, high))
+        held = sum(self.stretch(place, stretch, None) for place, stretch in enumerate(stretches))
+        tables = [self._edge_table(stretch) for stretch in stretches]
+        edges = pa.concat_tables(tables)
+        distinct = edges.group_by(edges.column_names).aggregate([])
+        order = [
+            (name, "ascending")
+            for name in ("from_kind", "to_kind", "from_id", "to_id", "link_kind")
+        ]
+        self.parts.add("edge?", encode(distinct.sort_by(order)))
+        head["stretches"] = [
+            {"start": low - origin, "end": high - origin} for low, high in stretches
+        ]
+        self.notes.append(
+            f"The timeline of {count:,} bars does not fit into {self.max_size:,} bytes: single bars"
+            f" and flows are here for {len(stretches)} stretches around the slowest flows"
+            f" ({held:,} bars), the rest in bins of {bin_ns / 1e6:.3f} ms. A larger --max-size, or"
+            " --start and --end, keep more; msgflow ui has everything."
+        )
+
+    def _edge_table(self, window: tuple[int, int]) -> pa.Table:
+        values = self.pages.recorded(self.connection, self.extent, window)
+        return run_page_query(self.connection, "edge", values)
+
+    def slow_moments(self) -> list[int]:
+        """Return when the slowest flow of each path began, the slowest first."""
+        self.pages.fill_flows(self.connection, self.extent)
+        worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
+        order = worst.sort_by([("latency", "descending")])
+        return [int(at) for at in order["root_at"].to_pylist()]
+
+    def page(self, head: dict[str, Any]) -> str:
+        packed = base64.b64encode(self.parts.pack(head)).decode()
+        scripts = [*(assets.vendored(name) for name in assets.SCRIPTS), assets.joined()]
+        styles = [*(assets.vendored(name) for name in assets.SHEETS), assets.text("style.css")]
+        policy = _POLICY.format(
+            scripts=" ".join(map(assets.source_hash, scripts)),
+            styles=" ".join(map(assets.source_hash, styles)),
+        )
+        # The browser runs scripts at the end of the page, behind the data.
+        body = [f'<script type="application/octet-stream" id="msgflow-data">{packed}</script>']
+        body += [f"<script>{script}</script>" for script in scripts[:-1]]
+        body.append(f'<script type="module">{scripts[-1]}</script>')
+        return assets.page(
+            head="\n".join(f"<style>{style}</style>" for style in styles),
+            body="\n".join(body),
+            policy=policy,
+        )

@@ -1,0 +1,413 @@
+"""`msgflow ui`: serves the pages of one database to the browser of the one who started it.
+
+Whoever reaches the port needs the token of the printed address, which becomes a cookie; requests
+that other sites make, or that name another host than this machine, are refused. Behind `ssh -L`
+the host is still this machine.
+"""
+
+from __future__ import annotations
+
+import hmac
+import html
+import ipaddress
+import re
+import secrets
+import socket
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import anyio
+import anyio.to_thread
+import duckdb
+import uvicorn
+from starlette.applications import Starlette
+from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route
+
+from msgflow.db.connection import connect
+from msgflow.errors import DatabaseError, MsgflowError, UsageError
+from msgflow.query.run import first_line
+from msgflow.view import assets
+from msgflow.view.pages import Pages
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from starlette.requests import Request
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
+HOST = "127.0.0.1"
+DEFAULT_PORT = 8642
+DEFAULT_MEMORY = "300MB"
+# Questions that are answered at the same time; the others wait.
+MOST_AT_ONCE = 4
+_SECONDS_BETWEEN_LOOKS = 0.1
+_LOCAL_NAMES = ("localhost",)
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
+    " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_TYPES = {".js": "text/javascript", ".css": "text/css"}
+_HEADERS = {
+    "Content-Security-Policy": _POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+_FILE = re.compile(r"[\w.-]+\.(?:js|css)")
+
+
+class ReplacedError(DatabaseError):
+    """The database is another one than that the page was made of."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Tells a file from another of the same name."""
+
+    device: int
+    inode: int
+    modified_ns: int
+    size: int
+
+
+class Shared:
+    """The open database, shared by all requests, and opened anew when its file is another.
+
+    Attributes:
+        generation: counts how often that was.
+    """
+
+    def __init__(self, path: Path, memory_limit: str) -> None:
+        self.path = path
+        self.generation = 1
+        self._memory_limit = memory_limit
+        self._lock = threading.Lock()
+        self._identity = _identity(path)
+        self._base, self.pages = self._open()
+
+    def _open(self) -> tuple[duckdb.DuckDBPyConnection, Pages]:
+        base = connect(self.path, read_only=True, memory_limit=self._memory_limit)
+        # A connection of its own for each request has the settings of the database, not those of
+        # the connection that it comes from.
+        base.execute("SET GLOBAL asof_loop_join_threshold = 0")
+        base.execute("SET enable_external_access = false")
+        base.execute("SET lock_configuration = true")
+        return base, Pages()
+
+    def require_same(self, generation: str | None) -> None:
+        """Raise where the page was made of another file than is there now.
+
+        Raises:
+            ReplacedError: it was; or the file is gone.
+            DatabaseError: what took its place cannot be opened.
+        """
+        with self._lock:
+            try:
+                identity = _identity(self.path)
+            except OSError:
+                raise ReplacedError(
+                    f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
+                ) from None
+            if identity != self._identity:
+                self._close()
+                self._base, self.pages = self._open()
+                self._identity = identity
+                self.generation += 1
+        if generation is not None and generation != str(self.generation):
+            raise ReplacedError(
+                f"the database was replaced while the page was open — {self.path}",
+                "reload the page to see the new one",
+            )
+
+    def cursor(self) -> duckdb.DuckDBPyConnection:
+        """Return a connection of its own to the database."""
+        with self._lock:
+            return self._base.cursor()
+
+    def _close(self) -> None:
+        self._base.close()
+        self.pages.close()
+
+    def close(self) -> None:
+        """Close the database."""
+        with self._lock:
+            self._close()
+
+
+def _identity(path: Path) -> Identity:
+    stat = path.stat()
+    return Identity(stat.st_dev, stat.st_ino, stat.st_mtime_ns, stat.st_size)
+
+
+def application(shared: Shared, token: str) -> ASGIApp:
+    """Return the application: pages and their data, for those who know the token.
+
+    Args:
+        shared: the database.
+        token: of the printed address.
+    """
+    limiter: list[anyio.CapacityLimiter] = []
+
+    async def page(request: Request) -> Response:
+        content = assets.page(
+            head=_head(), attributes=f' data-generation="{html.escape(str(shared.generation))}"'
+        )
+        return Response(content, media_type="text/html")
+
+    async def file(request: Request) -> Response:
+        name = request.path_params["name"]
+        if not _FILE.fullmatch(name):
+            return PlainTextResponse("not found", status_code=404)
+        if name in (*assets.SCRIPTS, *assets.SHEETS):
+            content = assets.vendored(name)
+        elif name in assets.modules() or name == "style.css":
+            content = assets.text(name)
+        else:
+            return PlainTextResponse("not found", status_code=404)
+        return Response(content, media_type=_TYPES[name[name.rindex(".") :]])
+
+    async def data(request: Request) -> Response:
+        if not limiter:
+            limiter.append(anyio.CapacityLimiter(MOST_AT_ONCE))
+        try:
+            shared.require_same(request.headers.get("X-Generation"))
+            return await _answered(shared, request, limiter[0])
+        except ReplacedError as error:
+            return _failure(error, 409, "replaced")
+        except UsageError as error:
+            return _failure(error, 400, "usage")
+        except MsgflowError as error:
+            return _failure(error, 500, "failed")
+        except duckdb.Error as error:
+            return JSONResponse(
+                {"error": first_line(error), "hint": None, "code": "failed"}, status_code=500
+            )
+
+    app = Starlette(
+        routes=[
+            Route("/", page),
+            Route("/{name}", file),
+            Route("/api/{name}", data),
+        ]
+    )
+    return Guard(app, token)
+
+
+async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLimiter) -> Response:
+    """Return the answer; interrupt the query when nobody waits for it any more."""
+    name = request.path_params["name"]
+    params: dict[str, Any] = dict(request.query_params)
+    pages = shared.pages
+    cursor = shared.cursor()
+    content: list[bytes] = []
+
+    async def watch(scope: anyio.CancelScope) -> None:
+        while not await request.is_disconnected():
+            await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
+        # Again and again: between two statements there is nothing to interrupt.
+        while True:
+            cursor.interrupt()
+            await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
+
+    try:
+        async with anyio.create_task_group() as group:
+            group.start_soon(watch, group.cancel_scope)
+            content.append(
+                await anyio.to_thread.run_sync(
+                    lambda: pages.answer(cursor, name, params), limiter=limiter
+                )
+            )
+            group.cancel_scope.cancel()
+    except BaseExceptionGroup as errors:
+        # A group of one: what the query raised.
+        raise errors.exceptions[0] from None
+    finally:
+        cursor.close()
+    return Response(content[0], media_type="application/octet-stream")
+
+
+def _failure(error: MsgflowError, status: int, code: str) -> Response:
+    return JSONResponse(
+        {"error": error.message, "hint": error.hint, "code": code}, status_code=status
+    )
+
+
+def _head() -> str:
+    sheets = "".join(
+        f'<link rel="stylesheet" href="{name}">\n' for name in (*assets.SHEETS, "style.css")
+    )
+    scripts = "".join(f'<script src="{name}" defer></script>\n' for name in assets.SCRIPTS)
+    return f'{sheets}{scripts}<script type="module" src="{assets.ENTRY}"></script>'
+
+
+class Guard:
+    """Lets only those through who know the token, come from our own page, and mean this machine."""
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self._app = app
+        self._token = token
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, refuse, or pass on."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        from starlette.requests import Request
+
+        request = Request(scope, receive)
+        refusal = self._refusal(request)
+        if refusal is not None:
+            await _with_headers(refusal)(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                known = [(k.lower().encode(), v.encode()) for k, v in _HEADERS.items()]
+                message["headers"] = [*message["headers"], *known]
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
+
+    def _refusal(self, request: Request) -> Response | None:
+        if not is_local(request.headers.get("host", "")):
+            return PlainTextResponse(
+                "error: this server answers for this machine alone\n", status_code=421
+            )
+        if request.method not in ("GET", "HEAD"):
+            return PlainTextResponse("error: nothing can be changed here\n", status_code=405)
+        if request.headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
+            # A link to the page may be followed from anywhere; then the cookie is not sent.
+            is_visit = request.headers.get("sec-fetch-mode") == "navigate"
+            if not (is_visit and request.url.path == "/"):
+                return PlainTextResponse("error: another site asks\n", status_code=403)
+        port = request.url.port or 80
+        cookie = f"msgflow_{port}"
+        given = request.query_params.get("token")
+        if given is not None and request.url.path == "/":
+            if not _same(given, self._token):
+                return _unknown()
+            response = RedirectResponse("/", status_code=303)
+            response.set_cookie(cookie, self._token, httponly=True, samesite="strict", path="/")
+            return response
+        if not _same(request.cookies.get(cookie, ""), self._token):
+            return _unknown()
+        return None
+
+
+def _with_headers(response: Response) -> Response:
+    for name, value in _HEADERS.items():
+        response.headers[name] = value
+    return response
+
+
+def _unknown() -> Response:
+    return PlainTextResponse(
+        "error: this page needs the address that msgflow ui printed, with its token\n",
+        status_code=403,
+    )
+
+
+def _same(given: str, token: str) -> bool:
+    return hmac.compare_digest(given.encode(), token.encode())
+
+
+def is_local(host: str) -> bool:
+    """Tell whether the Host header of a request names this machine, at any port."""
+    match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[^:\[\]]+)(?::\d{1,5})?", host)
+    if match is None:
+        return False
+    name = match[1].lower()
+    if name in _LOCAL_NAMES:
+        return True
+    try:
+        return ipaddress.ip_address(name.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def listen(port: int | None) -> socket.socket:
+    """Return a socket that listens on this machine alone.
+
+    Args:
+        port: which; 0 takes any that is free, None the usual one or else any.
+
+    Raises:
+        UsageError: it is in use, or not allowed.
+    """
+    wanted = DEFAULT_PORT if port is None else port
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((HOST, wanted))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        if port is None:
+            return listen(0)
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(
+            f"cannot listen on the port: {reason} — {wanted}",
+            "give another --port, or none: then a free one is taken",
+        ) from error
+    return listener
+
+
+def serve(
+    path: Path,
+    *,
+    port: int | None = None,
+    memory_limit: str = DEFAULT_MEMORY,
+    started: Callable[[str], None] = lambda address: None,
+) -> None:
+    """Serve the pages of a database until Ctrl-C.
+
+    Args:
+        path: the database.
+        port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
+        memory_limit: most memory that DuckDB takes, such as '300MB'.
+        started: called with the address, which has the token, once it can be opened.
+
+    Raises:
+        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
+        UsageError: the port is in use.
+    """
+    with running(path, port=port, memory_limit=memory_limit) as (server, listener, address):
+        server.started_with = lambda: started(address)
+        server.run(sockets=[listener])
+
+
+@contextmanager
+def running(
+    path: Path, *, port: int | None, memory_limit: str
+) -> Iterator[tuple[_Server, socket.socket, str]]:
+    """Prepare a server; see `serve`."""
+    shared = Shared(path, memory_limit)
+    try:
+        listener = listen(port)
+        token = secrets.token_urlsafe(24)
+        address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
+        config = uvicorn.Config(
+            application(shared, token), log_level="error", access_log=False, lifespan="off",
+            timeout_graceful_shutdown=1, ws="none", server_header=False,
+        )  # fmt: skip
+        with listener:
+            yield _Server(config), listener, address
+    finally:
+        shared.close()
+
+
+class _Server(uvicorn.Server):
+    """Tells when it can be reached."""
+
+    started_with: Callable[[], None] | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started and self.started_with is not None:
+            self.started_with()

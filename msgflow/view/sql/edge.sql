@@ -1,0 +1,36 @@
+-- name: edge
+-- title: Links between what a report holds
+-- description: Links of a run whose ends begin in a window, for a page without a database to follow
+--     flows by: the same as main.flow_both follows.
+-- grain: one row per link
+-- param: run BIGINT  Run
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: recorded_from_ns BIGINT  Begin of the window on the earliest clock
+-- param: recorded_before_ns BIGINT  Its end on the latest clock
+-- column: to_kind UTINYINT  Effect, as in bar.sql and call.sql
+-- column: to_id BIGINT  Its identity
+-- column: from_kind UTINYINT  Cause
+-- column: from_id BIGINT  Its identity
+-- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
+-- needs: view.segment, derive.flow_link
+WITH held AS (
+    SELECT kind, id FROM segment WHERE kind < 5
+),
+code AS (
+    SELECT unnest(
+        ['callback_instance', 'publication', 'take', 'request', 'response']
+    ) AS name, unnest([0, 1, 2, 3, 4])::UTINYINT AS code
+),
+coded AS (
+    SELECT t.code AS to_kind, l.to_id, f.code AS from_kind, l.from_id, l.link_kind
+    FROM derive.flow_link AS l
+    JOIN code AS f ON l.from_kind = f.name
+    JOIN code AS t ON l.to_kind = t.name
+    WHERE l.run_id = $run
+)
+SELECT to_kind, to_id, from_kind, from_id, link_kind
+FROM coded AS c
+WHERE EXISTS (SELECT 1 FROM held AS h WHERE h.kind = c.to_kind AND h.id = c.to_id)
+    OR EXISTS (SELECT 1 FROM held AS h WHERE h.kind = c.from_kind AND h.id = c.from_id)
+ORDER BY from_kind, to_kind, from_id, to_id, link_kind

@@ -1,0 +1,92 @@
+-- name: flow
+-- title: The flow of what was picked
+-- description: Everything that the picked thing caused and was caused by (main.flow_both), as bars,
+--     and the links between them.
+-- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
+-- param: id BIGINT  Its identity
+-- param: limit BIGINT = 20000  Most vertices, those nearest in time
+-- column: kind UTINYINT  As in bar.sql and call.sql
+-- column: id BIGINT  Identity of the vertex
+-- column: row_key BIGINT  Row of the timeline
+-- column: start_at BIGINT [ns since origin]  Begin
+-- column: length BIGINT [ns]  Length
+-- column: flags UTINYINT  As in bar.sql
+-- column: is_effect BOOLEAN  What was picked led to it
+-- column: is_cause BOOLEAN  It led to what was picked
+-- column: from_kind UTINYINT  Where a link comes from; NULL: nowhere
+-- column: from_id BIGINT  Its identity
+-- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
+-- column: vertex_count BIGINT  Vertices of the whole flow
+-- needs: view.bar, view.call, main.flow_forward, main.flow_backward, derive.flow_link,
+--     derive.process_clock, derive.corrected_ns
+WITH code AS (
+    SELECT unnest(
+        ['callback_instance', 'publication', 'take', 'request', 'response']
+    ) AS name, unnest([0, 1, 2, 3, 4])::UTINYINT AS code
+),
+reached AS MATERIALIZED (
+    SELECT kind, id, bool_or(is_effect) AS is_effect, bool_or(NOT is_effect) AS is_cause
+    FROM (
+        SELECT kind, id, true AS is_effect FROM main.flow_forward($kind, $id)
+        UNION ALL
+        SELECT kind, id, false FROM main.flow_backward($kind, $id)
+    )
+    GROUP BY kind, id
+),
+vertex AS (
+    SELECT r.kind AS name, c.code AS kind, r.id, r.is_effect, r.is_cause
+    FROM reached AS r
+    JOIN code AS c ON r.kind = c.name
+),
+drawn AS MATERIALIZED (
+    SELECT
+        v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key,
+        derive.corrected_ns(
+            b.recorded_ns, c.offset_ns, c.drift_ppb, c.reference_ns
+        ) AS start_ns,
+        derive.corrected_ns(
+            b.recorded_end_ns, c.offset_ns, c.drift_ppb, c.reference_ns
+        ) AS end_ns,
+        b.flags
+    FROM vertex AS v
+    JOIN bar AS b ON v.kind = b.kind AND v.id = b.id AND v.kind < 3
+    JOIN derive.process_clock AS c ON b.process_id = c.process_id
+    UNION ALL
+    SELECT
+        v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key, b.start_ns, b.end_ns, b.flags
+    FROM vertex AS v
+    JOIN call AS b ON v.kind = b.kind AND v.id = b.id
+),
+near AS MATERIALIZED (
+    SELECT d.name, d.kind, d.id, d.is_effect, d.is_cause, d.row_key, d.start_ns, d.end_ns, d.flags
+    FROM drawn AS d
+    ORDER BY
+        abs(d.start_ns - (SELECT min(start_ns) FROM drawn WHERE name = $kind AND id = $id)),
+        d.kind, d.id
+    LIMIT $limit
+),
+link AS (
+    SELECT l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind
+    FROM derive.flow_link AS l
+    SEMI JOIN near AS f ON l.from_kind = f.name AND l.from_id = f.id
+    SEMI JOIN near AS t ON l.to_kind = t.name AND l.to_id = t.id
+)
+SELECT
+    n.kind,
+    n.id,
+    n.row_key,
+    n.start_ns - $origin_ns AS start_at,
+    n.end_ns - n.start_ns AS length,
+    n.flags,
+    n.is_effect,
+    n.is_cause,
+    c.code AS from_kind,
+    l.from_id,
+    l.link_kind,
+    (SELECT count(*) FROM reached) AS vertex_count
+FROM near AS n
+LEFT JOIN link AS l ON n.name = l.to_kind AND n.id = l.to_id
+LEFT JOIN code AS c ON l.from_kind = c.name
+ORDER BY start_at, n.kind, n.id, c.code, l.from_id, l.link_kind

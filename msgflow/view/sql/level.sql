@@ -1,0 +1,33 @@
+-- name: level
+-- title: Bars of the timeline in a wide window
+-- description: What segments.sql gives for bins of some length, counted once for the whole run, put
+--     together to longer bins.
+-- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- param: bin_ns BIGINT  Length of a bin, a multiple of that of the level
+-- column: row_key BIGINT  Row of the timeline
+-- column: kind UTINYINT  Kind of the bar
+-- column: id BIGINT  Identity of the thing; NULL: several in one bin
+-- column: start_at BIGINT [ns since origin]  Begin of the bar, or of the bin
+-- column: length BIGINT [ns]  Length of the bar, or of the bin
+-- column: flags UTINYINT  As in bar.sql
+-- column: count BIGINT  Bars in the bin; 1 for a bar
+-- column: busy BIGINT [ns]  Sum of their lengths
+SELECT row_key, kind, id, start_at, length, flags, count, busy
+FROM level
+WHERE run_id = $run
+    AND start_at < $end_ns - $origin_ns AND start_at + length >= $start_ns - $origin_ns
+    AND id IS NOT NULL AND length >= $bin_ns
+UNION ALL
+SELECT
+    row_key, kind, NULL, $bin_ns * (start_at // $bin_ns), $bin_ns, bit_or(flags),
+    sum(count)::BIGINT, sum(busy)::BIGINT
+FROM level
+WHERE run_id = $run
+    AND start_at < $end_ns - $origin_ns AND start_at + length >= $start_ns - $origin_ns
+    AND (id IS NULL OR length < $bin_ns)
+GROUP BY row_key, kind, start_at // $bin_ns
+ORDER BY row_key, start_at, kind, id

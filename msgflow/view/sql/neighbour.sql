@@ -1,0 +1,40 @@
+-- name: neighbour
+-- title: The next or previous of its kind
+-- description: The bar on the same row of the timeline that begins next, or before.
+-- grain: one row per bar found
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: row BIGINT  Row of the timeline
+-- param: kind BIGINT  Kind of the bar
+-- param: id BIGINT  Identity of the thing
+-- param: step BIGINT  1: next, -1: previous
+-- column: kind UTINYINT  Kind of the bar
+-- column: id BIGINT  Identity of the thing
+-- column: start_at BIGINT [ns since origin]  Begin
+-- column: length BIGINT [ns]  Length
+-- needs: view.bar, view.call, derive.process_clock, derive.corrected_ns
+WITH beside AS (
+    SELECT
+        b.kind, b.id,
+        derive.corrected_ns(
+            b.recorded_ns, c.offset_ns, c.drift_ppb, c.reference_ns
+        ) AS start_ns,
+        derive.corrected_ns(
+            b.recorded_end_ns, c.offset_ns, c.drift_ppb, c.reference_ns
+        ) AS end_ns
+    FROM bar AS b
+    JOIN derive.process_clock AS c ON b.process_id = c.process_id
+    WHERE b.run_id = $run AND b.row_key = $row AND b.kind = $kind
+    UNION ALL
+    SELECT kind, id, start_ns, end_ns
+    FROM call
+    WHERE run_id = $run AND row_key = $row AND kind = $kind
+),
+numbered AS (
+    SELECT kind, id, start_ns, end_ns, row_number() OVER (ORDER BY start_ns, id) AS position
+    FROM beside
+)
+SELECT kind, id, start_ns - $origin_ns AS start_at, end_ns - start_ns AS length
+FROM numbered
+WHERE position = (SELECT position + $step FROM numbered WHERE id = $id)
+ORDER BY start_at

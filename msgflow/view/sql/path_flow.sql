@@ -1,0 +1,26 @@
+-- name: path_flow
+-- title: Flows of all paths
+-- description: The flows that e2e-latency counts: the first arrival of each root, or why there is
+--     none. Kept by the page for its pictures of single paths.
+-- grain: one row per path and root
+-- param: run BIGINT  Run
+-- param: origin_ns BIGINT  What times count from, epoch ns
+-- param: start_ns BIGINT  Begin of the window of roots, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- column: path_id BIGINT  Number of the path
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: root_at BIGINT [ns since origin]  Start of the root
+-- column: take_id BIGINT  Take at the end of the path; NULL: not reached
+-- column: latency BIGINT [ns]  From the start of the root to the end
+-- column: status VARCHAR  As in flows
+-- column: is_loss_affected BOOLEAN  A gap of a trace lies in its time
+-- needs: main.end_to_end
+SELECT
+    path_id, root_kind, root_id, root_ns - $origin_ns AS root_at, take_id, latency_ns AS latency,
+    status, is_loss_affected
+FROM main.end_to_end(
+    [$run], NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns
+)
+WHERE is_first
+ORDER BY path_id, root_at, root_kind, root_id

@@ -1,0 +1,26 @@
+-- name: path_histogram
+-- title: Histogram of a path
+-- description: How many flows of a path took how long, in bins of one width.
+-- grain: one row per bin with flows
+-- param: run BIGINT  Run
+-- param: path BIGINT  Number of the path
+-- param: bins BIGINT = 60  Number of bins
+-- column: bin BIGINT  Position of the bin, from 0
+-- column: low BIGINT [ns]  Least latency of the bin
+-- column: width BIGINT [ns]  Width of the bins
+-- column: count BIGINT  Flows
+WITH reached AS (
+    SELECT latency FROM flow WHERE run_id = $run AND path_id = $path AND latency IS NOT NULL
+),
+extent AS (
+    SELECT min(latency) AS least, (max(latency) - min(latency)) // $bins + 1 AS width FROM reached
+)
+SELECT
+    (r.latency - e.least) // e.width AS bin,
+    e.least + e.width * ((r.latency - e.least) // e.width) AS low,
+    e.width,
+    count(*) AS count
+FROM reached AS r
+CROSS JOIN extent AS e
+GROUP BY ALL
+ORDER BY bin

@@ -1,0 +1,40 @@
+-- name: path_point
+-- title: Latency of a path over time
+-- description: Flows of a path one by one, or, where they are many, the slowest of each piece of
+--     time with the median of the piece.
+-- grain: one row per flow, or per piece of time with flows
+-- param: run BIGINT  Run
+-- param: path BIGINT  Number of the path
+-- param: limit BIGINT = 2000  Most rows
+-- column: root_at BIGINT [ns since origin]  Start of the root
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: take_id BIGINT  Take at the end; NULL: not reached
+-- column: latency BIGINT [ns]  Latency; of the slowest in the piece
+-- column: median BIGINT [ns]  Median of the piece; the latency itself where flows are one by one
+-- column: count BIGINT  Flows in the piece
+-- column: missing BIGINT  Of these, flows that did not arrive, those at the edge left out
+WITH numbered AS (
+    SELECT
+        root_at, root_kind, root_id, take_id, latency, status,
+        count(*) OVER () AS number,
+        min(root_at) OVER () AS first_at,
+        max(root_at) OVER () AS last_at
+    FROM flow
+    WHERE run_id = $run AND path_id = $path
+)
+SELECT
+    arg_max(root_at, coalesce(latency, -1)) AS root_at,
+    arg_max(root_kind, coalesce(latency, -1)) AS root_kind,
+    arg_max(root_id, coalesce(latency, -1)) AS root_id,
+    arg_max(take_id, latency) AS take_id,
+    max(latency) AS latency,
+    quantile_disc(latency, 0.5) AS median,
+    count(*) AS count,
+    count(*) FILTER (WHERE status IN ('lost', 'superseded')) AS missing
+FROM numbered
+GROUP BY
+    CASE WHEN number <= $limit THEN root_id
+        ELSE (root_at - first_at) * $limit // (last_at - first_at + 1) END,
+    CASE WHEN number <= $limit THEN root_kind END
+ORDER BY root_at, root_kind, root_id

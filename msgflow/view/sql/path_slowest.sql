@@ -1,0 +1,20 @@
+-- name: path_slowest
+-- title: Slowest flows
+-- description: The slowest flows of a path, or of every path.
+-- grain: one row per flow
+-- param: run BIGINT  Run
+-- param: path BIGINT = NULL  Number of the path; every one when NULL
+-- param: limit BIGINT = 10  Most flows of a path
+-- column: path_id BIGINT  Number of the path
+-- column: root_at BIGINT [ns since origin]  Start of the root
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: take_id BIGINT  Take at the end
+-- column: latency BIGINT [ns]  Latency
+SELECT path_id, root_at, root_kind, root_id, take_id, latency
+FROM flow
+WHERE run_id = $run AND latency IS NOT NULL AND ($path IS NULL OR path_id = $path)
+QUALIFY row_number() OVER (
+    PARTITION BY path_id ORDER BY latency DESC, root_at, root_kind, root_id
+) <= $limit
+ORDER BY path_id, latency DESC, root_at, root_kind, root_id

@@ -1,0 +1,115 @@
+-- name: row
+-- title: Rows of the timeline
+-- description: Everything that has a row in the timeline, in its order: by host, process and node;
+--     there timers, subscriptions, services, clients and publishers, and below each process the
+--     threads of its executors.
+-- grain: one row per row of the timeline
+-- param: run BIGINT  Run
+-- column: row_key BIGINT  Identity of the row: eight times that of the object, plus its kind
+-- column: kind VARCHAR  'timer', 'subscription', 'service', 'client', 'publisher', 'callback' (of
+--     an unknown kind), 'thread' or 'middleware' (what belongs to no object of a node)
+-- column: object_id BIGINT  Identity of the timer, subscription, …; of 'middleware' the process
+-- column: host VARCHAR  Machine or container
+-- column: process VARCHAR  Name of the process and its pid
+-- column: process_id BIGINT  Identity of the process
+-- column: node VARCHAR  Full name of the node; NULL: none, or not known
+-- column: label VARCHAR  Period, topic, service, or thread
+-- column: symbol VARCHAR  Functions registered for its callbacks
+-- column: is_internal BOOLEAN  Infrastructure of ROS
+-- needs: main.timer, main.subscription, main.service, main.client, main.publisher, main.callback,
+--     main.executor_thread, main.executor, main.thread, main.process, main.host, main.node,
+--     main.publication, main.take, main.callback_label
+WITH symbol AS (
+    SELECT timer_id, subscription_id, service_id,
+        string_agg(DISTINCT symbol, ', ' ORDER BY symbol) AS symbol
+    FROM main.callback
+    WHERE run_id = $run AND symbol IS NOT NULL
+    GROUP BY timer_id, subscription_id, service_id
+),
+object AS (
+    SELECT
+        8 * t.timer_id AS row_key, 'timer' AS kind, t.timer_id AS object_id, t.process_id,
+        t.node_id,
+        coalesce(printf('%.10g ms', t.period_ns / 1e6), printf('0x%x', t.timer_handle)) AS label,
+        s.symbol, false AS is_internal, 1 AS place
+    FROM main.timer AS t
+    LEFT JOIN symbol AS s ON t.timer_id = s.timer_id
+    WHERE t.run_id = $run
+    UNION ALL
+    SELECT
+        8 * o.subscription_id + 1, 'subscription', o.subscription_id, o.process_id, o.node_id,
+        coalesce(o.topic_name, '?'), s.symbol, o.is_internal, 2
+    FROM main.subscription AS o
+    LEFT JOIN symbol AS s ON o.subscription_id = s.subscription_id
+    WHERE o.run_id = $run
+    UNION ALL
+    SELECT
+        8 * o.service_id + 2, 'service', o.service_id, o.process_id, o.node_id,
+        coalesce(o.service_name, '?'), s.symbol, o.is_internal, 3
+    FROM main.service AS o
+    LEFT JOIN symbol AS s ON o.service_id = s.service_id
+    WHERE o.run_id = $run
+    UNION ALL
+    SELECT
+        8 * client_id + 3, 'client', client_id, process_id, node_id, coalesce(service_name, '?'),
+        NULL, is_internal, 4
+    FROM main.client
+    WHERE run_id = $run
+    UNION ALL
+    SELECT
+        8 * publisher_id + 4, 'publisher', publisher_id, process_id, node_id,
+        coalesce(topic_name, '?'), NULL, is_internal, 5
+    FROM main.publisher
+    WHERE run_id = $run
+    UNION ALL
+    SELECT
+        8 * c.callback_id + 5, 'callback', c.callback_id, c.process_id, c.node_id, l.label,
+        c.symbol, l.is_internal, 6
+    FROM main.callback AS c
+    JOIN main.callback_label AS l ON c.callback_id = l.callback_id
+    WHERE c.run_id = $run
+        AND coalesce(
+            CASE c.kind
+                WHEN 'timer' THEN c.timer_id
+                WHEN 'subscription' THEN c.subscription_id
+                WHEN 'service' THEN c.service_id
+            END
+        ) IS NULL
+    UNION ALL
+    SELECT
+        8 * x.thread_id + 6, 'thread', x.thread_id, t.process_id, NULL,
+        printf('%s %d (%s)', coalesce(t.name, '?'), t.tid, replace(e.kind, '_', '-')), NULL, false,
+        8
+    FROM main.executor_thread AS x
+    JOIN main.executor AS e ON x.executor_id = e.executor_id
+    JOIN main.thread AS t ON x.thread_id = t.thread_id
+    WHERE x.run_id = $run
+    QUALIFY row_number() OVER (PARTITION BY x.thread_id ORDER BY x.executor_id) = 1
+    UNION ALL
+    SELECT 8 * process_id + 7, 'middleware', process_id, process_id, NULL, 'not of a node', NULL,
+        true, 7
+    FROM (
+        SELECT process_id FROM main.publication WHERE run_id = $run AND publisher_id IS NULL
+        UNION
+        SELECT process_id FROM main.take WHERE run_id = $run AND subscription_id IS NULL
+    )
+)
+SELECT
+    o.row_key,
+    o.kind,
+    o.object_id,
+    h.hostname AS host,
+    printf('%s %d', coalesce(p.name, '?'), p.pid)
+        || CASE WHEN p.life > 1 THEN printf(' (life %d)', p.life) ELSE '' END AS process,
+    o.process_id,
+    n.full_name AS node,
+    o.label,
+    o.symbol,
+    o.is_internal
+FROM object AS o
+JOIN main.process AS p ON o.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+LEFT JOIN main.node AS n ON o.node_id = n.node_id
+ORDER BY
+    h.hostname, h.host_id, p.first_seen_ns, p.process_id, o.place = 8, o.place = 7,
+    n.created_ns NULLS LAST, n.node_id NULLS LAST, o.place, o.object_id

@@ -1,0 +1,12 @@
+-- name: segment_count
+-- title: How many bars a window has
+-- description: Number of bars in a window, which decides whether they are drawn one by one.
+-- grain: one row per window
+-- param: run BIGINT  Run
+-- param: recorded_from_ns BIGINT  Begin of the window on the earliest clock
+-- param: recorded_before_ns BIGINT  Its end on the latest clock
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  Its end, epoch ns, exclusive
+-- column: count BIGINT  Bars
+-- needs: view.segment
+SELECT count(*) AS count FROM segment ORDER BY count

@@ -1,0 +1,135 @@
+// Starts the page: chooses where data come from, and shows the page that the address names.
+
+import { h, clear, color } from "./dom.js";
+import { address, current, go, onChange } from "./state.js";
+import { ServedSource } from "./source.js";
+import { embedded } from "./embedded.js";
+import { records } from "./columns.js";
+import { OverviewPage } from "./overview.js";
+import { TimelinePage } from "./timeline.js";
+import { failed, waiting } from "./notice.js";
+
+const PAGES = {
+  overview: ["Overview", OverviewPage],
+  timeline: ["Timeline", TimelinePage],
+};
+
+class App {
+  constructor(source) {
+    this.source = source;
+    this.steps = [];
+  }
+
+  async start() {
+    const runs = await this.source.fetch("run");
+    this.runs = records(runs);
+    this.main = document.querySelector("main");
+    this.nav = document.querySelector("nav");
+    this.header();
+    onChange(() => this.show());
+    await this.show();
+  }
+
+  get run() {
+    const asked = current().run;
+    return this.runs.find((run) => String(run.run_id) === asked) ?? this.runs[this.runs.length - 1];
+  }
+
+  fetch(name, params = {}, signal = undefined) {
+    return this.source.fetch(name, { run: this.run.run_id, ...params }, signal);
+  }
+
+  query(name, params = {}) {
+    return this.fetch("query", { name, ...params });
+  }
+
+  header() {
+    const runs = this.runs.length > 1
+      ? h("select", { "aria-label": "run", on: { change: (event) => go({ page: current().page, run: event.target.value, from: null, to: null, flow: null, path: null, hide: null }) } },
+        this.runs.map((run) => h("option", { value: String(run.run_id), selected: run === this.run }, run.name)))
+      : h("span", { className: "run-name" }, this.run?.name ?? "no run");
+    this.tabs = Object.entries(PAGES).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));
+    const theme = h("button", { type: "button", className: "theme", title: "light or dark", "aria-label": "light or dark", on: { click: () => this.theme() } }, "◐");
+    clear(this.nav, h("span", { className: "brand" }, "msgflow"), runs, h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)), theme);
+    const said = document.querySelector(".said");
+    if (this.source.notes.length) clear(said, this.source.notes.map((text) => h("p", {}, text)));
+  }
+
+  theme() {
+    const root = document.documentElement;
+    const isDark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+    root.dataset.theme = isDark ? "light" : "dark";
+    this.page?.recolor?.();
+  }
+
+  linksMoved() {
+    const { page, run } = current();
+    for (const { page: name, link } of this.tabs) {
+      link.href = name === page ? address({}) : `#/${name}${run ? `?run=${encodeURIComponent(run)}` : ""}`;
+      if (name === page) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+    }
+  }
+
+  async show() {
+    const asked = current();
+    const [title, Page] = PAGES[asked.page] ?? PAGES.overview;
+    if (!PAGES[asked.page]) { go({ page: "overview" }); return; }
+    this.linksMoved();
+    document.title = `${title} – ${this.run?.name ?? "msgflow"}`;
+    this.page?.leave?.();
+    clear(this.main, waiting());
+    if (!this.run) {
+      clear(this.main, h("section", {}, h("h2", {}, "No run"), h("p", {}, "The database holds no run yet: msgflow ingest TRACE")));
+      this.done();
+      return;
+    }
+    if (!this.run.start_text) {
+      clear(this.main, h("section", {}, h("h2", {}, "Empty run"), h("p", {}, `The run ${this.run.name} has no events. msgflow check says why.`)));
+      this.done();
+      return;
+    }
+    try {
+      this.page = new Page(this, this.main);
+      await this.page.ready;
+    } catch (error) {
+      if (error.name !== "AbortError") clear(this.main, failed(error));
+    }
+    this.done();
+  }
+
+  // For tests and benchmarks: when the page stands, and how long each drawing took [ms].
+  done() {
+    document.documentElement.dataset.ready = String(Number(document.documentElement.dataset.ready ?? 0) + 1);
+  }
+
+  drawn(milliseconds) {
+    this.steps.push(milliseconds);
+    if (this.steps.length === 1) document.documentElement.dataset.painted = String(performance.now());
+  }
+}
+
+const LACKING = [
+  ["DecompressionStream", () => "DecompressionStream" in window],
+  ["ResizeObserver", () => "ResizeObserver" in window],
+  ["canvas", () => Boolean(document.createElement("canvas").getContext?.("2d"))],
+];
+
+async function start() {
+  const lacking = LACKING.filter(([, has]) => !has()).map(([name]) => name);
+  const main = document.querySelector("main");
+  if (lacking.length) {
+    clear(main, failed(new Error(`this browser lacks ${lacking.join(", ")}: a newer one is needed (Firefox 113, Chrome 80, Safari 16.4)`)));
+    return;
+  }
+  try {
+    const source = (await embedded()) ?? new ServedSource();
+    const app = new App(source);
+    window.msgflow = app;
+    await app.start();
+  } catch (error) {
+    clear(main, failed(error));
+    throw error;
+  }
+}
+
+start();

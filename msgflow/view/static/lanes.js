@@ -1,0 +1,99 @@
+// Rows of the timeline: which there are, in which order, and where they lie on the canvas.
+
+export const HEIGHTS = { host: 22, process: 20, node: 20, row: 20 };
+
+// Kinds of rows that may be hidden, and what the boxes for that say.
+export const ROW_KINDS = {
+  timer: "timers", subscription: "subscriptions", service: "services", client: "clients",
+  publisher: "publishers", thread: "executors",
+};
+
+// Options: internal, query, hidden (Set of row keys), folded (Set of header keys), kinds (Set that
+// is hidden), only (Set of row keys, or null), used (Set of row keys with something to draw).
+export function layout(rows, options) {
+  const lanes = [];
+  let y = 0;
+  let [host, process, node] = [null, null, null];
+  let [hostFolded, processFolded, nodeFolded] = [false, false, false];
+  let hiddenCount = 0;
+  const query = (options.query ?? "").trim().toLowerCase();
+  const push = (lane) => {
+    lane.y = y;
+    lane.height = HEIGHTS[lane.type];
+    y += lane.height;
+    lanes.push(lane);
+  };
+  for (let row = 0; row < rows.rows; row++) {
+    const key = rows.row_key[row];
+    const kind = rows.kind[row];
+    const isAsked = options.only ? options.only.has(key) : true;
+    if (!isAsked) continue;
+    if (!options.only) {
+      if (rows.is_internal[row] && !options.internal) { hiddenCount++; continue; }
+      if (options.hidden.has(key) || options.kinds.has(kind)) { hiddenCount++; continue; }
+      if (query && !matches(rows, row, query)) { hiddenCount++; continue; }
+    }
+    const hostKey = `host:${rows.host[row]}`;
+    const processKey = `process:${rows.process_id[row]}`;
+    // Threads of executors stand below the process, without a node.
+    const nodeKey = kind === "thread" ? null : `node:${rows.process_id[row]}:${rows.node[row]}`;
+    if (hostKey !== host) {
+      host = hostKey;
+      process = node = null;
+      hostFolded = options.folded.has(hostKey);
+      push({ type: "host", key: hostKey, label: rows.host[row], folded: hostFolded, row });
+    }
+    if (hostFolded) continue;
+    if (processKey !== process) {
+      process = processKey;
+      node = null;
+      processFolded = options.folded.has(processKey);
+      push({ type: "process", key: processKey, label: rows.process[row], folded: processFolded, row });
+    }
+    if (processFolded) continue;
+    if (nodeKey !== node) {
+      node = nodeKey;
+      nodeFolded = nodeKey !== null && options.folded.has(nodeKey);
+      const label = rows.node[row] ?? "node not known";
+      if (nodeKey !== null) push({ type: "node", key: nodeKey, label, folded: nodeFolded, row });
+    }
+    if (nodeFolded) continue;
+    push({ type: "row", key, kind, label: rows.label[row], isInternal: rows.is_internal[row], row });
+  }
+  return { lanes, height: y, hiddenCount };
+}
+
+export function matches(rows, row, query) {
+  return [rows.label[row], rows.node[row], rows.process[row], rows.host[row], rows.kind[row]]
+    .some((text) => text && text.toLowerCase().includes(query));
+}
+
+// Bars by row of the timeline: from where to where they lie in the table, and how far the longest
+// of those before each reaches, so that what begins left of the window is found.
+export function indexBars(table) {
+  const ranges = new Map();
+  const reach = new Float64Array(table.rows);
+  const { row_key: keys, start_at: starts, length: lengths } = table;
+  let from = 0;
+  for (let at = 0; at < table.rows; at++) {
+    if (at === from || keys[at] !== keys[at - 1]) {
+      if (at > from) ranges.set(keys[at - 1], [from, at]);
+      from = at;
+      reach[at] = starts[at] + lengths[at];
+    } else {
+      reach[at] = Math.max(reach[at - 1], starts[at] + lengths[at]);
+    }
+  }
+  if (table.rows) ranges.set(keys[table.rows - 1], [from, table.rows]);
+  return { table, ranges, reach };
+}
+
+// First position in values[from, to) that is not below the limit; values rise.
+export function lowerBound(values, from, to, limit) {
+  while (from < to) {
+    const middle = (from + to) >> 1;
+    if (values[middle] < limit) from = middle + 1;
+    else to = middle;
+  }
+  return from;
+}

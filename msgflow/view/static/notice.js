@@ -1,0 +1,24 @@
+// What pages say when something is under way, missing or wrong.
+
+import { h } from "./dom.js";
+
+export function waiting(text = "reading …") {
+  return h("p", { className: "waiting", role: "status" }, text);
+}
+
+export function failed(error) {
+  const reload = error.code === "replaced" || error.code === "gone";
+  return h("div", { className: "failed", role: "alert" },
+    h("p", {}, `Error: ${error.message}`),
+    error.hint && h("p", { className: "soft" }, `What to do: ${error.hint}`),
+    reload && h("button", { type: "button", on: { click: () => location.reload() } }, "reload the page"));
+}
+
+export function notes(list) {
+  if (!list?.length) return null;
+  return h("ul", { className: "notes" }, list.map((text) => h("li", {}, text)));
+}
+
+export function command(text) {
+  return text ? h("p", { className: "command" }, "the same numbers: ", h("code", {}, text)) : null;
+}

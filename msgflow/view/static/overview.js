@@ -1,0 +1,123 @@
+// The first page: what was recorded, what is wrong with it, and what is slow.
+
+import { h, clear } from "./dom.js";
+import { address } from "./state.js";
+import { count, duration, wallClock } from "./words.js";
+import { dataTable, besides } from "./table.js";
+import { command, failed, notes, waiting } from "./notice.js";
+
+export class OverviewPage {
+  constructor(app, root) {
+    this.app = app;
+    this.root = root;
+    this.ready = this.build();
+  }
+
+  async build() {
+    const { app, root } = this;
+    const { run } = app;
+    const facts = h("dl", { className: "facts" });
+    const fact = (name, value) => facts.append(h("div", {}, h("dt", {}, name), h("dd", {}, value)));
+    fact("recorded", run.start_text ? wallClock(run.start_text, 0).replace("T", " ").replace(/\.\d+Z$/, " UTC") : "no events");
+    fact("length", duration(run.length));
+    fact("events", (run.event_count ?? 0).toLocaleString("en-US"));
+    const places = h("section", {}, h("h2", {}, "What was recorded"), facts);
+    const wrong = section("What is wrong with it");
+    const slow = section("The slowest paths");
+    const topics = section("Topics");
+    const processes = section("Processes");
+    clear(root, places, wrong.root, slow.root, topics.root, processes.root);
+    const hosts = app.query("info-hosts").then((table) => {
+      const list = Array.from({ length: table.rows }, (_, row) => table.hostname[row]);
+      fact(list.length === 1 ? "host" : "hosts", list.join(", "));
+    }).catch((error) => places.append(failed(error)));
+    const findings = fill(wrong, async () => {
+      const table = await app.fetch("finding");
+      const kinds = new Map();
+      for (let row = 0; row < table.rows; row++) {
+        const name = table.name[row];
+        if (!kinds.has(name)) kinds.set(name, []);
+        kinds.get(name).push(row);
+      }
+      const list = [...kinds.values()].map((rows) => {
+        const first = rows[0];
+        return h("article", { className: `finding ${table.severity[first]}` },
+          h("h3", {}, h("span", { className: "severity" }, table.severity[first]), " ", table.title[first]),
+          h("ul", {}, rows.slice(0, 5).map((row) => h("li", {}, h("b", {}, table.subject[row]), ` — ${table.detail[row]}`)),
+            rows.length > 5 && h("li", {}, `… and ${rows.length - 5} more`)),
+          h("p", {}, table.description[first]),
+          h("p", {}, h("b", {}, "Cause: "), table.cause[first]),
+          h("p", {}, h("b", {}, "Cure: "), table.cure[first]));
+      });
+      return [notes(table.meta.notes),
+        list.length ? list : h("p", {}, "Nothing is wrong with the recording."), command(table.meta.command)];
+    });
+    const paths = fill(slow, async () => {
+      const table = await app.query("e2e-latency");
+      const order = Array.from({ length: table.rows }, (_, row) => row).filter((row) => !Number.isNaN(table.p99_ns[row]))
+        .sort((a, b) => table.p99_ns[b] - table.p99_ns[a]);
+      const most = order.length ? table.p99_ns[order[0]] : 1;
+      if (!order.length) return [h("p", {}, table.rows ? "No flow reached the end of a path." : "There are no paths: no message is known to have been taken."), notes(table.meta.notes)];
+      const ids = pathNumbers(table, await app.fetch("path"));
+      return [
+        h("ol", { className: "slow" }, order.slice(0, 10).map((row) => h("li", {},
+          h("a", { href: address({ page: "paths", path: ids[row] }) },
+            h("span", { className: "bar-track" }, bar(table.median_ns[row] / most, "bar-median"), bar(table.p99_ns[row] / most, "bar-p99")),
+            h("span", { className: "numbers" }, `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`),
+            h("span", { className: "path-text" }, table.path[row]))))),
+        order.length > 10 && h("p", {}, h("a", { href: address({ page: "paths" }) }, `all ${count(order.length, "path")}`)),
+        notes(table.meta.notes), command(table.meta.command),
+      ];
+    });
+    const others = [
+      fill(topics, async () => {
+        const table = await app.query("info-topics");
+        return [dataTable(table, { label: "topics", shown: 12, nothing: "no topics" }), notes(table.meta.notes), command(table.meta.command)];
+      }),
+      fill(processes, async () => {
+        const table = await app.query("info-processes");
+        return [besides(`${count(table.rows, "process")}`.replace("processs", "processes"), dataTable(table, { label: "processes" }), command(table.meta.command))];
+      }),
+    ];
+    await Promise.all([hosts, findings, paths, ...others]);
+  }
+
+  leave() {}
+}
+
+function bar(share, name) {
+  const element = h("span", { className: name });
+  element.style.width = `${Math.max(100 * share, 0.3)}%`;
+  return element;
+}
+
+export function section(title) {
+  const body = h("div", {}, waiting());
+  return { root: h("section", {}, h("h2", {}, title), body), body };
+}
+
+export async function fill(place, make) {
+  try {
+    clear(place.body, await make());
+  } catch (error) {
+    if (error.name !== "AbortError") clear(place.body, failed(error));
+  }
+}
+
+// Which path of `paths` each row of a query is about: the same text, and where several paths bear
+// one, in the same order.
+export function pathNumbers(table, paths) {
+  const known = new Map();
+  for (let row = 0; row < paths.rows; row++) {
+    const list = known.get(paths.path[row]) ?? [];
+    list.push(paths.path_id[row]);
+    known.set(paths.path[row], list);
+  }
+  const used = new Map();
+  return Array.from({ length: table.rows }, (_, row) => {
+    const list = known.get(table.path[row]) ?? [];
+    const position = used.get(table.path[row]) ?? 0;
+    used.set(table.path[row], position + 1);
+    return list[Math.min(position, list.length - 1)];
+  });
+}

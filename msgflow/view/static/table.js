@@ -1,0 +1,74 @@
+// A table beside every chart: sorted by a click, with what its columns mean.
+
+import { h, clear } from "./dom.js";
+import { cell, title, count } from "./words.js";
+
+const SHOWN = 100;
+const HIDDEN = new Set(["run_id"]);
+
+// Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, link(row, name).
+export function dataTable(table, options = {}) {
+  const described = table.meta?.columns ?? {};
+  const names = options.columns ?? table.columns.map((column) => column.name)
+    .filter((name) => !HIDDEN.has(name));
+  const columns = names.map((name) => table.columns.find((column) => column.name === name))
+    .filter(Boolean);
+  const order = Array.from({ length: table.rows }, (_, row) => row)
+    .filter((row) => !options.only || options.only(row));
+  let sort = options.sort ?? null;
+  let shown = options.shown ?? SHOWN;
+  const body = h("tbody");
+  const more = h("button", { type: "button", className: "more", on: { click: () => { shown *= 10; fill(); } } });
+  const heads = columns.map((column) => {
+    const isNumber = column.type === "integer" || column.type === "double";
+    return h("th", { scope: "col", className: isNumber ? "number" : "", title: described[column.name] ?? "" },
+      h("button", { type: "button", on: { click: () => {
+        sort = { name: column.name, down: sort?.name === column.name ? !sort.down : isNumber };
+        fill();
+      } } }, title(column.name)));
+  });
+
+  function fill() {
+    if (sort && table[sort.name]) {
+      const values = table[sort.name];
+      order.sort((a, b) => {
+        const [x, y] = [values[a], values[b]];
+        const missing = [x, y].map((v) => v === null || v === undefined || Number.isNaN(v));
+        if (missing[0] || missing[1]) return missing[0] - missing[1] || a - b;
+        const difference = typeof x === "number" ? x - y : String(x).localeCompare(String(y));
+        return (sort.down ? -difference : difference) || a - b;
+      });
+    }
+    heads.forEach((head, position) => {
+      const is = sort?.name === columns[position].name;
+      head.setAttribute("aria-sort", is ? (sort.down ? "descending" : "ascending") : "none");
+    });
+    clear(body, order.slice(0, shown).map((row) => {
+      const cells = columns.map((column, position) => {
+        const isNumber = column.type === "integer" || column.type === "double";
+        const text = cell(table[column.name][row], column);
+        const inside = position === 0 && options.onPick
+          ? h("button", { type: "button", className: "pick" }, text || "–") : text;
+        return h("td", { className: isNumber ? "number" : (String(text).length > 40 ? "long" : "") }, inside);
+      });
+      return h("tr", {
+        className: options.onPick ? "can-pick" : "",
+        "aria-selected": options.picked?.(row) ? "true" : undefined,
+        data: options.data?.(row),
+        on: options.onPick ? { click: () => options.onPick(row) } : {},
+      }, cells);
+    }));
+    more.hidden = order.length <= shown;
+    more.textContent = `show more: ${count(order.length - Math.min(shown, order.length), "row")} not shown`;
+  }
+
+  fill();
+  return h("div", { className: "table-frame" },
+    h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": options.label ?? "table" },
+      h("table", {}, h("thead", {}, h("tr", {}, heads)), body)),
+    order.length === 0 && h("p", { className: "nothing" }, options.nothing ?? "nothing"), more);
+}
+
+export function besides(label, ...content) {
+  return h("details", { className: "beside" }, h("summary", {}, label), content);
+}

@@ -1,0 +1,74 @@
+"""Pages as they are served, and as a browser shows them."""
+
+from __future__ import annotations
+
+import http.client
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from msgflow.view.server import running
+
+
+class Served:
+    """A server in a thread of this process."""
+
+    def __init__(self, path: Path) -> None:
+        self._running = running(path, port=0, memory_limit="500MB")
+        self.server, listener, self.address = self._running.__enter__()
+        self._ready = threading.Event()
+        self.server.started_with = self._ready.set
+        self._thread = threading.Thread(
+            target=lambda: self.server.run(sockets=[listener]), daemon=True
+        )
+        self._thread.start()
+        assert self._ready.wait(20)
+        self.port = urlsplit(self.address).port
+        self.token = self.address.partition("token=")[2]
+
+    def get(
+        self, path: str, *, method: str = "GET", **headers: str
+    ) -> tuple[int, dict[str, str], bytes]:
+        """Ask as the browser does that has the cookie; headers replace what it says."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        said = {"Host": f"127.0.0.1:{self.port}", "Cookie": f"msgflow_{self.port}={self.token}"}
+        said |= {name.replace("_", "-"): value for name, value in headers.items()}
+        connection.request(method, path, headers=said)
+        answer = connection.getresponse()
+        content = answer.read()
+        connection.close()
+        return answer.status, {k.lower(): v for k, v in answer.getheaders()}, content
+
+    def close(self) -> None:
+        self.server.should_exit = True
+        self._thread.join(20)
+        self._running.__exit__(None, None, None)
+
+
+@dataclass
+class Page:
+    """A page in the browser, and everything that went wrong on it."""
+
+    page: Any
+    errors: list[str] = field(default_factory=list)
+    foreign: list[str] = field(default_factory=list)
+
+    def open(self, address: str) -> None:
+        """Open an address and wait until the page stands."""
+        self.page.goto(address)
+        self.page.wait_for_selector("html[data-ready]", timeout=30_000)
+
+    def go(self, place: str) -> None:
+        """Go to a place of the page, such as '#/paths', and wait until it stands."""
+        before = int(self.page.locator("html").get_attribute("data-ready") or 0)
+        self.page.evaluate("place => { location.hash = place; }", place)
+        self.page.wait_for_selector(f"html[data-ready='{before + 1}']", timeout=30_000)
+
+    def flow(self) -> set[tuple[str, int]]:
+        """Return (kind, identity) of everything that the page says the picked flow has."""
+        rows = self.page.locator(".steps tbody tr")
+        rows.first.wait_for(timeout=30_000)
+        found = rows.evaluate_all("rows => rows.map(row => [row.dataset.kind, row.dataset.id])")
+        return {(kind, int(number)) for kind, number in found}

@@ -1,0 +1,167 @@
+"""Databases to look at, and a browser to look with where there is one."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import duckdb
+import pytest
+from served import Page, Served
+
+from msgflow.clocks import apply_clocks, read_clock_sync
+from msgflow.database import open_db
+from msgflow.db.connection import connect
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
+
+# The sandbox of Chromium needs rights that test machines do not give; nothing foreign is opened.
+_ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
+    """Return the database that `make` makes in a directory, once for all workers of a test run."""
+    base = factory.getbasetemp()
+    directory = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / f"view_{name}"
+    path = directory / f"{name}.duckdb"
+    done = directory / "done"
+    try:
+        directory.mkdir()
+    except FileExistsError:
+        while not done.exists():
+            time.sleep(0.1)
+    else:
+        try:
+            make(path)
+        finally:
+            done.touch()
+    return path
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot on two hosts, three seconds of it, with clocks brought together."""
+
+    def make(path: Path) -> None:
+        simulate("demo", path.parent / "trace", factor=0.3)
+        ingest([path.parent / "trace"], path)
+        apply_clocks(path, read_clock_sync("messages"), run=None)
+
+    return made_once(tmp_path_factory, "demo", make)
+
+
+@pytest.fixture(scope="session")
+def systems(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three runs: Autoware twice, with indirect links and another executor, and services."""
+
+    def make(path: Path) -> None:
+        for name in ("services", "autoware_two_threads", "autoware"):
+            simulate(name, path.parent / name, factor=0.2)
+            ingest([path.parent / name], path)
+
+    return made_once(tmp_path_factory, "systems", make)
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory, shared_traces: Path) -> Path:
+    """The recording that Trace Compass is tested with."""
+    return made_once(
+        tmp_path_factory,
+        "recorded",
+        lambda path: ingest([shared_traces / "tracecompass-ros2"], path) and None,
+    )
+
+
+@pytest.fixture(scope="session")
+def read() -> Iterator[Callable[[Path], duckdb.DuckDBPyConnection]]:
+    """Opens databases for reading, each once."""
+    known: dict[Path, duckdb.DuckDBPyConnection] = {}
+
+    def connected(path: Path) -> duckdb.DuckDBPyConnection:
+        if path not in known:
+            known[path] = connect(path, read_only=True)
+        return known[path].cursor()
+
+    yield connected
+    for connection in known.values():
+        connection.close()
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """Writes a report of a database, once for the same options; returns its address."""
+    directory = tmp_path_factory.mktemp("reports")
+    known: dict[str, str] = {}
+
+    def written(database: Path, **options: Any) -> str:
+        key = f"{database} {options}"
+        if key not in known:
+            path = directory / f"{len(known)}.html"
+            with open_db(database) as opened:
+                opened.report(path, **options)
+            known[key] = path.as_uri()
+        return known[key]
+
+    return written
+
+
+@pytest.fixture(scope="session")
+def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Path], Served]]:
+    """Serves databases, each once: copies, as one process opens a file with one memory limit."""
+    directory = tmp_path_factory.mktemp("served")
+    known: dict[Path, Served] = {}
+
+    def served(path: Path) -> Served:
+        if path not in known:
+            copy = directory / path.name
+            shutil.copyfile(path, copy)
+            known[path] = Served(copy)
+        return known[path]
+
+    yield served
+    for server in known.values():
+        server.close()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """A real browser; without one these tests are skipped."""
+    program = next(filter(None, map(shutil.which, _NAMES)), None)
+    if program is None:
+        pytest.skip("no Chromium here: apt install chromium")
+    playwright = pytest.importorskip("playwright.sync_api")
+    os.environ.setdefault("PLAYWRIGHT_SKIP_BROWSER_DOWNLOAD", "1")
+    with playwright.sync_playwright() as running_playwright:
+        browser = running_playwright.chromium.launch(executable_path=program, args=_ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(chromium: Any) -> Iterator[Page]:
+    """A new page; at its end there were no errors, and nothing was fetched from elsewhere."""
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    result = Page(context.new_page())
+
+    def asked(request: Any) -> None:
+        parts = urlsplit(request.url)
+        if parts.scheme not in ("file", "data", "blob") and parts.hostname != "127.0.0.1":
+            result.foreign.append(request.url)
+
+    def said(message: Any) -> None:
+        if message.type == "error":
+            result.errors.append(message.text)
+
+    result.page.on("console", said)
+    result.page.on("pageerror", lambda error: result.errors.append(str(error)))
+    result.page.on("request", asked)
+    yield result
+    context.close()
+    assert not result.errors
+    assert not result.foreign

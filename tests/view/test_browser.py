@@ -1,0 +1,253 @@
+"""The pages in a real browser: served, and from a file."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from served import Page, Served
+
+from msgflow.database import open_db
+
+Read = Callable[[Path], duckdb.DuckDBPyConnection]
+Report = Callable[..., str]
+Serve = Callable[[Path], Served]
+
+
+def flow_of(connection: duckdb.DuckDBPyConnection, kind: str, number: int) -> set[tuple[str, int]]:
+    return set(
+        connection.execute("SELECT kind, id FROM flow_both(?, ?)", [kind, number]).fetchall()
+    )
+
+
+def a_publication(connection: duckdb.DuckDBPyConnection, run: int) -> int:
+    ((number,),) = connection.execute(
+        "SELECT min(publication_id) FROM link_causal AS c JOIN link_transport AS t"
+        " USING (publication_id) WHERE c.run_id = ? AND c.kind <> 'direct'",
+        [run],
+    ).fetchall()
+    if number is None:
+        ((number,),) = connection.execute(
+            "SELECT quantile_disc(publication_id, 0.5) FROM link_transport WHERE run_id = ?", [run]
+        ).fetchall()
+    return int(number)
+
+
+def picked(kind: str, number: int) -> str:
+    """Return how the row of a picked thing is found."""
+    return f".steps tr[data-kind={kind}][data-id='{number}'][aria-selected=true]"
+
+
+def colors(page: Page) -> int:
+    """Return how many colours the canvas has: a blank one has few."""
+    found: int = page.page.locator("canvas.timeline").evaluate(
+        """canvas => {
+            const { width, height } = canvas;
+            const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+            const seen = new Set();
+            for (let at = 0; at < data.length; at += 4)
+                seen.add((data[at] << 16) | (data[at + 1] << 8) | data[at + 2]);
+            return seen.size;
+        }"""
+    )
+    return found
+
+
+def pick_on_canvas(page: Page, kind: int) -> tuple[str, int]:
+    """Click in the middle of the first bar of a kind that is in sight; return what was picked."""
+    x, y, name, number = page.page.evaluate(
+        """kind => {
+            const { renderer } = msgflow.page;
+            const { table, ranges } = renderer.bars;
+            for (const lane of renderer.lanes) {
+                const range = ranges.get(lane.key);
+                if (!range || lane.y + lane.height > renderer.tall - 40) continue;
+                for (let at = range[0]; at < range[1]; at++) {
+                    const middle = table.start_at[at] + table.length[at] / 2;
+                    const { from, to } = renderer.view;
+                    if (table.kind[at] !== kind || middle < from || middle > to) continue;
+                    return [renderer.x(middle), 30 + lane.y - renderer.scroll + lane.height / 2,
+                        ["callback_instance", "publication", "take"][kind], table.id[at]];
+                }
+            }
+            return null;
+        }""",
+        kind,
+    )
+    page.page.locator("canvas.timeline").click(position={"x": x, "y": y})
+    return name, number
+
+
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_picking_lights_up_exactly_the_flow(
+    way: str, systems: Path, read: Read, serve: Serve, report: Report, page: Page
+) -> None:
+    connection = read(systems)
+    number = a_publication(connection, 3)
+    if way == "served":
+        page.open(serve(systems).address)
+    else:
+        page.open(report(systems, run=3))
+    page.go(f"#/timeline?run=3&flow=publication:{number}")
+    wanted = flow_of(connection, "publication", number)
+    assert len(wanted) > 10
+    assert page.flow() == wanted
+    marked = page.page.locator(".steps tr.is-critical").count()
+    assert 2 < marked <= len(wanted)
+    assert colors(page) > 10
+    # The address leads back to it.
+    address = page.page.url
+    assert f"flow=publication%3A{number}" in address
+    page.page.keyboard.press("Escape")
+    page.page.locator(".side").wait_for(state="hidden")
+    assert "flow=" not in page.page.url
+
+
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_clicking_a_bar_picks_it(
+    way: str, recorded: Path, read: Read, serve: Serve, report: Report, page: Page
+) -> None:
+    page.open(serve(recorded).address if way == "served" else report(recorded))
+    ((begin, end),) = (
+        read(recorded)
+        .execute(
+            "SELECT quantile_disc(b.start_ns, 0.5) - r.start_ns AS begin, begin + 3000000"
+            " FROM publication AS b JOIN link_transport USING (publication_id)"
+            " CROSS JOIN run AS r GROUP BY r.start_ns"
+        )
+        .fetchall()
+    )
+    page.go(f"#/timeline?from={begin}&to={end}")
+    for kind in (1, 0):
+        name, number = pick_on_canvas(page, kind)
+        page.page.locator(picked(name, number)).wait_for()
+        assert page.flow() == flow_of(read(recorded), name, number)
+        page.page.keyboard.press("Escape")
+        page.page.locator(".side").wait_for(state="hidden")
+
+
+def test_keys_and_boxes_move_and_hide(demo: Path, report: Report, page: Page) -> None:
+    page.open(report(demo))
+    page.go("#/timeline")
+
+    def view() -> tuple[float, float]:
+        found = page.page.evaluate(
+            "[msgflow.page.renderer.view.from, msgflow.page.renderer.view.to]"
+        )
+        return found[0], found[1]
+
+    begin, end = view()
+    page.page.locator("canvas.timeline").focus()
+    page.page.keyboard.press("+")
+    assert view()[1] - view()[0] == pytest.approx((end - begin) / 2)
+    before = view()
+    page.page.keyboard.press("ArrowRight")
+    assert view()[0] > before[0]
+    page.page.keyboard.press("f")
+    assert view() == (begin, end)
+    # To the nanosecond, and no further.
+    for _ in range(60):
+        page.page.keyboard.press("+")
+    assert 10 <= view()[1] - view()[0] <= 100
+    page.page.keyboard.press("f")
+    rows = "lanes.filter(lane => lane.type === 'row')"
+    lanes = f"msgflow.page.renderer.{rows}.map(lane => lane.label)"
+    every = page.page.evaluate(lanes)
+    assert "/rosout" not in every
+    page.page.get_by_label("show rows with this text").fill("/camera/image")
+    assert set(page.page.evaluate(lanes)) == {"/camera/image"}
+    page.page.get_by_label("show rows with this text").fill("")
+    page.page.locator(".menu summary").click()
+    page.page.get_by_label("what ROS does for itself").check()
+    assert "/rosout" in page.page.evaluate(lanes)
+    page.page.get_by_label("publishers").uncheck()
+    assert "/rosout" not in page.page.evaluate(lanes)
+    page.page.wait_for_timeout(200)
+    assert "internal=1" in page.page.url
+    assert "kind%3Apublisher" in page.page.url
+    picked = page.page.evaluate("msgflow.page.rows.row_key.length")
+    assert picked > len(every)
+
+
+def test_next_and_previous_of_a_row(demo: Path, read: Read, report: Report, page: Page) -> None:
+    order = [
+        number
+        for (number,) in read(demo)
+        .execute(
+            "SELECT publication_id FROM publication JOIN publisher USING (publisher_id)"
+            " WHERE topic_name = '/camera/image' ORDER BY start_ns"
+        )
+        .fetchall()
+    ]
+    page.open(report(demo))
+    page.go(f"#/timeline?flow=publication:{order[5]}")
+    for key, number in (("n", order[6]), ("p", order[5]), ("p", order[4])):
+        page.page.keyboard.press(key)
+        page.page.locator(picked("publication", number)).wait_for()
+
+
+def test_numbers_of_the_overview_are_those_of_the_queries(
+    demo: Path, serve: Serve, report: Report, page: Page
+) -> None:
+    with open_db(demo) as opened:
+        latency = opened.query("e2e-latency").to_arrow().to_pylist()
+        topics = opened.query("info-topics").to_arrow().to_pylist()
+    for address in (serve(demo).address, report(demo)):
+        page.page.goto("about:blank")
+        page.open(address)
+        text = page.page.locator("main").inner_text()
+        for row in latency:
+            assert row["path"] in text
+            if row["p99_ns"] is not None:
+                assert (
+                    f"{row['p99_ns'] / 1e6:.3f}".rstrip("0").rstrip(".") in text
+                    or row["p99_ns"] < 1e6
+                )
+        table = page.page.get_by_role("region", name="topics").locator("tbody tr")
+        shown = table.evaluate_all(
+            "rows => rows.map(row => [...row.cells].map(cell => cell.textContent))"
+        )
+        assert (
+            shown
+            == [
+                [
+                    row["topic_name"],
+                    *(
+                        f"{row[name]:,}"
+                        for name in (
+                            "publisher_count",
+                            "subscription_count",
+                            "publication_count",
+                            "take_count",
+                        )
+                    ),
+                ]
+                for row in topics
+            ][:12]
+        )
+
+
+def test_a_screenshot_is_no_blank_page(demo: Path, read: Read, report: Report, page: Page) -> None:
+    number = a_publication(read(demo), 1)
+    for width, height, scheme in ((1280, 800, "light"), (390, 844, "dark")):
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.page.emulate_media(color_scheme=scheme)
+        page.open(f"{report(demo)}#/timeline?flow=publication:{number}")
+        page.page.locator(".steps tbody tr").first.wait_for()
+        assert colors(page) > 10
+        assert len(page.page.screenshot()) > 15_000
+        wide = page.page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= width
+
+
+def test_a_report_has_all_in_it(demo: Path, report: Report) -> None:
+    content = Path(report(demo).removeprefix("file://")).read_text(encoding="utf-8")
+    assert "default-src 'none'" in content
+    assert " src=" not in content.replace("img-src", "").replace("script-src", "").replace(
+        "style-src", ""
+    ).replace("default-src", "")
+    packed = content.partition('id="msgflow-data">')[2].partition("</script>")[0]
+    assert base64.b64decode(packed)[:2] == b"\x1f\x8b"

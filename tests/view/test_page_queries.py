@@ -1,0 +1,305 @@
+"""What pages show is what the views and named queries say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+from tables import decoded
+
+from msgflow.view.page_query import DIRECTORY, page_query, run_page_query, statement
+from msgflow.view.pages import LEVEL_BINS, Pages
+
+NAMES = sorted(path.stem for path in DIRECTORY.glob("*.sql"))
+OVER_SCRATCH = {"level", "path_histogram", "path_point", "path_share", "path_slowest"}
+Read = Callable[[Path], duckdb.DuckDBPyConnection]
+_REFERENCE = re.compile(r"\b(?:store|derive|main)\.[a-z_0-9]+\b")
+
+
+def values(connection: duckdb.DuckDBPyConnection, pages: Pages, run: int | None = None) -> Any:
+    params = {} if run is None else {"run": str(run)}
+    extent = pages.extent(connection, params)
+    return pages.recorded(connection, extent, pages.window(extent, params))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_headers_say_what_a_page_query_has(name: str, demo: Path, read: Read) -> None:
+    header = page_query(name)
+    assert header.name == name
+    body = re.sub(r"--[^\n]*", "", header.body)
+    assert {need for need in header.needs if not need.startswith("view.")} == set(
+        _REFERENCE.findall(body)
+    )
+    if header.kind == "inline" or name in OVER_SCRATCH:
+        return
+    connection = read(demo)
+    named = connection.extract_statements(statement(name))[0].named_parameters
+    assert named == {param.name for param in header.params}
+    given = (
+        dict.fromkeys(named, 1) | {"kind": "take"} if "kind" in named else dict.fromkeys(named, 1)
+    )
+    if name == "neighbour":
+        given["kind"] = 1
+    table = run_page_query(connection, name, given)
+    assert table.column_names == [column.name for column in header.columns]
+
+
+def test_bars_are_the_instances_of_the_views(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages()
+    bars = run_page_query(connection, "segments", values(connection, pages))
+    connection.register("bars", bars)
+    ((origin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
+    for kind, sql in enumerate((
+        "SELECT callback_instance_id, start_ns, coalesce(end_ns, start_ns) FROM callback_instance",
+        "SELECT publication_id, start_ns, end_ns FROM publication",
+        "SELECT take_id, taken_ns, taken_ns FROM take",
+        "SELECT request_id, coalesce(sent_ns, taken_ns), coalesce(taken_ns, sent_ns)"
+        " FROM request",
+        "SELECT response_id, coalesce(sent_ns, taken_ns), coalesce(taken_ns, sent_ns)"
+        " FROM response",
+    )):  # fmt: skip
+        drawn = (
+            f"SELECT id, start_at + {origin}, start_at + length + {origin}"
+            f" FROM bars WHERE kind = {kind}"
+        )
+        assert connection.execute(f"({sql}) EXCEPT ALL ({drawn})").fetchall() == []
+        assert connection.execute(f"({drawn}) EXCEPT ALL ({sql})").fetchall() == []
+    for kind, state in ((5, "wait"), (6, "process"), (7, "execute")):
+        drawn = (
+            f"SELECT (row_key - 6) // 8, start_at + {origin}, length FROM bars WHERE kind = {kind}"
+        )
+        sql = (
+            "SELECT thread_id, start_ns, coalesce(end_ns, start_ns) - start_ns"
+            f" FROM executor_state WHERE state = '{state}'"
+        )
+        assert connection.execute(f"({sql}) EXCEPT ALL ({drawn})").fetchall() == []
+        assert connection.execute(f"({drawn}) EXCEPT ALL ({sql})").fetchall() == []
+
+
+def test_every_bar_has_a_row(systems: Path, demo: Path, read: Read) -> None:
+    for path, run in ((systems, 1), (systems, 2), (demo, 1)):
+        connection = read(path)
+        known = values(connection, Pages(), run)
+        bars = run_page_query(connection, "segments", known)
+        rows = run_page_query(connection, "row", {"run": run})
+        keys = rows["row_key"].to_pylist()
+        assert len(set(keys)) == len(keys)
+        assert set(bars["row_key"].to_pylist()) <= set(keys)
+
+
+def test_a_window_has_the_bars_that_overlap_it(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages()
+    extent = pages.extent(connection, {})
+    whole = run_page_query(connection, "segments", values(connection, pages)).to_pylist()
+    window = {"start": 700_000_000, "end": 900_000_000}
+    known = pages.recorded(connection, extent, pages.window(extent, window))
+    part = run_page_query(connection, "segments", known).to_pylist()
+    wanted = [
+        bar
+        for bar in whole
+        if bar["start_at"] < window["end"] and bar["start_at"] + bar["length"] >= window["start"]
+    ]
+    assert part == wanted
+    assert 0 < len(part) < len(whole)
+    # One that began before the window and lasts into it.
+    assert any(bar["start_at"] < window["start"] for bar in part)
+
+
+def test_bins_lose_nothing(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages()
+    known = values(connection, pages)
+    single = run_page_query(connection, "segments", known)
+    bin_ns = 5_000_000
+    binned = run_page_query(connection, "segments", known | {"bin_ns": bin_ns})
+    assert binned.num_rows < single.num_rows
+    connection.register("single", single)
+    connection.register("binned", binned)
+    totals = (
+        "SELECT row_key, kind, sum(count)::BIGINT, sum(busy)::BIGINT FROM {}"
+        " GROUP BY ALL ORDER BY ALL"
+    )
+    assert (
+        connection.execute(totals.format("single")).fetchall()
+        == connection.execute(totals.format("binned")).fetchall()
+    )
+    long = (
+        "SELECT row_key, kind, id, start_at FROM {}"
+        " WHERE length >= 5000000 AND id IS NOT NULL ORDER BY ALL"
+    )
+    assert (
+        connection.execute(long.format("single")).fetchall()
+        == connection.execute(long.format("binned")).fetchall()
+    )
+    ((wrong,),) = connection.execute(
+        "SELECT count(*) FROM binned"
+        " WHERE id IS NULL AND (start_at % 5000000 <> 0 OR length <> 5000000)"
+    ).fetchall()
+    assert wrong == 0
+
+
+def test_a_level_put_together_says_the_same_as_bins_made_at_once(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages(most_bars=1)
+    extent = pages.extent(connection, {})
+    content = decoded(pages.answer(connection, "segments", {}))
+    bin_ns = content.meta["bin"]
+    level_ns = extent.length_ns // LEVEL_BINS + 1
+    assert bin_ns % level_ns == 0
+    assert bin_ns > level_ns
+    direct = run_page_query(
+        connection, "segments", values(connection, pages) | {"bin_ns": bin_ns}
+    ).to_pylist()
+    assert content.meta["count"] == sum(bar["count"] for bar in direct)
+    assert content.rows == [{**bar, "id": bar["id"]} for bar in direct]
+
+
+def test_a_flow_is_what_flow_both_says(systems: Path, demo: Path, read: Read) -> None:
+    names = ["callback_instance", "publication", "take", "request", "response"]
+    for path, run in ((systems, 1), (systems, 3), (demo, 1)):
+        connection = read(path)
+        pages = Pages()
+        for kind in names:
+            found = connection.execute(
+                f"SELECT {kind}_id FROM main.{kind} WHERE run_id = {run} ORDER BY 1"
+            ).fetchall()
+            for (number,) in found[len(found) // 3 :: max(len(found) // 3, 1)][:2]:
+                content = decoded(
+                    pages.answer(connection, "flow", {"run": run, "kind": kind, "id": number})
+                )
+                drawn = {(names[row["kind"]], row["id"]) for row in content.rows}
+                wanted = set(
+                    connection.execute(
+                        f"SELECT kind, id FROM flow_both('{kind}', {number})"
+                    ).fetchall()
+                )
+                assert drawn == wanted
+                assert content.rows[0]["vertex_count"] == len(wanted)
+                links = {
+                    (
+                        names[row["from_kind"]],
+                        row["from_id"],
+                        names[row["kind"]],
+                        row["id"],
+                        row["link_kind"],
+                    )
+                    for row in content.rows
+                    if row["from_kind"] is not None
+                }
+                connection.execute("CREATE OR REPLACE TEMP TABLE vertex (kind VARCHAR, id BIGINT)")
+                connection.executemany("INSERT INTO vertex VALUES (?, ?)", sorted(wanted))
+                assert links == set(
+                    connection.execute(
+                        "SELECT from_kind, from_id, to_kind, to_id, link_kind FROM flow_edge"
+                        " SEMI JOIN vertex AS f ON from_kind = f.kind AND from_id = f.id"
+                        " SEMI JOIN vertex AS t ON to_kind = t.kind AND to_id = t.id"
+                    ).fetchall()
+                )
+
+
+def test_arrows_are_the_links(systems: Path, read: Read) -> None:
+    connection = read(systems)
+    known = values(connection, Pages(), 3)
+    arrows = run_page_query(connection, "links", known | {"limit": 10**6}).to_pylist()
+    transport = connection.execute(
+        "SELECT count(*), sum(latency_ns) FROM link_transport WHERE run_id = 3"
+    ).fetchall()
+    messages = [arrow for arrow in arrows if arrow["link_kind"] == 0]
+    assert [(len(messages), sum(one["to_at"] - one["from_at"] for one in messages))] == transport
+    codes = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent"]
+    causes = dict(
+        connection.execute(
+            "SELECT kind, count(*) FROM link_causal WHERE run_id = 3 GROUP BY kind"
+        ).fetchall()
+    )
+    for code, kind in enumerate(codes[1:], start=1):
+        assert len([one for one in arrows if one["link_kind"] == code]) == causes.get(kind, 0)
+    assert causes["periodic_async"]
+    assert causes["partial_sync"]
+    waits = sum(one["to_at"] - one["from_at"] for one in arrows if one["link_kind"] in (2, 3))
+    ((wanted,),) = connection.execute(
+        "SELECT sum(wait_ns) FROM link_causal"
+        " WHERE run_id = 3 AND kind IN ('periodic_async', 'partial_sync')"
+    ).fetchall()
+    assert waits == wanted
+
+
+def test_flows_of_paths_are_those_that_e2e_latency_counts(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages()
+    latency = decoded(pages.answer(connection, "query", {"name": "e2e-latency"})).rows
+    paths = decoded(pages.answer(connection, "path", {})).rows
+    assert [row["path"] for row in paths] == sorted(row["path"] for row in latency)
+    for row in latency:
+        (number,) = [path["path_id"] for path in paths if path["path"] == row["path"]]
+        histogram = decoded(pages.answer(connection, "path_histogram", {"path": number})).rows
+        assert sum(one["count"] for one in histogram) == row["reached"]
+        assert histogram[0]["low"] == row["min_ns"]
+        last = histogram[-1]
+        assert last["low"] <= row["max_ns"] < last["low"] + last["width"]
+        shares = decoded(pages.answer(connection, "path_share", {"path": number})).rows
+        assert shares[-1] == {"share": 1.0, "latency": row["max_ns"]}
+        half = next(one["latency"] for one in shares if one["share"] >= 0.5)
+        assert abs(half - row["median_ns"]) <= (row["max_ns"] - row["min_ns"]) / 10
+        points = decoded(pages.answer(connection, "path_point", {"path": number})).rows
+        assert len(points) == row["roots"]
+        assert max(one["latency"] or 0 for one in points) == row["max_ns"]
+        assert sum(one["missing"] for one in points) == row["lost"] + row["superseded"]
+        few = decoded(pages.answer(connection, "path_point", {"path": number, "limit": 7})).rows
+        assert len(few) <= 7
+        assert sum(one["count"] for one in few) == row["roots"]
+        assert max(one["latency"] or 0 for one in few) == row["max_ns"]
+        slowest = decoded(pages.answer(connection, "path_slowest", {"path": number})).rows
+        assert [one["latency"] for one in slowest] == sorted(
+            (one["latency"] for one in points if one["latency"] is not None), reverse=True
+        )[:10]
+
+
+def test_executors_over_time_add_up(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages()
+    shares = decoded(pages.answer(connection, "executor_share", {})).rows
+    for state in ("wait", "process", "execute"):
+        ((wanted,),) = connection.execute(
+            "SELECT sum(end_ns - start_ns) FROM executor_state WHERE state = ?", [state]
+        ).fetchall()
+        assert sum(row["busy"] for row in shares if row["state"] == state) == wanted
+    assert all(0 <= row["busy"] <= row["length"] for row in shares)
+
+
+def test_the_next_of_a_row(demo: Path, read: Read) -> None:
+    connection = read(demo)
+    pages = Pages()
+    ((publisher, count),) = connection.execute(
+        "SELECT publisher_id, count(*) FROM publication JOIN publisher USING (publisher_id)"
+        " WHERE topic_name = '/camera/image' GROUP BY publisher_id"
+    ).fetchall()
+    order = [
+        number
+        for (number,) in connection.execute(
+            "SELECT publication_id FROM publication WHERE publisher_id = ? ORDER BY start_ns",
+            [publisher],
+        ).fetchall()
+    ]
+    assert len(order) == count
+
+    def beside(number: int, step: int) -> list[int]:
+        found = decoded(
+            pages.answer(
+                connection,
+                "neighbour",
+                {"row": 8 * publisher + 4, "kind": 1, "id": number, "step": step},
+            )
+        )
+        return [row["id"] for row in found.rows]
+
+    assert beside(order[3], 1) == [order[4]]
+    assert beside(order[3], -1) == [order[2]]
+    assert beside(order[0], -1) == []
+    assert beside(order[-1], 1) == []

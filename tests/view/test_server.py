@@ -1,0 +1,228 @@
+"""Who gets an answer from `msgflow ui`, and what it says when it cannot."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from served import Served
+from tables import decoded
+
+from msgflow.errors import DatabaseError, UsageError
+from msgflow.ingest import ingest
+from msgflow.view.server import is_local, listen, serve
+
+Serve = Callable[[Path], Served]
+
+
+@pytest.mark.parametrize(
+    ("host", "is_ours"),
+    [
+        ("127.0.0.1:8642", True),
+        ("localhost:1234", True),
+        ("LOCALHOST", True),
+        ("127.8.8.8", True),
+        ("[::1]:80", True),
+        ("evil.example", False),
+        ("127.0.0.1.evil.example", False),
+        ("localhost.evil.example:8642", False),
+        ("10.0.0.1", False),
+        ("", False),
+        ("127.0.0.1:8642@evil", False),
+    ],
+)
+def test_only_this_machine_is_meant(host: str, is_ours: bool) -> None:
+    assert is_local(host) is is_ours
+
+
+def test_strangers_get_nothing(demo: Path, serve: Serve) -> None:
+    server = serve(demo)
+    assert server.get("/")[0] == 200
+    for path in ("/", "/app.js", "/api/run"):
+        assert server.get(path, Cookie="")[0] == 403
+        assert server.get(path, Cookie=f"msgflow_{server.port}=wrong")[0] == 403
+        assert server.get(path, Host="evil.example")[0] == 421
+        assert server.get(path, Sec_Fetch_Site="cross-site")[0] == 403
+        assert server.get(path, method="POST")[0] == 405
+    assert server.get("/?token=wrong", Cookie="")[0] == 403
+    status, headers, _ = server.get(f"/?token={server.token}", Cookie="")
+    assert (status, headers["location"]) == (303, "/")
+    assert "HttpOnly" in headers["set-cookie"]
+    assert "samesite=strict" in headers["set-cookie"].lower()
+    # Behind ssh -L the port is another one.
+    assert (
+        server.get("/api/run", Host="localhost:9999", Cookie=f"msgflow_9999={server.token}")[0]
+        == 200
+    )
+
+
+def test_every_answer_is_strict(demo: Path, serve: Serve) -> None:
+    server = serve(demo)
+    for path, kind in (
+        ("/", "text/html"),
+        ("/app.js", "text/javascript"),
+        ("/style.css", "text/css"),
+    ):
+        status, headers, _ = server.get(path)
+        assert status == 200
+        assert headers["content-type"].startswith(kind)
+        assert "default-src 'none'" in headers["content-security-policy"]
+        assert "unsafe" not in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cache-control"] == "no-store"
+    for path in ("/server.py", "/..%2fserver.py", "/../pages.py", "/libraries.json", "/none.js"):
+        assert server.get(path)[0] == 404
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("nothing", "no such data"),
+        ("segments?start=x", "start is a whole number"),
+        ("segments?start=99999999999999999999", "start is a whole number"),
+        ("segments?run=99", "no such run"),
+        ("flow?kind=run&id=1", "a flow begins with"),
+        ("flow?kind=take&id=1;DROP", "id is a whole number"),
+        ("query?name=../../etc", "do not show such a query"),
+        ("query?name=data-quality", "do not show such a query"),
+        ("compare?other=99", "no such run"),
+        ("path_point?path=x", "path is a whole number"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(demo: Path, serve: Serve, place: str, said: str) -> None:
+    status, _, content = serve(demo).get(f"/api/{place}")
+    assert status == 400
+    assert said in json.loads(content)["error"]
+
+
+def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, systems: Path) -> None:
+    path = tmp_path / "copy.duckdb"
+    shutil.copyfile(demo, path)
+    server = Served(path)
+    try:
+        assert server.get("/api/run", X_Generation="1")[0] == 200
+        other = tmp_path / "other.duckdb"
+        shutil.copyfile(systems, other)
+        other.replace(path)
+        status, _, content = server.get("/api/run", X_Generation="1")
+        assert status == 409
+        assert json.loads(content)["code"] == "replaced"
+        assert b'data-generation="2"' in server.get("/")[2]
+        status, _, content = server.get("/api/run", X_Generation="2")
+        assert status == 200
+        assert len(decoded(content).rows) == 3
+        path.unlink()
+        status, _, content = server.get("/api/run", X_Generation="2")
+        assert status == 409
+        assert "no longer there" in json.loads(content)["error"]
+    finally:
+        server.close()
+
+
+def test_an_ingest_meanwhile_is_refused(demo: Path, tmp_path: Path) -> None:
+    path = tmp_path / "copy.duckdb"
+    shutil.copyfile(demo, path)
+    with running_program(path) as (process, _):
+        with pytest.raises(DatabaseError, match="in use by another process"):
+            ingest([demo.parent / "trace"], path, name="again")
+        assert process.poll() is None
+
+
+def test_a_port_in_use_is_said(demo: Path, tmp_path: Path) -> None:
+    path = Path(shutil.copyfile(demo, tmp_path / "copy.duckdb"))
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(UsageError, match="cannot listen on the port"):
+            serve(path, port=port)
+    with listen(None) as first, listen(None) as second:
+        assert first.getsockname() != second.getsockname()
+        assert first.getsockname()[0] == "127.0.0.1"
+
+
+class running_program:
+    """`msgflow ui` as a process of its own, with its address."""
+
+    def __init__(self, path: Path, **environment: str) -> None:
+        self._command = [sys.executable, "-m", "msgflow", "ui", "--port", "0", "--db", str(path)]
+        self._environment = os.environ | environment
+
+    def __enter__(self) -> tuple[subprocess.Popen[str], str]:
+        command = [*self._command, *([] if "BROWSER" in self._environment else ["--no-browser"])]
+        self.process = subprocess.Popen(
+            command,
+            env=self._environment,
+            stderr=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stderr is not None
+        return self.process, self.process.stderr.readline().strip()
+
+    def __exit__(self, *error: Any) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it(demo: Path, number: signal.Signals) -> None:
+    with running_program(demo) as (process, address):
+        assert address.startswith("http://127.0.0.1:")
+        process.send_signal(number)
+        begin = time.monotonic()
+        out, error = process.communicate(timeout=20)
+        assert time.monotonic() - begin < 10
+        assert out == ""
+        assert "Traceback" not in error
+        assert process.returncode in (0, 130, 143, -number)
+
+
+def test_without_a_browser_it_says_so(demo: Path) -> None:
+    nowhere = {"BROWSER": "/nonexistent", "DISPLAY": "", "WAYLAND_DISPLAY": "", "PATH": ""}
+    with running_program(demo, **nowhere) as (process, _):
+        assert process.stderr is not None
+        lines = [process.stderr.readline() for _ in range(2)]
+        assert any("open the address yourself" in line for line in lines), lines
+
+
+def test_what_nobody_waits_for_ends(
+    demo: Path, serve: Serve, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A query that would take very long is interrupted when its reader goes away."""
+    server = serve(demo)
+    ended: list[float] = []
+
+    def long(pages: Any, connection: Any, params: Any) -> bytes:
+        begin = time.monotonic()
+        try:
+            connection.execute("SELECT count(*) FROM range(10000000) a, range(10000000)").fetchall()
+        finally:
+            ended.append(time.monotonic() - begin)
+        return b""
+
+    from msgflow.view import pages
+
+    monkeypatch.setitem(pages._ANSWERS, "edge", long)
+    with socket.create_connection(("127.0.0.1", server.port)) as reader:
+        reader.sendall(
+            f"GET /api/edge HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+            f"Cookie: msgflow_{server.port}={server.token}\r\n\r\n".encode()
+        )
+        time.sleep(0.5)
+    for _ in range(200):
+        if ended:
+            break
+        time.sleep(0.05)
+    assert ended
+    assert server.get("/api/run")[0] == 200
