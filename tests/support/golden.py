@@ -3,6 +3,8 @@
     cases/<query or view>/<case>/
         input/<table>.csv    rows of store.<table>; columns left out are NULL, or where the table
                              forbids that 1 for a key, else 0, false or an empty text
+        system               name of a file in tests/support/systems that fills the store by SQL,
+                             beside the rows of BASE: what several cases have in common
         derive               if this file is there, links are derived before
         params.json          parameters of the query, and run, start, end, skip_first, internal;
                              or arguments of the macro
@@ -45,6 +47,7 @@ BASE: dict[str, dict[str, str]] = {
     "process": {"process_id": "1", "pid": "1", "name": "process"},
     "thread": {"thread_id": "1", "tid": "1", "name": "thread"},
 }
+SYSTEMS = Path(__file__).parent / "systems"
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SELECTION = ("run", "start", "end", "skip_first", "internal")
 _TEMPLATE = pytest.StashKey[Path]()
@@ -101,6 +104,9 @@ def evaluate(folder: Path, empty: Path) -> str:
         shutil.copyfile(empty, path)
         with duckdb.connect(str(path)) as connection:
             fill(connection, folder / "input")
+            if (folder / "system").exists():
+                name = (folder / "system").read_text().strip()
+                connection.execute((SYSTEMS / f"{name}.sql").read_text())
             if (folder / "derive").exists():
                 for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
                     derive(connection, run_id)
