@@ -64,11 +64,20 @@ WHERE h.ts_ns IS NOT NULL;
 
 -- Times in the trace by which a row may name an instance; a take also by its callback's start.
 CREATE OR REPLACE TEMP TABLE truth_time AS
--- All traces of a host are on the clock of the first one.
+-- All traces of a host are on the clock of the first one, but for errors of measuring.
 WITH clock_error AS (
-    SELECT host, arg_min(clock_error_ns, path) AS error_ns
-    FROM simulated_trace
-    GROUP BY host
+    SELECT
+        host, pid,
+        CASE
+            WHEN abs(clock_error_ns - first_error_ns) <= 1000 THEN clock_error_ns
+            ELSE first_error_ns
+        END AS error_ns
+    FROM (
+        SELECT
+            host, pid, clock_error_ns,
+            first(clock_error_ns) OVER (PARTITION BY host ORDER BY path) AS first_error_ns
+        FROM simulated_trace
+    )
 ),
 state AS (
     SELECT s.*, concat_ws('/', host, pid, tid, start_ns) AS id FROM simulated_executor_state AS s
@@ -89,7 +98,7 @@ named AS (
 )
 SELECT n.kind, n.id, n.host, n.pid, n.tid, n.ts_ns + c.error_ns AS ts_ns
 FROM named AS n
-JOIN clock_error AS c ON n.host = c.host;
+JOIN clock_error AS c ON n.host = c.host AND n.pid = coalesce(c.pid, n.pid);
 
 CREATE OR REPLACE TEMP TABLE truth_link AS
 WITH recorded AS (

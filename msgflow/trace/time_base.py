@@ -1,13 +1,18 @@
 """One time base for the traces of one boot.
 
-A tracer measures how far its clock is from the epoch for every trace anew. The clock itself is the
-same for all traces of a boot, as its uuid says: what the offsets differ by is an error of measuring
-or, between sessions, what the time of day was set or slewed by meanwhile.
+A tracer measures how far its clock is from the epoch for every trace anew, with buffers per process
+for every process. The clock itself is the same for all traces of a boot, as its uuid says: what the
+offsets differ by is an error of measuring or, between sessions, what the time of day was set by
+meanwhile. An error of measuring is left alone, so that times are those that the trace says and every
+other reader shows; one host's times would not fit together after a clock was set, so that is undone.
 """
 
 from __future__ import annotations
 
 GIGA = 1_000_000_000
+# LTTng reads the two clocks next to each other, several times, and takes the best: a few ns, or where
+# reading a clock needs the kernel some hundred.
+GREATEST_ERROR_NS = 1_000
 
 
 class TimeBase:
@@ -19,7 +24,7 @@ class TimeBase:
     def correction_ns(
         self, uuid: str | None, name: str | None, frequency: int, offset_ns: int
     ) -> int:
-        """Return what to add to the times of a trace, so that they are those of the first one.
+        """Return what to add to the times of a trace, so that they fit those of the first one.
 
         Args:
             uuid: of the trace's clock, or None, which is a clock of its own.
@@ -29,4 +34,5 @@ class TimeBase:
         """
         if uuid is None or frequency != GIGA:
             return 0
-        return self._offsets.setdefault((uuid, name), offset_ns) - offset_ns
+        correction = self._offsets.setdefault((uuid, name), offset_ns) - offset_ns
+        return 0 if abs(correction) <= GREATEST_ERROR_NS else correction

@@ -1,4 +1,4 @@
-"""Traces of one boot are on one time base, whatever offset each of them declares."""
+"""Traces of one boot are on one time base, however far apart the offsets that they declare."""
 
 from __future__ import annotations
 
@@ -40,19 +40,32 @@ def read(traces: TraceSet) -> tuple[list[tuple[int, int]], list[tuple[int, int]]
 
 
 def test_the_first_trace_of_a_boot_decides(tmp_path: Path, open_traces: Open) -> None:
-    write(tmp_path / "a", 1_000, [10, 20])
-    write(tmp_path / "b", 400, [15])
+    write(tmp_path / "a", 10_000, [10, 20])
+    write(tmp_path / "b", 4_000, [15])
     write(tmp_path / "c", 2_000_000_000, [12, 18, 22])
     with open_traces(tmp_path) as traces:
         declared = [info.clock_offset_ns - EPOCH for info in traces.traces]
         corrections = [info.clock_correction_ns for info in traces.traces]
         extents = [(i.begin_ns - EPOCH, i.end_ns - EPOCH) for i in traces.traces]  # type: ignore[operator]
         events, packets = read(traces)
-    assert declared == [1_000, 400, 2_000_000_000]
-    assert corrections == [0, 600, -1_999_999_000]
-    assert extents == [(1_010, 1_020), (1_015, 1_015), (1_012, 1_022)]
-    assert events == [(0, 1_010), (2, 1_012), (1, 1_015), (2, 1_018), (0, 1_020), (2, 1_022)]
-    assert sorted(packets) == [(1_010, 1_020), (1_012, 1_022), (1_015, 1_015)]
+    assert declared == [10_000, 4_000, 2_000_000_000]
+    assert corrections == [0, 6_000, -1_999_990_000]
+    assert extents == [(10_010, 10_020), (10_015, 10_015), (10_012, 10_022)]
+    assert events == [(0, 10_010), (2, 10_012), (1, 10_015), (2, 10_018), (0, 10_020), (2, 10_022)]
+    assert sorted(packets) == [(10_010, 10_020), (10_012, 10_022), (10_015, 10_015)]
+
+
+def test_errors_of_measuring_are_left_alone(tmp_path: Path, open_traces: Open) -> None:
+    write(tmp_path / "a", 10_000, [10, 11])
+    write(tmp_path / "b", 9_000, [15])
+    write(tmp_path / "c", 11_000, [16])
+    write(tmp_path / "d", 8_999, [17])
+    write(tmp_path / "e", 11_001, [18])
+    with open_traces(tmp_path) as traces:
+        assert [info.clock_correction_ns for info in traces.traces] == [0, 0, 0, 1_001, -1_001]
+        events, _ = read(traces)
+    assert sorted(events) == [(0, 10_010), (0, 10_011), (1, 9_015), (2, 11_016), (3, 10_017),
+                              (4, 10_018)]  # fmt: skip
 
 
 def test_another_boot_keeps_its_offset(tmp_path: Path, open_traces: Open) -> None:
