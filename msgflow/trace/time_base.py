@@ -3,15 +3,15 @@
 A tracer measures how far its clock is from the epoch for every trace anew, with buffers per process
 for every process. The clock itself is the same for all traces of a boot, as its uuid says: what the
 offsets differ by is an error of measuring or, between sessions, what the time of day was set by
-meanwhile. An error of measuring is left alone, so that times are those that the trace says and every
-other reader shows; one host's times would not fit together after a clock was set, so that is undone.
+meanwhile. An error of measuring is left alone, so that times are those that the trace says and that
+every other reader shows. That a clock was set is undone: times of one host have to fit together.
 """
 
 from __future__ import annotations
 
 GIGA = 1_000_000_000
-# LTTng reads the two clocks next to each other, several times, and takes the best: a few ns, or where
-# reading a clock needs the kernel some hundred.
+# LTTng reads the two clocks next to each other, several times, and takes the best: some ns, or some
+# hundred where reading a clock needs the kernel.
 GREATEST_ERROR_NS = 1_000
 
 
