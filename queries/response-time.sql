@@ -1,0 +1,122 @@
+-- name: response-time
+-- title: Response time by path, as CARET counts it
+-- description: The four response times of CARET. An input that does not arrive is answered by the
+--     first output of a later one; the inputs that one output answers are its cycle. 'all' is from
+--     every input to its output; of every output 'best' is from the newest input of the cycle,
+--     'worst' from the oldest, and 'worst-with-external-latency' from the newest input of the
+--     cycle before. As in CARET, the earliest output of a path counts for none of them. The time
+--     window is that of the input for 'all', else that of the newest input of the cycle. With
+--     from_event publish and to_event callback_start it is CARET's own path.
+-- grain: one row per path and response time
+-- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
+-- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
+--     output
+-- param: max_depth BIGINT {1..} = 32     Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- column: run_id BIGINT            Run
+-- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
+-- column: count BIGINT             Response times: inputs for 'all', else outputs
+-- column: min_ns BIGINT [ns]       Shortest
+-- column: median_ns BIGINT [ns]    Median
+-- column: mean_ns BIGINT [ns]      Mean
+-- column: p95_ns BIGINT [ns]       95 % of them are at most this
+-- column: p99_ns BIGINT [ns]       99 % of them are at most this
+-- column: max_ns BIGINT [ns]       Longest
+-- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
+--     never shows a callback
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
+-- column: path VARCHAR             Nodes and topics
+-- note: clocks
+-- needs: main.flow_path, main.end_to_end
+WITH input AS (
+    SELECT
+        path_id,
+        root_kind,
+        root_id,
+        any_value(root_ns) AS root_ns,
+        min(sink_ns) AS first_ns,
+        any_value(sink_event) AS sink_event
+    FROM main.end_to_end(
+        $runs, $from, $to, $from_event, $to_event,
+        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT,
+        max_depth := $max_depth, max_paths := $max_paths
+    )
+    GROUP BY path_id, root_kind, root_id
+),
+answered AS (
+    SELECT
+        path_id,
+        root_ns,
+        sink_event,
+        min(first_ns) OVER (
+            PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
+            ROWS UNBOUNDED PRECEDING
+        ) AS answer_ns
+    FROM input
+),
+cycle AS (
+    SELECT
+        path_id,
+        answer_ns,
+        min(root_ns) AS oldest_ns,
+        max(root_ns) AS newest_ns,
+        any_value(sink_event) AS sink_event
+    FROM answered
+    WHERE answer_ns IS NOT NULL
+    GROUP BY path_id, answer_ns
+    QUALIFY row_number() OVER (PARTITION BY path_id ORDER BY answer_ns) > 1
+),
+response AS (
+    SELECT
+        path_id, sink_event, newest_ns AS input_ns,
+        unnest([
+            {response: 'best', response_ns: answer_ns - newest_ns},
+            {response: 'worst', response_ns: answer_ns - oldest_ns},
+            {
+                response: 'worst-with-external-latency',
+                response_ns: answer_ns - lag(newest_ns) OVER (
+                    PARTITION BY path_id ORDER BY answer_ns
+                )
+            }
+        ], recursive := true)
+    FROM cycle
+    UNION ALL
+    SELECT a.path_id, a.sink_event, a.root_ns, 'all', a.answer_ns - a.root_ns
+    FROM answered AS a
+    JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
+),
+measured AS (
+    SELECT
+        path_id,
+        response,
+        count(response_ns) AS count,
+        any_value(sink_event) AS sink_event,
+        min(response_ns) AS min_ns,
+        quantile_disc(response_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(response_ns))::BIGINT AS mean_ns,
+        max(response_ns) AS max_ns
+    FROM response
+    WHERE input_ns >= $start_ns AND input_ns < $end_ns
+    GROUP BY path_id, response
+)
+SELECT
+    p.run_id,
+    m.response,
+    m.count,
+    m.min_ns,
+    m.quantiles[1] AS median_ns,
+    m.mean_ns,
+    m.quantiles[2] AS p95_ns,
+    m.quantiles[3] AS p99_ns,
+    m.max_ns,
+    m.sink_event,
+    p.is_cut,
+    p.path
+FROM main.flow_path(
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+) AS p
+JOIN measured AS m ON p.path_id = m.path_id
+WHERE p.is_path
+ORDER BY p.run_id, p.path, p.path_id, m.response
