@@ -17,13 +17,14 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test bench truth babeltrace chromium clean
+.PHONY: help demo test bench truth fuzz babeltrace chromium clean
 
 help:
 	@echo 'make demo   simulate a robot, ingest its trace, print end-to-end latency'
 	@echo 'make test   style, types, import contracts, tests'
 	@echo 'make bench  speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth  precision and recall on systems of which everything is known, minutes'
+	@echo 'make fuzz   damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make clean  remove what these made'
 
 demo: $(VENV)/.installed
@@ -45,6 +46,9 @@ bench: $(VENV)/.installed babeltrace
 
 truth: $(VENV)/.installed
 	$(BIN)/python benchmarks/truth.py
+
+fuzz: $(VENV)/.installed
+	$(BIN)/python benchmarks/fuzz.py
 
 $(VENV)/.made:
 	@$(APT); command -v $(PYTHON) >/dev/null 2>&1 || apt_install python3 python3-venv

@@ -358,7 +358,7 @@ def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
 
 
 def _fallback_name(paths: Sequence[str | Path]) -> str:
-    name = archive.stem(Path(paths[0]).resolve())
+    name = archive.stem(Path(os.path.realpath(paths[0])))
     return name if is_run_name(name) else f"run-{name}".rstrip("-")
 
 
@@ -414,7 +414,7 @@ def _host_paths(
     given: dict[Path, tuple[str, str | Path]] = {}
     for name, paths in hosts.items():
         for path in [paths] if isinstance(paths, str | Path) else paths:
-            other, _ = given.setdefault(Path(path).resolve(), (name, path))
+            other, _ = given.setdefault(Path(os.path.realpath(path)), (name, path))
             if other != name:
                 raise UsageError(
                     f"two names are given for the host of one path: {other} and {name} — {path}",

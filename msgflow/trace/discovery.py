@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace import metadata
 from msgflow.trace.archive import is_archive
-from msgflow.trace.files import irregular, unreadable_error
+from msgflow.trace.files import irregular, read_regular, unreadable_error
 from msgflow.trace.model import TraceLocation
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ _FOREIGN = {
     ".zip": "an archive",
     ".7z": "an archive",
 }
+_STREAM_MAGICS = {b"\xc1\x1f\xfc\xc1", b"\xc1\xfc\x1f\xc1"}
+_MAGIC_SIZE = 4
+_MOST_LOOKED_AT = 20
 _RECORD_HINT = "ros2 trace"
 
 
@@ -44,9 +48,12 @@ def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     found: dict[Path, TraceLocation] = {}
     for path in map(Path, paths):
         _check_exists(path)
-        below = [_locate(directory) for directory in _directories_with_metadata(path)]
+        strays: list[Path] = []
+        below = [_locate(directory) for directory in _directories_with_metadata(path, strays)]
+        if strays:
+            below[:1] = [replace(first, strays=tuple(strays)) for first in below[:1]]
         if not below:
-            raise _no_trace_error(path)
+            raise _no_trace_error(path, strays)
         found.update((location.path, location) for location in below)
     locations = [found[path] for path in sorted(found)]
     if not locations:
@@ -92,7 +99,8 @@ def _check_exists(path: Path) -> None:
         )
 
 
-def _directories_with_metadata(root: Path) -> Iterator[Path]:
+def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]:
+    """Yield the traces below a directory; add streams that have no metadata to `strays`."""
     visited: set[Path] = set()
 
     def fail(error: OSError) -> None:
@@ -102,7 +110,7 @@ def _directories_with_metadata(root: Path) -> Iterator[Path]:
         ) from error
 
     for directory, names, files in os.walk(root, onerror=fail, followlinks=True):
-        resolved = Path(directory).resolve()
+        resolved = Path(os.path.realpath(directory))
         if resolved in visited:
             names.clear()
             continue
@@ -110,6 +118,20 @@ def _directories_with_metadata(root: Path) -> Iterator[Path]:
         names.sort()
         if metadata.FILE_NAME in files:
             yield resolved
+        else:
+            strays += _first_stream(resolved, files)
+
+
+def _first_stream(directory: Path, names: Sequence[str]) -> list[Path]:
+    """Return the first of these files that is a stream of a trace, if there is one."""
+    for name in sorted(names)[:_MOST_LOOKED_AT]:
+        try:
+            is_stream = read_regular(directory / name, None, _MAGIC_SIZE) in _STREAM_MAGICS
+        except OSError:
+            continue
+        if is_stream:
+            return [directory / name]
+    return []
 
 
 def _locate(directory: Path) -> TraceLocation:
@@ -128,7 +150,13 @@ def _locate(directory: Path) -> TraceLocation:
     return TraceLocation(directory, size)
 
 
-def _no_trace_error(path: Path) -> TraceError:
+def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
+    if strays:
+        return TraceError(
+            f"a stream of a trace without its `metadata`, which is missing or renamed — "
+            f"{strays[0]}",
+            hint=f"ls {strays[0].parent}; copy the file `metadata` from where it was recorded",
+        )
     entries = sorted(path.iterdir())
     if not entries:
         return TraceError(f"empty directory — {path}", hint=_RECORD_HINT)

@@ -25,8 +25,8 @@ class UnsuitableFileError(OSError):
     """A file is of a kind or size that no tracer writes."""
 
 
-def read_regular(path: Path, most_bytes: int) -> bytes:
-    """Return the content of a regular file.
+def read_regular(path: Path, most_bytes: int | None, size: int = -1) -> bytes:
+    """Return the content of a regular file, or the first `size` bytes of it.
 
     Raises:
         UnsuitableFileError: it is a pipe, a device or the like, or longer than `most_bytes`.
@@ -38,13 +38,13 @@ def read_regular(path: Path, most_bytes: int) -> bytes:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
             raise UnsuitableFileError(errno.EINVAL, f"{_kind(status.st_mode)}, no file", str(path))
-        if status.st_size > most_bytes:
+        if most_bytes is not None and status.st_size > most_bytes:
             raise UnsuitableFileError(
                 errno.EFBIG,
                 f"{status.st_size:,} bytes, more than the {most_bytes:,} that make sense",
                 str(path),
             )
-        return file.read(status.st_size)
+        return file.read(status.st_size if size < 0 else size)
 
 
 def irregular(path: Path) -> str | None:

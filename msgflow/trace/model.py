@@ -18,10 +18,12 @@ class TraceLocation:
     Attributes:
         path: the directory, absolute, symbolic links resolved.
         size_bytes: total size of its stream files (without metadata and indexes).
+        strays: streams beside or below it that belong to no trace, as their metadata is missing.
     """
 
     path: Path
     size_bytes: int
+    strays: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ there, and removed again if they lead nowhere. Owners, modes and times are not r
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import stat
 import tarfile
@@ -16,13 +17,21 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
-from msgflow.errors import TraceError
+from msgflow.errors import TraceError, UsageError
 from msgflow.trace.compression import CORRUPT, UNPACKABLE, open_plain
 
 _CHUNK = 1 << 20
 _MOST_HEADER_BYTES = 1 << 20
 _MOST_LINK_BYTES = 4096
 _FREE_PART_LEFT = 20
+LIMIT_VARIABLE = "MSGFLOW_UNPACK_LIMIT"
+"""Environment variable: most bytes that an archive may have unpacked, such as 20GB."""
+
+# Traces are packed ten to thirty times smaller, with the zeros at the ends of packets up to fifty.
+_MOST_UNPACKED = 1 << 30
+_MOST_RATIO = 64
+_UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
+_SIZE = re.compile(r"(\d{1,15})\s*([KMGT]?)B?", re.IGNORECASE | re.ASCII)
 # What a file takes on the disk at least, however small it is.
 _BYTES_PER_MEMBER = 4096
 _ZIP = b"PK"
@@ -40,11 +49,12 @@ def unpack(archive: Path, directory: Path) -> None:
     """Unpack an archive into an empty directory.
 
     Raises:
-        TraceError: it is damaged, encrypted, too large for the disk, or has a member that is a
-            device or would lie, or lead, outside of the directory.
+        TraceError: it is damaged, encrypted, too large for the disk or for what it is packed, or
+            has a member that is a device or would lie, or lead, outside of the directory.
+        UsageError: the limit in the environment is none.
     """
-    target = _Target(archive, directory)
     try:
+        target = _Target(archive, directory)
         with archive.open("rb") as file:
             if file.peek(len(_ZIP)).startswith(_ZIP):
                 _unpack_zip(file, target)
@@ -68,6 +78,16 @@ def unpack(archive: Path, directory: Path) -> None:
         ) from error
 
 
+def _limit(archive: Path) -> int:
+    text = os.environ.get(LIMIT_VARIABLE)
+    if text is None:
+        return max(_MOST_UNPACKED, _MOST_RATIO * archive.stat().st_size)
+    match = _SIZE.fullmatch(text.strip())
+    if match is None:
+        raise UsageError(f"not an amount of bytes: {text} — {LIMIT_VARIABLE}", "give one like 20GB")
+    return int(match[1]) * _UNITS[match[2].upper()]
+
+
 def _reason(error: Exception) -> str:
     return str(error).rstrip(".") or "it ends too early"
 
@@ -80,13 +100,24 @@ class _Target:
     directory: Path
     links: list[tuple[str, Path, str]] = field(default_factory=list)
     room: int = field(init=False)
+    limit: int = field(init=False)
+    size: int = 0
 
     def __post_init__(self) -> None:
         free = shutil.disk_usage(self.directory).free
         self.room = free - free // _FREE_PART_LEFT
+        self.limit = _limit(self.archive)
 
     def take(self, size: int) -> None:
         """Use up some bytes of the disk."""
+        self.size += size
+        if self.size > self.limit:
+            raise TraceError(
+                f"the archive has more than {self.limit:,} bytes unpacked, "
+                f"{self.archive.stat().st_size:,} packed — {self.archive}",
+                hint=f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it; or "
+                "unpack it by hand and give the directory",
+            )
         self.room -= size
         if self.room < 0:
             raise TraceError(
@@ -94,6 +125,11 @@ class _Target:
                 f"{self.archive}",
                 hint="TMPDIR=DIRECTORY msgflow … unpacks it on another disk",
             )
+
+    def expect(self, size: int) -> None:
+        """Refuse a member of this size before anything of it is written, if it is too large."""
+        if self.size + size > self.limit:
+            self.take(size)
 
     def place(self, member: str) -> Path:
         """Return where a member belongs."""
@@ -105,13 +141,20 @@ class _Target:
 
     def make_directory(self, member: str) -> None:
         """Make a directory."""
-        self.place(member).mkdir(parents=True, exist_ok=True)
+        try:
+            self.place(member).mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise self._two_kinds(member) from error
 
     def write(self, member: str, content: IO[bytes]) -> None:
         """Write a regular file."""
         place = self.place(member)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with place.open("wb") as file:
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            file = place.open("wb")
+        except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
+            raise self._two_kinds(member) from error
+        with file:
             while chunk := content.read(_CHUNK):
                 self.take(len(chunk))
                 file.write(chunk)
@@ -121,8 +164,11 @@ class _Target:
         place, source = self.place(member), self.place(earlier)
         if not source.is_file():
             raise tarfile.ReadError(f"{member} is a link to {earlier}, which is missing")
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.unlink(missing_ok=True)
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.unlink(missing_ok=True)
+        except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
+            raise self._two_kinds(member) from error
         os.link(source, place)
 
     def add_symbolic_link(self, member: str, to: str) -> None:
@@ -135,12 +181,18 @@ class _Target:
 
     def make_links(self) -> None:
         """Make the symbolic links; where they lead is only certain when all are made."""
-        for _, place, _ in self.links:
-            place.parent.mkdir(parents=True, exist_ok=True)
-        # Every parent is a directory now, and stays one: no link takes the place of a directory.
-        for _, place, to in self.links:
-            place.unlink(missing_ok=True)
-            place.symlink_to(to)
+        member = ""
+        try:
+            for link in self.links:
+                member, place, _ = link
+                place.parent.mkdir(parents=True, exist_ok=True)
+            # Every parent is a directory now, and stays one: no link takes a directory's place.
+            for link in self.links:
+                member, place, to = link
+                place.unlink(missing_ok=True)
+                place.symlink_to(to)
+        except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:
+            raise self._two_kinds(member) from error
         dangling = {place for member, place, _ in self.links if not self._leads_inside(member)}
         for place in dangling:
             place.unlink()
@@ -150,11 +202,14 @@ class _Target:
         place = self.place(member)
         try:
             end, is_there = os.path.realpath(place, strict=True), True
-        except FileNotFoundError:
+        except OSError:  # leads nowhere, or in a circle
             end, is_there = os.path.realpath(place), False
         if not Path(end).is_relative_to(self.directory.resolve()):
             raise self._refusal(member, "is a link that leads outside of it")
         return is_there
+
+    def _two_kinds(self, member: str) -> tarfile.ReadError:
+        return tarfile.ReadError(f"{member!r} is both a directory and something else in it")
 
     def _refusal(self, member: str, why: str) -> TraceError:
         return TraceError(
@@ -194,6 +249,7 @@ def _unpack_tar(file: IO[bytes], target: _Target) -> None:
             elif member.isreg():
                 source = tar.extractfile(member)
                 assert source is not None
+                target.expect(member.size)
                 target.write(member.name, source)
             elif member.islnk():
                 target.add_hard_link(member.name, member.linkname)
@@ -217,6 +273,7 @@ def _unpack_zip(file: IO[bytes], target: _Target) -> None:
                     to = content.read(_MOST_LINK_BYTES)
                 target.add_symbolic_link(member.filename, os.fsdecode(to))
             elif kind in (0, stat.S_IFREG):
+                target.expect(member.file_size)
                 with archive.open(member) as content:
                     target.write(member.filename, content)
             else:

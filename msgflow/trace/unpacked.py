@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import os
 import shutil
 import tempfile
 import weakref
@@ -74,7 +75,7 @@ class Unpacked:
     def _unpacked(self, path: Path) -> Path:
         if not is_archive(path):
             return path
-        archive = path.resolve()
+        archive = Path(os.path.realpath(path))
         for directory, known in self._archives.items():
             if known == archive:
                 return directory

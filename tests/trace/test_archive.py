@@ -14,8 +14,9 @@ import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
-from msgflow.errors import TraceError
+from msgflow.errors import TraceError, UsageError
 from msgflow.trace import TraceSet
+from msgflow.trace import unpack as unpack_module
 from msgflow.trace.archive import stem
 from msgflow.trace.unpack import unpack
 
@@ -301,3 +302,88 @@ def test_names_without_suffix(tmp_path: Path) -> None:
     assert stem(tmp_path / "missing.zip") == "missing.zip"
     (tmp_path / "directory.tar").mkdir()
     assert stem(tmp_path / "directory.tar") == "directory.tar"
+
+
+class TestBounds:
+    """What is packed small may be large."""
+
+    def bomb(self, archive: Path, size: int) -> Path:
+        """A directory of a sparse file: a tar with holes, which is a few kilobytes."""
+        with tarfile.open(archive, "w:gz", compresslevel=1) as tar:
+            member = tarfile.TarInfo("trace/stream")
+            member.size = size
+            tar.addfile(member, _Zeros(size))
+        return archive
+
+    def test_ratio(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(unpack_module, "_MOST_UNPACKED", 1 << 20)
+        archive = self.bomb(tmp_path / "bomb.tar.gz", 2 << 20)
+        with pytest.raises(TraceError, match=r"than 1,048,576 bytes unpacked, .* packed") as caught:
+            msgflow.trace.open([archive])
+        assert "MSGFLOW_UNPACK_LIMIT=" in (caught.value.hint or "")
+
+    def test_a_member_is_refused_before_it_is_written(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """As a sparse one of terabytes has to be."""
+        archive = tmp_path / "sparse.tar"
+        member = tarfile.TarInfo("trace/stream")
+        member.size = 1 << 40
+        archive.write_bytes(member.tobuf() + bytes(10_240))
+
+        def write(*_: object) -> None:
+            raise AssertionError("it is written")
+
+        monkeypatch.setattr("msgflow.trace.unpack._Target.write", write)
+        with pytest.raises(TraceError, match="bytes unpacked"):
+            msgflow.trace.open([archive])
+
+    def test_the_limit_can_be_raised(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(unpack_module, "_MOST_UNPACKED", 1 << 20)
+        archive = self.bomb(tmp_path / "bomb.tar.gz", 2 << 20)
+        monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "3 MB")
+        with pytest.raises(TraceError, match="no CTF trace"):
+            msgflow.trace.open([archive])
+        monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "2MB")
+        with pytest.raises(TraceError, match="more than 2,000,000 bytes"):
+            msgflow.trace.open([archive])
+        monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "much")
+        with pytest.raises(UsageError, match="not an amount of bytes: much"):
+            msgflow.trace.open([archive])
+
+    def test_a_usual_ratio_is_no_bomb(
+        self, session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(unpack_module, "_MOST_UNPACKED", 0)
+        with msgflow.trace.open([pack(session, tmp_path / "session.tar.gz")]) as traces:
+            assert traces.traces
+
+
+class _Zeros:
+    def __init__(self, size: int) -> None:
+        self._left = size
+
+    def read(self, size: int) -> bytes:
+        size = min(size, self._left)
+        self._left -= size
+        return bytes(size)
+
+
+@pytest.mark.parametrize("first", ["file", "directory"])
+def test_one_name_of_two_kinds(tmp_path: Path, first: str) -> None:
+    archive = tmp_path / "odd.tar"
+    with tarfile.open(archive, "w") as tar:
+        directory = tarfile.TarInfo("trace/name")
+        directory.type = tarfile.DIRTYPE
+        members = [tarfile.TarInfo("trace/name"), directory]
+        for member in members if first == "file" else members[::-1]:
+            tar.addfile(member)
+    with pytest.raises(TraceError, match="is both a directory and something else") as caught:
+        msgflow.trace.open([archive])
+    assert "copy or pack it again" in (caught.value.hint or "")
+
+
+def test_an_archive_that_is_a_link_in_a_circle(tmp_path: Path) -> None:
+    (tmp_path / "a.tar").symlink_to(tmp_path / "a.tar")
+    with pytest.raises(TraceError, match="not a trace but a link in a circle"):
+        msgflow.trace.open([tmp_path / "a.tar"])

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
+import msgflow.trace
 from msgflow.errors import ExitCode, TraceError
 from msgflow.trace import discover
 
@@ -171,3 +172,25 @@ def test_directory_that_must_not_be_read(tmp_path: Path) -> None:
         fails([tmp_path], "cannot read the directory", "^ls -ld")
     finally:
         (tmp_path / "trace").chmod(0o755)
+
+
+def test_metadata_that_is_renamed(tmp_path: Path) -> None:
+    for name in "ab":
+        write_trace(tmp_path / name, CONTENT)
+    (tmp_path / "a" / "metadata").rename(tmp_path / "a" / "metadata.bak")
+    (location,) = discover([tmp_path])
+    assert location.strays == (tmp_path / "a" / "channel_0",)
+    with msgflow.trace.open([tmp_path]) as traces:
+        (damage,) = traces.damages
+    assert damage.file == tmp_path / "a" / "channel_0"
+    assert "`metadata`, which is missing or renamed" in damage.message
+    fails([tmp_path / "a"], "a stream of a trace without its `metadata`", "^ls ")
+
+
+def test_directories_in_a_circle(tmp_path: Path) -> None:
+    write_trace(tmp_path / "a", CONTENT)
+    (tmp_path / "a" / "up").symlink_to(tmp_path)
+    (tmp_path / "a" / "circle").symlink_to(tmp_path / "a" / "circle")
+    (location,) = discover([tmp_path])
+    assert location.path == tmp_path / "a"
+    fails([tmp_path / "a" / "circle"], "not a trace but a link in a circle", "give the directory")

@@ -82,6 +82,8 @@ class CtfTraceSet(ExclusiveTraceSet):
         def report(file: Path, position: int, offset: int, message: str) -> None:
             self._report(Damage(index, file, position, offset, message))
 
+        for file in location.strays:
+            report(file, 0, 0, "a stream without `metadata`, which is missing or renamed: left out")
         for note in declared.notes:
             report(path / FILE_NAME, 0, 0, note)
         try:

@@ -1,0 +1,440 @@
+"""Damages what msgflow reads, at random, and looks at what it makes of it.
+
+    python benchmarks/fuzz.py [--cases 10000] [--seed 1] [--jobs N] [--kind KIND]… [--case N]…
+
+Each case changes a small recording, an archive of one, a database, or a file of links or clocks,
+and runs the whole of msgflow on it in a process with limits: ingest, check, and three queries.
+Counted are, by kind of input:
+
+- traceback: one is printed; mistake: an error says "mistake of msgflow"; crash: the process ends by
+  a signal; hang: it takes longer, or more output, than it may;
+- damage: a failed ingest changed the database, or a stored run does not pass `db check`;
+- unreported: a query answers otherwise than without the change, and no diagnostic, warning or error
+  says that anything was wrong.
+
+Bytes of a payload, and names in the metadata, are protected by nothing in the format: such changes
+are made as well, but cannot be unreported. A case is the same for the same seed and number;
+`--case N` runs it alone and prints what was said. The exit code is 1 where anything was counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import TYPE_CHECKING, Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
+from mutations import (
+    ANYWHERE,
+    MUTATIONS,
+    STRUCTURAL,
+    damage_archive,
+    damage_file,
+    damage_text,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+SECONDS_OF_CPU = 30
+SECONDS = 180
+ADDRESS_SPACE = 8 << 30
+LARGEST_FILE = 400 << 20
+BAD = ("traceback", "mistake", "crash", "hang", "damage", "unreported")
+QUERIES = ("e2e-latency", "delivery", "transport-latency")
+BASES = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"), ("services", "jazzy"))
+LENGTH = 0.004
+
+LINKS = """links:
+  - kind: partial_sync
+    node: /perception/detector
+    inputs:
+      - /camera/image
+      - /scan
+    outputs: /perception/detections
+"""
+CLOCKS = """clocks:
+  {host}:
+    offset_ns: 1000
+    drift_ppb: 3
+"""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What the queries answer, and what was found wrong."""
+
+    results: tuple[str, ...]
+    reports: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Base:
+    """A recording to be changed.
+
+    Attributes:
+        directory: its traces.
+        database: the same, ingested.
+        archives: the same, packed.
+        hosts: names of its hosts.
+        answers: what is said of it unchanged.
+    """
+
+    directory: Path
+    database: Path
+    archives: tuple[Path, ...]
+    hosts: tuple[str, ...]
+    answers: Answers
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a case.
+
+    Attributes:
+        number: of the case.
+        kind: of input.
+        change: what was done.
+        bad: what of `BAD` it is; empty if all is well.
+        said: what was printed.
+    """
+
+    number: int
+    kind: str
+    change: str
+    bad: tuple[str, ...]
+    said: str
+    ending: str
+
+
+def prepare(directory: Path) -> list[Base]:
+    """Simulate and ingest the recordings; in processes, since what forks must have no threads."""
+    return [_base(directory, *base) for base in BASES]
+
+
+def _base(directory: Path, system: str, layout: str) -> Base:
+    place = directory / system
+    place.mkdir()
+    traces, database = place / "copy", place / "run.duckdb"
+    empty = directory / "empty.duckdb"
+
+    def make() -> dict[str, Any]:
+        from msgflow.db import migrate
+        from msgflow.sim import simulate
+
+        if not empty.exists():
+            migrate.create(empty)
+        shutil.copyfile(empty, database)
+        simulation = simulate(system, place / "trace", factor=LENGTH, layout=layout)
+        shutil.copytree(
+            simulation.directory, traces, ignore=shutil.ignore_patterns("truth", "*.json")
+        )
+        meta = json.loads((simulation.directory / "truth" / "meta.json").read_text())
+        forms = ("tar", "gztar", "xztar", "zip")
+        archives = [shutil.make_archive(str(place / "robot"), form, traces) for form in forms]
+        return {"hosts": list(meta["hosts"]), "archives": archives}
+
+    ending, made, said = run(make, place)
+    if ending == "ended":
+        ending, found, said = run(lambda: commands(database, [traces], []), place)
+    if ending != "ended" or not found.get("results"):
+        raise SystemExit(f"cannot prepare {system}: {said}")
+    archives = tuple(map(Path, made["archives"]))
+    return Base(traces, database, archives, tuple(made["hosts"]), answers_of(found, place))
+
+
+def commands(database: Path, traces: Sequence[Path], options: Sequence[str]) -> dict[str, Any]:
+    """Run msgflow; runs in a process of its own."""
+    found: dict[str, Any] = {"codes": []}
+    db = ["--db", str(database)]
+    before = database.read_bytes()
+    if traces:
+        code, _ = msgflow("ingest", *map(str, traces), *db, *options)
+        found["codes"].append(code)
+        if code:
+            found["damaged"] = database.read_bytes() != before
+            return found
+    code, text = msgflow("check", "--format", "json", *db)
+    found["codes"].append(code)
+    found["reports"] = [text]
+    code, text = msgflow("query", "info-diagnostics", "--format", "json", *db)
+    found["reports"].append(text)
+    found["results"] = []
+    for query in QUERIES:
+        code, text = msgflow("query", query, "--format", "json", *db)
+        found["codes"].append(code)
+        found["results"].append(text)
+    if traces:
+        code, _ = msgflow("db", "check", *db)
+        found["damaged"] = code != 0
+    else:
+        found["damaged"] = database.read_bytes() != before
+    return found
+
+
+def msgflow(*arguments: str) -> tuple[int, str]:
+    """Run a command in this process; return its exit code and what it printed to stdout."""
+    from msgflow.cli.app import app
+
+    with tempfile.TemporaryFile() as output:
+        kept = os.dup(1)
+        os.dup2(output.fileno(), 1)
+        try:
+            app(list(arguments))
+            code = 0
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else 1
+        finally:
+            with contextlib.suppress(OSError):
+                sys.stdout.flush()
+            os.dup2(kept, 1)
+            os.close(kept)
+        output.seek(0)
+        return code, output.read().decode("utf-8", "replace")
+
+
+def run(work: Callable[[], dict[str, Any]], directory: Path) -> tuple[str, dict[str, Any], str]:
+    """Do something in a process with limits; return how it ended, what it returned and said."""
+    stderr, result = directory / "stderr", directory / "result"
+    pid = os.fork()
+    if pid == 0:
+        status = 1
+        try:
+            descriptor = os.open(stderr, os.O_CREAT | os.O_TRUNC | os.O_WRONLY)
+            os.dup2(descriptor, 2)
+            os.dup2(descriptor, 1)
+            os.environ["TMPDIR"] = str(directory)
+            tempfile.tempdir = None
+            for limit, value in (
+                (resource.RLIMIT_AS, ADDRESS_SPACE),
+                (resource.RLIMIT_CPU, SECONDS_OF_CPU),
+                (resource.RLIMIT_FSIZE, LARGEST_FILE),
+                (resource.RLIMIT_CORE, 0),
+            ):
+                resource.setrlimit(limit, (value, value))
+            result.write_text(json.dumps(work()))
+            status = 0
+        except BaseException as error:
+            import traceback
+
+            traceback.print_exception(error)
+        finally:
+            with contextlib.suppress(Exception):
+                sys.stderr.flush()
+            os._exit(status)
+    ending = wait(pid)
+    said = stderr.read_text("utf-8", "replace") if stderr.exists() else ""
+    found = json.loads(result.read_text()) if ending == "ended" and result.exists() else {}
+    return ending, found, said
+
+
+def wait(pid: int) -> str:
+    """Wait for a process, but not for ever; say how it ended."""
+    until = time.monotonic() + SECONDS
+    while time.monotonic() < until:
+        done, status, usage = os.wait4(pid, os.WNOHANG)
+        if done:
+            if not os.WIFSIGNALED(status):
+                return "ended" if os.WEXITSTATUS(status) == 0 else "failed"
+            number = os.WTERMSIG(status)
+            is_limit = number in {signal.SIGXCPU, signal.SIGXFSZ} or (
+                number == signal.SIGKILL and usage.ru_utime + usage.ru_stime > SECONDS_OF_CPU - 1
+            )
+            return "hang" if is_limit else f"crash by signal {number}"
+        time.sleep(0.005)
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    return "hang"
+
+
+def answers_of(found: dict[str, Any], directory: Path) -> Answers:
+    """Return what can be compared: without the place of the case."""
+
+    def plain(texts: Sequence[str]) -> tuple[str, ...]:
+        return tuple(text.replace(str(directory), "") for text in texts)
+
+    return Answers(plain(found.get("results", ())), plain(found.get("reports", ())))
+
+
+def case(
+    number: int, seed: int, bases: Sequence[Base], kinds: Sequence[str], place: Path
+) -> Outcome:
+    """Run one case in an empty directory."""
+    random = Random(f"{seed} {number}")
+    kind = random.choice(kinds)
+    base = bases[random.randrange(len(bases))]
+    database = place / "run.duckdb"
+    empty = base.directory.parents[1] / "empty.duckdb"
+    shutil.copyfile(base.database if kind == "database" else empty, database)
+    traces, options, protected = [base.directory], [], True
+    if kind == "trace":
+        traces = [place / "copy"]
+        shutil.copytree(base.directory, traces[0])
+        directories = sorted(path.parent for path in traces[0].rglob("metadata"))
+        changes = []
+        for _ in range(random.choice((1, 1, 1, 2))):
+            directory = random.choice(directories)
+            mutation = random.choice((*MUTATIONS, *STRUCTURAL))
+            protected &= mutation not in ANYWHERE
+            with contextlib.suppress(OSError, IndexError, ValueError):
+                changes.append(f"{mutation.__name__}: {mutation(directory, random)}")
+        change = "; ".join(changes)
+    elif kind == "archive":
+        archive = random.choice(base.archives)
+        traces = [place / archive.name]
+        shutil.copyfile(archive, traces[0])
+        change = f"{archive.suffix}: {damage_archive(traces[0], random)}"
+        # A plain tar has no sums of its contents.
+        protected = archive.suffix != ".tar"
+    elif kind == "database":
+        change, traces, protected = damage_file(database, random), [], False
+    else:
+        text = LINKS if kind == "links" else CLOCKS.format(host=random.choice(base.hosts))
+        file = place / f"{kind}.yaml"
+        content, change = damage_text(text, random)
+        file.write_bytes(content)
+        options = ["--links", str(file)] if kind == "links" else ["--clock-sync", str(file)]
+        protected = False
+    ending, found, said = run(lambda: commands(database, traces, options), place)
+    bad = []
+    if "Traceback (most recent call last)" in said:
+        bad.append("traceback")
+    if "mistake of msgflow" in said:
+        bad.append("mistake")
+    if ending == "hang":
+        bad.append("hang")
+    if ending.startswith("crash"):
+        bad.append("crash")
+    if found.get("damaged"):
+        bad.append("damage")
+    if protected and "results" in found:
+        answers, usual = answers_of(found, place), base.answers
+        if answers.results != usual.results and answers.reports == usual.reports:
+            bad.append("unreported")
+    refused = bool(found.get("codes")) and found["codes"][0] != 0 and "results" not in found
+    return Outcome(number, kind, change, tuple(bad), said, "refused" if refused else ending)
+
+
+def worker(
+    numbers: Sequence[int], seed: int, bases: Sequence[Base], kinds: Sequence[str], write: int
+) -> None:
+    """Run cases one after the other; send each outcome as a line."""
+    with os.fdopen(write, "w") as stream, tempfile.TemporaryDirectory() as temporary:
+        for number in numbers:
+            place = Path(temporary) / str(number)
+            place.mkdir()
+            outcome = case(number, seed, bases, kinds, place)
+            shutil.rmtree(place, ignore_errors=True)
+            stream.write(json.dumps(vars(outcome)) + "\n")
+            stream.flush()
+
+
+def outcomes(
+    numbers: Sequence[int], seed: int, bases: Sequence[Base], kinds: Sequence[str], jobs: int
+) -> Iterator[Outcome]:
+    """Run cases in several processes, which have imported everything before they fork for each."""
+    import selectors
+
+    import duckdb  # noqa: F401
+    import numpy  # noqa: F401
+    import pyarrow.compute  # noqa: F401
+
+    import msgflow.cli.app
+    import msgflow.database
+    import msgflow.ingest  # noqa: F401
+
+    with selectors.DefaultSelector() as selector:
+        for job in range(jobs):
+            read, write = os.pipe()
+            if os.fork() == 0:
+                os.close(read)
+                try:
+                    worker(numbers[job::jobs], seed, bases, kinds, write)
+                finally:
+                    os._exit(0)
+            os.close(write)
+            selector.register(os.fdopen(read), selectors.EVENT_READ)
+        while selector.get_map():
+            for key, _ in selector.select():
+                line = key.fileobj.readline()  # type: ignore[union-attr]
+                if not line:
+                    selector.unregister(key.fileobj)
+                    continue
+                row = json.loads(line)
+                yield Outcome(**{**row, "bad": tuple(row["bad"])})
+
+
+KINDS = ("trace",) * 12 + ("archive",) * 3 + ("database",) * 2 + ("links", "clocks")
+
+
+def campaign(
+    numbers: Sequence[int],
+    seed: int,
+    kinds: Sequence[str] = KINDS,
+    jobs: int = 1,
+    report: Callable[[Outcome], None] = lambda outcome: None,
+) -> list[Outcome]:
+    """Run these cases and return what became of them."""
+    found = []
+    with tempfile.TemporaryDirectory() as temporary:
+        bases = prepare(Path(temporary))
+        for outcome in outcomes(numbers, seed, bases, kinds, jobs):
+            report(outcome)
+            found.append(outcome)
+    return found
+
+
+def main() -> None:
+    """Run the campaign and print what was counted."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cases", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--kind", action="append", choices=sorted(set(KINDS)))
+    parser.add_argument("--case", action="append", type=int, help="only this one")
+    arguments = parser.parse_args()
+    numbers = arguments.case or range(arguments.cases)
+    begin = time.monotonic()
+
+    def report(outcome: Outcome) -> None:
+        if outcome.bad or arguments.case:
+            said = outcome.said.strip().splitlines()
+            shown = said if arguments.case else said[-3:]
+            print(
+                f"case {outcome.number} ({outcome.kind}): {', '.join(outcome.bad) or 'well'} "
+                f"[{outcome.ending}] — {outcome.change}",
+                *(f"    {line[:300]}" for line in shown),
+                sep="\n",
+                flush=True,
+            )
+
+    kinds = tuple(arguments.kind or KINDS)
+    found = campaign(numbers, arguments.seed, kinds, arguments.jobs, report)
+    print(f"\n{'kind':10}{'cases':>8}{'refused':>9}" + "".join(f"{bad:>12}" for bad in BAD))
+    for kind in sorted({outcome.kind for outcome in found}):
+        of_kind = [outcome for outcome in found if outcome.kind == kind]
+        counts = Counter(bad for outcome in of_kind for bad in outcome.bad)
+        refused = sum(outcome.ending == "refused" for outcome in of_kind)
+        print(f"{kind:10}{len(of_kind):8}{refused:9}" + "".join(f"{counts[bad]:12}" for bad in BAD))
+    bad = sum(bool(outcome.bad) for outcome in found)
+    print(f"\n{len(found)} cases in {time.monotonic() - begin:.0f} s, {bad} of them not well")
+    sys.exit(bool(bad))
+
+
+if __name__ == "__main__":
+    main()
