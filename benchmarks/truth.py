@@ -59,6 +59,17 @@ RECORDINGS = {
     "loss": Recording(lost_event_share=0.3),
     "packets": Recording(lost_packet_share=0.2),
     "pause": Recording(pauses=((SECOND // 3, SECOND // 2),)),
+    # Processes join and leave one after the other; also with messages on their way between them.
+    "handover": Recording(
+        start_ns=SECOND // 10, pauses=((SECOND // 6, SECOND // 5),), handover_ns=30_000_000
+    ),
+    "dual_handover": Recording(
+        start_ns=SECOND // 10, is_dual_session=True, clock_error_ns=3_000, handover_ns=30_000_000
+    ),
+    # Events of initialisation, and later ones.
+    "lost_begin": Recording(
+        losses=((4_000_000, 6_000_000), (150_000_000, 170_000_000), (500_000_000, 540_000_000))
+    ),
     "truncated": Recording(cut_streams=1, unfinished_streams=1),
     "dual": Recording(start_ns=SECOND // 3, is_dual_session=True, clock_error_ns=3_000),
     "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),

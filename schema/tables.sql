@@ -460,7 +460,8 @@ CREATE TABLE store.link_transport (
     method           VARCHAR NOT NULL,           -- 'exact', 'exact_stamp', 'nearest' or 'ring_buffer'
     candidate_count  BIGINT,                     -- Publications that it could have been
     is_self_loop     BOOLEAN NOT NULL,           -- Received by the publishing node itself
-    is_loss_affected BOOLEAN NOT NULL            -- A gap of the trace may hide a better partner
+    is_loss_affected BOOLEAN NOT NULL,           -- A gap of the trace may hide a better partner
+    is_copy          BOOLEAN NOT NULL            -- Of what a ring buffer carries as well: no callback gets it
 );
 
 -- One row per network packet and clock that received it from another.

@@ -56,7 +56,8 @@ class Score:
 
 @dataclass(frozen=True)
 class Drop:
-    """Messages that a subscription did not take: the true reason and the one that was given.
+    """Messages that were not taken, or whose publication is not known: the true reason, if there
+    is one, or what became of their events, and the reason that was given.
 
     `undecided`: why the trace does not decide it; None where it does, so that the one given must be
     right.
@@ -87,8 +88,10 @@ def compare_simulated(
         ).fetchall()
         if {("publication_id",), ("subscription_id",), ("status",), ("reason",)} - set(columns):
             return scores, None
-        drops = connection.execute((_SQL / "drops.sql").read_text()).fetchall()
-        return scores, [Drop(*row) for row in drops]
+        rows = []
+        for name in ("drops", "orphans"):
+            rows += connection.execute((_SQL / f"{name}.sql").read_text()).fetchall()
+        return scores, [Drop(*row) for row in rows]
 
 
 def compare_recorded(database: Path, truth: Path) -> list[Score]:

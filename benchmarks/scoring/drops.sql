@@ -1,5 +1,8 @@
 -- Reasons that `stat_delivery` gives for messages that were not taken, beside those of the truth.
--- Compared row by row; the reasons that are right for each true one are in `accepted`.
+-- Compared row by row; the reasons that are right for each true one are in `accepted`. Where events
+-- are missing that the trace may need, saying that it cannot be told is no mistake; any other
+-- reason has to be the true one all the same. So it is for messages that were taken, but whose take
+-- is not in the trace: their truth is 'delivered', with the cause for which it is not.
 WITH accepted AS (
     FROM (VALUES
         ('before_subscription', 'before_subscription'),
@@ -18,7 +21,19 @@ WITH accepted AS (
         ('expired', 'take_failed'),
         ('subscription_ended', 'subscription_ended'),
         ('pending_at_end', 'pending_at_end'),
-        ('pending_at_end', 'subscription_ended')
+        ('pending_at_end', 'subscription_ended'),
+        ('delivered, late start', 'receiver_gap'),
+        ('delivered, pause', 'receiver_gap'),
+        ('delivered, loss', 'receiver_gap'),
+        ('delivered, packets', 'receiver_gap'),
+        ('delivered, truncation', 'receiver_gap'),
+        -- Who leaves before others when recording stops is not told from who ends.
+        ('delivered, stop', 'subscription_ended'),
+        ('delivered, stop', 'pending_at_end'),
+        ('delivered, stop', 'receiver_gap'),
+        ('delivered, recorded', 'unknown'),
+        -- Where a gap may hide the better partner, a message in a ring buffer has no link.
+        ('delivered, recorded', 'receiver_gap')
     ) AS a(truth, reason)
 ),
 place AS (
@@ -35,20 +50,55 @@ publication AS (
     SELECT found_from_id AS publication_id, from_id AS true_id
     FROM verdict
     WHERE kind = 'publication' AND from_id IS NOT NULL
+),
+said AS (
+    SELECT
+        d.reason AS truth,
+        v.reason,
+        coalesce(v.reason, v.status, 'no row') AS said,
+        coalesce(
+            d.undecided,
+            CASE
+                WHEN d.is_spoilt AND coalesce(v.reason, 'unknown') IN ('receiver_gap', 'unknown')
+                    THEN 'events are missing'
+            END
+        ) AS undecided
+    FROM truth_drop AS d
+    JOIN publication AS b ON d.publication_id = b.true_id
+    JOIN place AS s
+        ON d.host = s.host AND d.pid = s.pid AND d.subscription_handle = s.subscription_handle
+        AND d.life = s.life
+    LEFT JOIN analysed.main.stat_delivery AS v
+        ON b.publication_id = v.publication_id AND s.subscription_id = v.subscription_id
+    UNION ALL
+    SELECT
+        concat('delivered, ', t.cause),
+        v.reason,
+        v.reason,
+        CASE
+            WHEN v.reason = 'unknown' THEN 'events are missing'
+            -- Objects whose handles were used again may be mixed up where one was not seen.
+            WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN
+                'initialisation is missing'
+        END
+    FROM analysed.main.stat_delivery AS v
+    JOIN publication AS b ON v.publication_id = b.publication_id
+    JOIN place AS s ON v.subscription_id = s.subscription_id
+    JOIN truth_delivery AS t
+        ON b.true_id = t.publication_id AND s.host = t.host AND s.pid = t.pid
+        AND s.subscription_handle = t.subscription_handle AND s.life = t.life
+    ANTI JOIN truth_drop AS d
+        ON b.true_id = d.publication_id AND s.host = d.host AND s.pid = d.pid
+        AND s.subscription_handle = d.subscription_handle AND s.life = d.life
+    WHERE v.status <> 'delivered'
 )
 SELECT
-    d.reason AS truth,
-    coalesce(v.reason, v.status, 'no row') AS reason,
+    d.truth,
+    d.said AS reason,
     d.undecided,
     count(*) AS messages,
     coalesce(bool_or(a.reason IS NOT NULL), false) AS is_right
-FROM truth_drop AS d
-JOIN publication AS b ON d.publication_id = b.true_id
-JOIN place AS s
-    ON d.host = s.host AND d.pid = s.pid AND d.subscription_handle = s.subscription_handle
-    AND d.life = s.life
-LEFT JOIN analysed.main.stat_delivery AS v
-    ON b.publication_id = v.publication_id AND s.subscription_id = v.subscription_id
-LEFT JOIN accepted AS a ON d.reason = a.truth AND v.reason = a.reason
+FROM said AS d
+LEFT JOIN accepted AS a ON d.truth = a.truth AND d.reason = a.reason
 GROUP BY ALL
 ORDER BY ALL;

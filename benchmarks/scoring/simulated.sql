@@ -423,8 +423,8 @@ unnamed AS (
 SELECT
     u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
     u.reason, u.is_internal,
+    p.host IN (FROM lost) OR s.host IN (FROM lost) AS is_spoilt,
     CASE
-        WHEN p.host IN (FROM lost) OR s.host IN (FROM lost) THEN 'events are missing'
         WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
             OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
             THEN 'initialisation is missing'
@@ -466,3 +466,93 @@ LEFT JOIN way AS w ON p.host = w.publication_host AND s.host = w.take_host
 LEFT JOIN equal_stamp AS q
     ON p.topic_name = q.topic_name AND p.source_timestamp_ns = q.source_timestamp_ns
 WHERE l.is_decided;
+
+-- Processes of which it cannot be told which of their subscriptions had a handle.
+CREATE OR REPLACE TEMP TABLE truth_mixed AS
+SELECT DISTINCT host, pid
+FROM simulated_subscription
+SEMI JOIN (
+    SELECT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+) AS u USING (host, pid)
+GROUP BY host, pid, subscription_handle
+HAVING count(*) > 1;
+
+-- Messages that a subscription did take, and why the event of that is not in the trace, if it is
+-- not. Copies of messages that come through a ring buffer as well are no deliveries.
+CREATE OR REPLACE TEMP TABLE truth_delivery AS
+WITH life AS (
+    SELECT
+        subscription_id, host, pid, subscription_handle,
+        row_number() OVER (
+            PARTITION BY host, pid, subscription_handle ORDER BY created_ns
+        ) AS life
+    FROM simulated_subscription
+)
+SELECT
+    t.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
+    coalesce(any_value(u.cause), 'recorded') AS cause
+FROM simulated_take AS t
+JOIN life AS s ON t.subscription_id = s.subscription_id
+LEFT JOIN simulated_unrecorded AS u
+    ON t.host = u.host AND t.pid = u.pid AND t.tid = u.tid
+    AND u.ts_ns = coalesce(t.dequeue_ns, t.rmw_ns)
+WHERE t.method <> 'rmw'
+    OR (t.publication_id, t.subscription_id) NOT IN (
+        SELECT (publication_id, subscription_id) FROM simulated_take WHERE method = 'ring_buffer'
+    )
+GROUP BY ALL;
+
+-- What became of the events that would tell each take its publication.
+CREATE OR REPLACE TEMP TABLE truth_origin AS
+WITH layout AS (
+    SELECT
+        coalesce(bool_or(event = 'dds:write' AND field = 'timestamp'), false)
+        AND NOT coalesce(bool_or(event = 'ros2:rmw_publish' AND field = 'timestamp'), false)
+            AS is_dds_stamped
+    FROM simulated_declared
+),
+written AS (
+    SELECT publication_id, max(ts_ns) AS ts_ns
+    FROM simulated_dds_event
+    WHERE event = 'dds:write'
+    GROUP BY publication_id
+),
+sent AS (
+    SELECT
+        p.publication_id, p.host, p.pid, p.tid, p.intra_ns,
+        CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END AS stamped_ns
+    FROM simulated_publication AS p
+    CROSS JOIN layout AS l
+    LEFT JOIN written AS w ON p.publication_id = w.publication_id
+),
+decided AS (
+    SELECT to_id, bool_or(is_decided) AS is_decided
+    FROM truth_link
+    WHERE kind = 'transport'
+    GROUP BY to_id
+)
+SELECT
+    t.take_id::VARCHAR AS take_id,
+    CASE
+        WHEN t.method = 'callback_only' THEN 'no event'
+        WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
+        WHEN k.cause IS NOT NULL THEN concat('taken, ', k.cause)
+        WHEN u.cause IS NOT NULL THEN concat('sent, ', u.cause)
+        ELSE 'recorded'
+    END AS truth,
+    CASE
+        WHEN k.cause IS NULL AND u.cause IS NULL AND t.method <> 'callback_only'
+            AND NOT d.is_decided
+            THEN 'the link is not decided'
+    END AS undecided
+FROM simulated_take AS t
+JOIN simulated_transport AS x ON t.take_id = x.take_id
+JOIN sent AS s ON t.publication_id = s.publication_id
+LEFT JOIN decided AS d ON t.take_id::VARCHAR = d.to_id
+LEFT JOIN simulated_unrecorded AS k
+    ON t.host = k.host AND t.pid = k.pid AND t.tid = k.tid AND t.rmw_ns = k.ts_ns
+    AND k.event = 'ros2:rmw_take'
+LEFT JOIN simulated_unrecorded AS u
+    ON s.host = u.host AND s.pid = u.pid AND s.tid = u.tid
+    AND u.ts_ns = CASE WHEN t.method = 'ring_buffer' THEN s.intra_ns ELSE s.stamped_ns END
+    AND u.event IN ('ros2:rmw_publish', 'dds:write', 'ros2:rclcpp_intra_publish');

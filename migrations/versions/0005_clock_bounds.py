@@ -1,4 +1,4 @@
-"""What is known of the error of the correction of a clock, at any time.
+"""What is known of the error of the correction of a clock, at any time; copies nobody gets.
 
 Frozen: it does not follow later changes of msgflow/db/tables.py.
 """
@@ -13,7 +13,10 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Add the table; clocks that are corrected already have no rows until they are so anew."""
+    """Add the table and the column.
+
+    Clocks that are corrected already have no rows until they are so anew.
+    """
     op.create_table(
         "clock_uncertainty",
         sa.Column("run_id", sa.BigInteger(), nullable=False, comment="Run that the row belongs to"),
@@ -33,8 +36,18 @@ def upgrade() -> None:
         schema="store",
         comment="One row per clock and moment; between two the bound is a straight line",
     )
+    op.add_column(
+        "link_transport",
+        sa.Column(
+            "is_copy",
+            sa.Boolean(),
+            comment="Of what a ring buffer carries as well: no callback gets it",
+        ),
+        schema="store",
+    )
 
 
 def downgrade() -> None:
-    """Drop the table."""
+    """Drop the column and the table."""
+    op.drop_column("link_transport", "is_copy", schema="store")
     op.drop_table("clock_uncertainty", schema="store")

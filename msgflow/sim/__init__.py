@@ -78,7 +78,8 @@ trace — one row per trace:
     host, pid (NULL: of all processes), path, clock_error_ns (what its time stamps are ahead of the
     times in these tables)
 unrecorded — one row per event of the layout that happened and is not in a trace:
-    host, pid, tid, event, ts_ns, cause ('late start', 'pause', 'loss', 'packets', 'truncation')
+    host, pid, tid, event, ts_ns, cause ('late start', 'pause', 'loss', 'packets',
+    'truncation', 'stop')
 executor_state — one row per executor event, lasting until the next one of the thread:
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
     'wait' for wait_for_work, 'execute' for execute)

@@ -19,6 +19,7 @@ from msgflow.sim.scenario import (
     reentrant,
     services,
     stamps,
+    starvation,
     traffic,
     transforms,
 )
@@ -42,6 +43,8 @@ def scenarios() -> Mapping[str, Scenario]:
         intra_process.mixed_intra_process(),
         delivery.overload(),
         delivery.losses(),
+        starvation.starved(),
+        starvation.overwritten_copies(),
         transforms.transforms(),
         services.services(),
         lives.restarts(),

@@ -97,13 +97,14 @@ def simulate(
     # Yet traces that differ in anything never pass for the same.
     course = f"{chosen.name}/{seed}"
     identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}/{clock_drift_ppm!r}"
+    length = int(chosen.duration_ns * factor)
     truth = Truth(target / "truth")
     for event in layouts()[chosen.layout].events:
         for field in event.fields or (None,):
             truth.declared.add(event.name, None if field is None else field.name)
     world = World(course, truth)
     machines = {
-        host.hostname: _machine(chosen, host, clock, target, identity, truth)
+        host.hostname: _machine(chosen, host, clock, target, identity, truth, length)
         for host, clock in zip(
             chosen.hosts, _clocks(chosen.hosts, clock_offset_ns, clock_drift_ppm), strict=True
         )
@@ -111,7 +112,7 @@ def simulate(
     middleware = Middleware(world, overwrites=chosen.overwrites, expected=_subscriptions(chosen))
     network = ServiceNetwork(world)
     processes = _start(chosen, world, machines, middleware, network, course)
-    world.run(int(chosen.duration_ns * factor), middleware.arrive)
+    world.run(length, middleware.arrive)
 
     for process in processes:
         for thread in process.threads:
@@ -237,6 +238,7 @@ def _machine(
     target: Path,
     identity_key: str,
     truth: Truth,
+    length: int,
 ) -> Machine:
     recording = host.recording or scenario.recording
     digest = sha256(f"{identity_key}/{host.hostname}".encode()).digest()
@@ -258,5 +260,6 @@ def _machine(
         recording,
         truth,
         clock,
+        length,
     )
     return Machine(host.hostname, clock, recorder, recording, host.stamp_resolution_ns)

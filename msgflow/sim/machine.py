@@ -153,6 +153,9 @@ class Thread:
 
         The one it had last is preferred.
         """
+        period, length = self.process.description.starved_ns
+        if length and (passed := time % period) >= period - length:
+            return time - passed + period
         free_at = self.machine.free_at
         cpu = self.cpu
         if self.world.random() < _MIGRATION:

@@ -40,6 +40,8 @@ _INITIALISATION = (
     "rclcpp_ipb_to_subscription",
 )
 
+_FOR_EVER = 1 << 62
+
 
 class Tracepoints:
     """The events as the simulation emits them, one attribute each.
@@ -86,7 +88,9 @@ class Recorder:
         recording: Recording,
         truth: Truth,
         clock: HostClock,
+        stop: int,
     ) -> None:
+        """Open the files; recording is asked to stop at time `stop`."""
         self.layout = layout
         self.cpu_count = cpu_count
         self.tracepoints = Tracepoints(layout)
@@ -95,6 +99,10 @@ class Recorder:
         self._recording = recording
         self._truth = truth
         self._clock = clock
+        self._stop = clock.elapsed(stop)
+        self._losses = tuple(
+            (clock.elapsed(begin), clock.elapsed(end)) for begin, end in recording.losses
+        )
         self._random = Random(str(identity.uuid))
         self._snapshot: TraceWriter | None = None
         self._writers: dict[int, TraceWriter] = {}
@@ -141,6 +149,10 @@ class Recorder:
         """Whether the packet that is now full is lost."""
         return self._random.random() < self._recording.lost_packet_share
 
+    def is_losing(self, time: int) -> bool:
+        """Whether what happens at `time` is lost."""
+        return any(begin <= time < end for begin, end in self._losses)
+
     def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
         """Write down an event that the trace should have and has not."""
         pid, tid, _ = thread_of(context)
@@ -165,6 +177,17 @@ class Recorder:
     def _emitter(self, cpu: int) -> Callable[..., None]:
         start = self._clock.elapsed(self._recording.start_ns)
         is_per_process = self._recording.buffers is Buffers.PER_PROCESS
+        absences: dict[int, tuple[tuple[int, int, str], ...]] = {}
+
+        def absence(context: bytes, time: int) -> str | None:
+            """Why the process is not recorded at `time`, though the session is."""
+            pid, _, _ = thread_of(context)
+            if pid not in absences:
+                absences[pid] = tuple(self._absences(pid))
+            for begin, end, cause in absences[pid]:
+                if begin <= time < end:
+                    return cause
+            return None
 
         def emit(tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
             if tracepoint.pack is None:
@@ -175,12 +198,28 @@ class Recorder:
                 else:
                     self.unrecorded(tracepoint, time, context, "late start")
                 return
+            if self._recording.handover_ns and (cause := absence(context, time)) is not None:
+                self.unrecorded(tracepoint, time, context, cause)
+                return
             pid, name = 0, ""
             if is_per_process:
                 pid, _, name = thread_of(context)
             self._writer(pid, name).streams[cpu].emit(tracepoint, time, context, *values)
 
         return emit
+
+    def _absences(self, pid: int) -> Iterator[tuple[int, int, str]]:
+        """When a process that is there all the time has not joined yet, or has left already."""
+        shown, recording = self._clock.elapsed, self._recording
+        random = Random(f"{self._identity.uuid}/{pid}")
+        if recording.start_ns:
+            start = shown(recording.start_ns)
+            yield start, start + int(random.random() * recording.handover_ns), "late start"
+        for pause in recording.pauses:
+            begin, end = (shown(time) for time in pause)
+            yield begin - int(random.random() * recording.handover_ns), begin, "pause"
+            yield end, end + int(random.random() * recording.handover_ns), "pause"
+        yield self._stop - int(random.random() * recording.handover_ns), _FOR_EVER, "stop"
 
     def _writer(self, pid: int, name: str) -> TraceWriter:
         """The trace of a process, or that of the user if `pid` is 0."""

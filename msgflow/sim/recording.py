@@ -27,6 +27,9 @@ class Recording:
         rotations: the trace is continued in a further chunk of the archive from these times on.
         missing_chunk: which chunk is not there, counted from 1 behind the first; 0: all are.
         buffers: one trace per user, or one per process.
+        handover_ns: the tracer tells one process after the other that recording starts or stops;
+            within this time after each start they join it, before each stop they leave it.
+        losses: all CPUs lose what happens between these times, and count it.
         clock_error_ns: the epoch offsets of the traces of one host differ by up to this much:
             those of processes, or that of the snapshot from that of the rest.
         lost_event_share: behind this share (0..1) of the packets, events are lost for a while.
@@ -45,6 +48,8 @@ class Recording:
     rotations: tuple[int, ...] = ()
     missing_chunk: int = 0
     buffers: Buffers = Buffers.PER_USER
+    handover_ns: int = 0
+    losses: tuple[tuple[int, int], ...] = ()
     clock_error_ns: int = 0
     lost_event_share: float = 0.0
     longest_loss: int = 200
@@ -62,7 +67,8 @@ class Recording:
             raise UsageError(
                 f"no clock runs {self.slew_ppm} ppm too fast", "give less than 1000 ppm"
             )
-        if min(self.start_ns, self.cut_streams, self.unfinished_streams, self.clock_error_ns) < 0:
+        amounts = (self.start_ns, self.cut_streams, self.unfinished_streams, self.clock_error_ns)
+        if min(*amounts, self.handover_ns) < 0:
             raise UsageError("a negative time or count makes no sense", "give 0 or more")
         if not 0 <= self.missing_chunk <= len(self.rotations):
             raise UsageError(
@@ -79,10 +85,11 @@ class Recording:
             )
 
     def _check_times(self) -> None:
-        if bad := [pause for pause in self.pauses if pause[0] >= pause[1]]:
-            raise UsageError(
-                f"a pause must end after it has begun — {bad[0]}", "give its begin first"
-            )
+        for name, stretches in (("pause", self.pauses), ("loss", self.losses)):
+            if bad := [stretch for stretch in stretches if stretch[0] >= stretch[1]]:
+                raise UsageError(
+                    f"a {name} must end after it has begun — {bad[0]}", "give its begin first"
+                )
         previous = self.start_ns
         for begin, end in sorted((*self.pauses, *((time, time) for time in self.rotations))):
             if begin <= previous:

@@ -104,6 +104,8 @@ class Process:
             so that another life of it may follow, at the same addresses.
         is_killed: it ends at once, in the middle of whatever it does.
         client_library: 'rclcpp' or 'rclpy', which has no events of its own.
+        starved_ns: period, and how long at its end none of its threads gets a CPU; one that runs
+            already goes on.
         threads_from: threads other than the main one have ids above this; the process id if None.
     """
 
@@ -116,6 +118,7 @@ class Process:
     stop_ns: int | None = None
     is_killed: bool = False
     client_library: str = "rclcpp"
+    starved_ns: tuple[int, int] = (0, 0)
     threads_from: int | None = None
 
     def tid(self, number: int) -> int:

@@ -54,8 +54,8 @@ def kind_of(directory: Path) -> MetadataKind:
     content = content_of(directory)
     if not content:
         raise TraceError(
-            f"the trace's `metadata` is empty, the recording did not get started — {directory}",
-            hint="record again, and stop the recording before copying it",
+            f"the trace's `metadata` is empty, nothing of it was written yet — {directory}",
+            hint="stop the recording (lttng stop), then copy it again",
         )
     order = BYTE_ORDER_OF_MAGIC.get(content[:4])
     if order is not None:

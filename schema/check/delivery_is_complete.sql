@@ -1,11 +1,12 @@
 -- name: check.delivery_is_complete
 -- description: Every take has a publication or a reason, and every message was taken by each
 --     subscription of its topic or has a reason: published times subscriptions is what was
---     delivered and what was not. Placeholders for readers of ring buffers do not count.
+--     delivered and what was not. Placeholders for readers of ring buffers do not count, nor
+--     do those that only get copies of what these carry.
 -- grain: one row per run and topic, or run, for which the sums differ
 -- severity: error
 -- needs: store.publication, store.publisher, store.subscription, store.link_transport,
---     store.undelivered, store.take, store.orphan_take
+--     store.undelivered, store.take, store.orphan_take, derive.copied_pair
 WITH published AS (
     SELECT p.run_id, p.topic_name, count(*) AS number
     FROM store.publication AS b
@@ -29,8 +30,19 @@ delivered AS (
     FROM store.link_transport AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     JOIN subscription AS s ON l.subscription_id = s.subscription_id
-    WHERE p.topic_name = s.topic_name
+    WHERE p.topic_name = s.topic_name AND l.is_copy IS NOT TRUE
     GROUP BY s.run_id, s.topic_name
+),
+not_judged AS (
+    SELECT p.run_id, p.topic_name, count(*) AS number
+    FROM derive.copied_pair AS c
+    JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
+    JOIN subscription AS s
+        ON c.subscription_id = s.subscription_id AND p.topic_name = s.topic_name
+    JOIN store.publication AS b ON c.publisher_id = b.publisher_id
+    ANTI JOIN (SELECT * FROM store.link_transport WHERE is_copy IS NOT TRUE) AS l
+        ON b.publication_id = l.publication_id AND c.subscription_id = l.subscription_id
+    GROUP BY p.run_id, p.topic_name
 ),
 undelivered AS (
     SELECT s.run_id, s.topic_name, count(*) AS number
@@ -47,13 +59,14 @@ linked AS (
 orphan AS (
     SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id
 )
-SELECT b.run_id, b.topic_name, b.number * s.number AS expected,
+SELECT b.run_id, b.topic_name, b.number * s.number - coalesce(n.number, 0) AS expected,
     coalesce(d.number, 0) + coalesce(u.number, 0) AS explained
 FROM published AS b
 JOIN subscribed AS s ON b.run_id = s.run_id AND b.topic_name = s.topic_name
 LEFT JOIN delivered AS d ON b.run_id = d.run_id AND b.topic_name = d.topic_name
 LEFT JOIN undelivered AS u ON b.run_id = u.run_id AND b.topic_name = u.topic_name
-WHERE b.number * s.number <> coalesce(d.number, 0) + coalesce(u.number, 0)
+LEFT JOIN not_judged AS n ON b.run_id = n.run_id AND b.topic_name = n.topic_name
+WHERE b.number * s.number - coalesce(n.number, 0) <> coalesce(d.number, 0) + coalesce(u.number, 0)
 UNION ALL
 SELECT t.run_id, NULL, t.number, coalesce(l.number, 0) + coalesce(o.number, 0)
 FROM taken AS t

@@ -56,7 +56,7 @@ UNION ALL
 SELECT DISTINCT run_id, 'orphan_take.reason', reason
 FROM store.orphan_take
 WHERE reason NOT IN (
-    'no_stamp', 'before_tracing', 'publisher_gap', 'publisher_trace_ends',
+    'no_stamp', 'receiver_gap', 'before_tracing', 'publisher_gap', 'publisher_trace_ends',
     'publisher_not_traced', 'ambiguous', 'unknown'
 )
 UNION ALL

@@ -1,8 +1,8 @@
 -- name: finding.message_without_stamp
 -- title: Messages cannot be followed, as they carry no stamp
 -- description: Messages were handed to subscriptions without a stamp that says which publication
---     they are. Their flows begin there, and of the publications of the topic it is not known
---     whether these subscriptions took them.
+--     they are, and no gap of the trace explains it. Their flows begin there, and of the
+--     publications of the topic it is not known whether these subscriptions took them.
 -- cause: Loaned messages, and messages inside of a process before Iron, reach callbacks without an
 --     event that tells of the message; or the events of taking (rmw_take) were not enabled.
 -- cure: Enable all events of ROS (ros2:*); record with loaning or intra-process communication off

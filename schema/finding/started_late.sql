@@ -2,15 +2,15 @@
 -- title: Tracing started after ROS
 -- description: Objects were used whose creation is not in the trace. They are placeholders without
 --     a name or with one deduced from messages, so that topics and nodes are missing in results.
---     Those of ROS itself do not count: /rosout is published on handles never initialised.
--- cause: The session was started after the nodes, or the events of initialisation were not enabled
---     or lost.
+--     Those of ROS itself do not count: /rosout is published on handles never initialised. Nor do
+--     processes whose events of initialisation may have been lost (initialisation_lost).
+-- cause: The session was started after the nodes, or the events of initialisation were not enabled.
 -- cure: Start the session first: ros2 trace, or the Trace action at the head of the launch file; or
 --     record initialisation into a snapshot session that runs all the time, and ingest both.
 -- grain: one row per process
 -- severity: warning
 -- needs: main.node, main.publisher, main.subscription, main.timer, main.service, main.client,
---     main.callback, main.process, main.host
+--     main.callback, main.process, main.host, derive.lossy_start
 WITH object AS (
     SELECT process_id, 'nodes' AS kind, is_inferred FROM main.node
     UNION ALL
@@ -41,5 +41,5 @@ SELECT
 FROM counted AS c
 JOIN main.process AS p ON c.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
-WHERE c.inferred > 0
+WHERE c.inferred > 0 AND p.process_id NOT IN (SELECT process_id FROM derive.lossy_start)
 GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname

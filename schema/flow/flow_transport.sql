@@ -1,10 +1,13 @@
 -- name: derive.flow_transport
 -- description: Messages handed over on the topics of the application, with both objects. ROS's own
---     topics and self loops are no part of a path.
+--     topics, self loops and copies that no callback gets are no part of a path.
 -- grain: one row per take whose publication is known
 -- needs: store.link_transport, store.publisher, store.subscription
 SELECT l.run_id, l.publication_id, l.publisher_id, l.take_id, l.subscription_id
 FROM store.link_transport AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
-WHERE NOT l.is_self_loop AND NOT p.is_internal AND NOT s.is_internal
+WHERE NOT l.is_self_loop
+    AND l.is_copy IS NOT TRUE
+    AND NOT p.is_internal
+    AND NOT s.is_internal

@@ -1,8 +1,8 @@
 -- name: derive.process_clock
--- description: How the times of each process are corrected.
+-- description: The clock of each process, and how its times are corrected.
 -- grain: one row per process
 -- needs: store.process, store.host, store.clock
-SELECT p.process_id, c.offset_ns, c.drift_ppb, c.reference_ns
+SELECT p.process_id, c.clock_id, c.offset_ns, c.drift_ppb, c.reference_ns
 FROM store.process AS p
 JOIN store.host AS h ON p.host_id = h.host_id
 JOIN store.clock AS c ON h.clock_id = c.clock_id

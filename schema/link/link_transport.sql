@@ -5,13 +5,15 @@
 --     through it. A link by equal stamps and topics with one candidate cannot be spoilt by lost
 --     events. Any other can: where a gap of the sender's trace lies between the publication and the
 --     take (on hosts with different clocks: within the publication), or a gap of the receiver's
---     trace likewise, the better candidate may be in it.
+--     trace likewise, the better candidate may be in it. What comes to a reader of ring buffers
+--     through the middleware as well, without a callback, is a copy that nobody gets; so it is with
+--     a placeholder, which nothing joins with the reader of the buffer.
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.recording_gap, derive.exposed_trace,
 --     store.publication, store.publisher, store.take, store.subscription, store.node,
---     store.process, store.host
+--     store.process, store.host, store.callback_instance
 CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
 WITH link AS (
     SELECT
@@ -71,6 +73,31 @@ exposed AS (
         ON u.recording_id = g.recording_id
         AND u.taken_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.received_from_ns
+),
+intra_process AS (
+    SELECT DISTINCT publisher_id
+    FROM store.publication
+    WHERE run_id = only_run AND intra_ns IS NOT NULL AND publisher_id IS NOT NULL
+),
+buffered AS (
+    SELECT DISTINCT subscription_id
+    FROM store.take
+    WHERE run_id = only_run AND method = 'ring_buffer' AND subscription_id IS NOT NULL
+),
+repeated AS (
+    SELECT l.take_id
+    FROM link AS l
+    JOIN intra_process AS i ON l.publisher_id = i.publisher_id
+    JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    JOIN store.subscription AS s
+        ON l.subscription_id = s.subscription_id AND p.process_id = s.process_id
+    LEFT JOIN buffered AS b ON l.subscription_id = b.subscription_id
+    WHERE l.method <> 'ring_buffer' AND (b.subscription_id IS NOT NULL OR s.is_inferred)
+),
+copy AS (
+    SELECT r.take_id
+    FROM repeated AS r
+    ANTI JOIN store.callback_instance AS c ON r.take_id = c.take_id
 )
 SELECT
     l.run_id,
@@ -88,10 +115,12 @@ SELECT
         ),
         false
     ) AS is_self_loop,
-    l.is_loss_affected OR x.take_id IS NOT NULL AS is_loss_affected
+    l.is_loss_affected OR x.take_id IS NOT NULL AS is_loss_affected,
+    c.take_id IS NOT NULL AS is_copy
 FROM link AS l
 LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 LEFT JOIN store.subscription AS s
     ON l.subscription_id = s.subscription_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
+LEFT JOIN copy AS c ON l.take_id = c.take_id

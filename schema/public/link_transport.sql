@@ -9,6 +9,7 @@
 -- column: candidate_count BIGINT  Publications that it could have been
 -- column: is_self_loop BOOLEAN  Received by the publishing node itself
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
+-- column: is_copy BOOLEAN  A ring buffer carries the same message: no callback gets this one
 -- column: latency_ns BIGINT [ns]  From the end of the publication to the take
 -- needs: store.link_transport, main.publication, main.take
 SELECT
@@ -19,6 +20,7 @@ SELECT
     l.candidate_count,
     l.is_self_loop,
     l.is_loss_affected,
+    l.is_copy,
     t.taken_ns - b.end_ns AS latency_ns
 FROM store.link_transport AS l
 JOIN main.publication AS b ON l.publication_id = b.publication_id

@@ -2,7 +2,8 @@
 -- description: What became of every message at every subscription of its topic. Whether a message
 --     was overwritten in the queue or lost on the way is told by the depth of the queue alone;
 --     incompatible QoS, lifespan and best effort do not show in a trace. Of a ring buffer whose
---     subscription was not traced there is only what was taken from it.
+--     subscription was not traced there is only what was taken from it. The copy by the middleware
+--     of what a ring buffer carries is no delivery: no callback gets it.
 -- grain: one row per publication and subscription of its topic
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: publication_id BIGINT  The message
@@ -24,7 +25,7 @@ SELECT
     'delivered' AS status,
     NULL::VARCHAR AS reason
 FROM store.link_transport
-WHERE subscription_id IS NOT NULL
+WHERE subscription_id IS NOT NULL AND is_copy IS NOT TRUE
 GROUP BY run_id, publication_id, subscription_id
 UNION ALL
 SELECT

@@ -4,8 +4,9 @@
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: take_id BIGINT  The take
 -- column: subscription_id BIGINT  Subscription that took it
--- column: reason VARCHAR  'no_stamp', 'before_tracing', 'publisher_gap', 'publisher_trace_ends',
---     'publisher_not_traced', 'ambiguous' or 'unknown', the first that holds
+-- column: reason VARCHAR  'no_stamp', 'receiver_gap' (the event with the stamp was lost),
+--     'before_tracing', 'publisher_gap', 'publisher_trace_ends', 'publisher_not_traced',
+--     'ambiguous' or 'unknown', the first that holds
 -- needs: store.orphan_take
 SELECT run_id, take_id, subscription_id, reason
 FROM store.orphan_take

@@ -28,7 +28,7 @@ sent AS (
 )
 SELECT
     run_id, publication_id, publisher_id, topic_name, source_timestamp_ns, clock_id,
-    end_ns AS arrival_ns
+    end_ns AS arrival_ns, true AS has_one_clock
 FROM sent
 WHERE from_clock_id = clock_id
 UNION ALL
@@ -43,7 +43,8 @@ SELECT
                 o.offset_ns, o.drift_ppb, o.reference_ns
             )
         END
-    )
+    ),
+    false
 FROM (SELECT * FROM sent WHERE from_clock_id <> clock_id) AS s
 ASOF LEFT JOIN derive.clock_shift AS c
     ON s.run_id = c.run_id

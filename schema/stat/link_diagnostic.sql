@@ -21,6 +21,7 @@ by_topic AS (
 latency AS (
     SELECT
         l.run_id,
+        bc.clock_id = tc.clock_id AS has_one_clock,
         derive.corrected_ns(t.taken_ns, tc.offset_ns, tc.drift_ppb, tc.reference_ns)
         - derive.corrected_ns(b.end_ns, bc.offset_ns, bc.drift_ppb, bc.reference_ns)
             AS latency_ns
@@ -71,7 +72,22 @@ SELECT
         END
     )
 FROM latency
-WHERE latency_ns < 0
+WHERE latency_ns < 0 AND NOT has_one_clock
+GROUP BY run_id
+UNION ALL
+SELECT
+    run_id,
+    NULL,
+    'early_take',
+    'info',
+    count(*),
+    printf(
+        'messages that were received up to %.3f ms before the call of publish() returned, on the '
+        || 'same clock: latency counts from the last event of the call, and is negative for them',
+        -min(latency_ns) / 1e6
+    )
+FROM latency
+WHERE latency_ns < 0 AND has_one_clock
 GROUP BY run_id
 UNION ALL
 SELECT

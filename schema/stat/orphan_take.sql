@@ -2,23 +2,38 @@
 -- kind: macro
 -- description: Why the publication of a take is not known; the first reason that holds. The stamp
 --     is compared on the host of each process that could have sent it: those with a publisher of
---     the topic, or with any where the topic is not known.
+--     the topic (known senders), those with one whose topic is not known or of which initialisation
+--     is missing (possible senders), and all with any publisher where the topic is not known. What
+--     comes out of a ring buffer has no stamp: it was put in after the message before it, which
+--     came from there.
 -- grain: one row per take whose publication is not known
--- needs: store.take, store.link_transport, store.subscription, store.publisher,
+-- needs: store.take, store.link_transport, store.subscription, store.publisher, store.node,
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
---     derive.take_candidate, store.nearest_message
+--     derive.process_presence, derive.take_candidate, store.nearest_message
 CREATE OR REPLACE MACRO derive.orphan_take(of_run) AS TABLE
 WITH orphan AS MATERIALIZED (
-    SELECT t.take_id, t.subscription_id, t.source_timestamp_ns AS stamp_ns, s.topic_name
+    SELECT
+        t.take_id, t.subscription_id, t.process_id, t.method, t.taken_ns, t.is_loss_affected,
+        t.source_timestamp_ns AS stamp_ns, s.topic_name, s.created_ns
     FROM (SELECT * FROM store.take WHERE run_id = of_run) AS t
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
 ),
-host_begin AS (
-    SELECT host_id, min(start_ns) AS begin_ns
+presence AS MATERIALIZED (
+    SELECT process_id, min(begin_ns) AS begin_ns, min(recorded_from_ns) AS recorded_from_ns
+    FROM derive.process_presence
+    WHERE run_id = of_run AND EXISTS (SELECT 1 FROM orphan)
+    GROUP BY process_id
+),
+gap AS MATERIALIZED (
+    SELECT process_id, start_ns, covered_until_ns
+    FROM derive.process_gap
+    WHERE run_id = of_run AND EXISTS (SELECT 1 FROM orphan)
+),
+run_begin AS (
+    SELECT min(start_ns) AS begin_ns
     FROM store.trace
     WHERE run_id = of_run AND domain IS DISTINCT FROM 'kernel'
-    GROUP BY host_id
 ),
 stampless AS (
     SELECT process_id
@@ -33,26 +48,55 @@ sending AS (
     WHERE run_id = of_run
     GROUP BY topic_name, process_id
 ),
+-- Processes that may have publishers of which the trace does not say the topic.
+incomplete AS (
+    SELECT process_id FROM sending WHERE topic_name IS NULL
+    UNION
+    SELECT process_id
+    FROM store.publisher
+    WHERE run_id = of_run AND is_inferred AND NOT coalesce(is_internal, false)
+    UNION
+    SELECT process_id
+    FROM store.subscription
+    WHERE run_id = of_run AND is_inferred AND NOT coalesce(is_internal, false)
+    UNION
+    SELECT process_id FROM store.node WHERE run_id = of_run AND is_inferred
+),
+topic AS (
+    SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL
+),
+candidate AS (
+    SELECT topic_name, process_id, created_ns, true AS is_known
+    FROM sending
+    WHERE topic_name IS NOT NULL
+    UNION ALL
+    SELECT t.topic_name, i.process_id, 0, false
+    FROM topic AS t
+    CROSS JOIN incomplete AS i
+    WHERE (t.topic_name, i.process_id) NOT IN (
+        SELECT (topic_name, process_id) FROM sending WHERE topic_name IS NOT NULL
+    )
+    UNION ALL
+    SELECT NULL, process_id, min(created_ns), true
+    FROM sending
+    GROUP BY process_id
+),
 sender AS (
     SELECT
-        s.topic_name, s.process_id, s.created_ns, p.host_id, p.last_seen_ns, h.begin_ns,
-        s.process_id IN (SELECT process_id FROM stampless) AS is_stampless
-    FROM (
-        SELECT topic_name, process_id, created_ns
-        FROM sending
-        WHERE topic_name IS NOT NULL
-        UNION ALL
-        SELECT NULL, process_id, min(created_ns)
-        FROM sending
-        GROUP BY process_id
-    ) AS s
-    JOIN store.process AS p ON s.process_id = p.process_id
-    LEFT JOIN host_begin AS h ON p.host_id = h.host_id
+        c.topic_name, c.process_id, c.created_ns, c.is_known, p.host_id, p.last_seen_ns,
+        coalesce(r.begin_ns, p.first_seen_ns) AS begin_ns,
+        coalesce(r.recorded_from_ns, p.first_seen_ns) AS recorded_from_ns,
+        c.process_id IN (SELECT process_id FROM stampless) AS is_stampless
+    FROM candidate AS c
+    JOIN store.process AS p ON c.process_id = p.process_id
+    LEFT JOIN presence AS r ON c.process_id = r.process_id
 ),
--- Each stamp on the host of each process that could have sent it.
+-- Each stamp on the host of each process that could have sent it. A publisher that was created
+-- later, as the trace shows, could not.
 sent AS (
     SELECT
-        o.take_id, s.process_id, s.created_ns, s.last_seen_ns, s.begin_ns, s.is_stampless,
+        o.take_id, s.process_id, s.created_ns, s.last_seen_ns, s.recorded_from_ns, s.is_known,
+        s.is_stampless,
         o.stamp_ns + coalesce(h.shift_ns, 0) AS at_ns,
         o.stamp_ns + coalesce(h.shift_ns, 0) + 1_000_000 AS until_ns
     FROM orphan AS o
@@ -60,29 +104,69 @@ sent AS (
     ASOF LEFT JOIN (SELECT * FROM derive.stamp_shift WHERE run_id = of_run) AS h
         ON s.host_id = h.host_id AND o.stamp_ns >= h.from_ns
     WHERE o.stamp_ns IS NOT NULL
+        AND (
+            s.created_ns < s.begin_ns
+            OR s.created_ns <= o.stamp_ns + coalesce(h.shift_ns, 0) + 1_000_000
+        )
 ),
 judged AS (
     SELECT
         s.take_id,
-        bool_and(s.at_ns < s.begin_ns) AS is_before_tracing,
+        coalesce(
+            bool_and(s.at_ns < s.recorded_from_ns) FILTER (WHERE s.is_known),
+            bool_and(s.at_ns < s.recorded_from_ns)
+        ) AS is_before_tracing,
         bool_or(coalesce(g.covered_until_ns >= s.at_ns - 1_000_000, false)) AS has_gap,
-        bool_and(s.last_seen_ns < s.at_ns) AS has_none_left,
-        bool_or(s.last_seen_ns < s.at_ns) AS has_ended,
+        coalesce(
+            bool_and(s.last_seen_ns < s.at_ns) FILTER (WHERE s.is_known),
+            bool_and(s.last_seen_ns < s.at_ns)
+        ) AS has_none_left,
+        bool_or(s.last_seen_ns < s.at_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
         bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless
     FROM sent AS s
-    ASOF LEFT JOIN (SELECT * FROM derive.process_gap WHERE run_id = of_run) AS g
-        ON s.process_id = g.process_id AND s.until_ns >= g.start_ns
+    ASOF LEFT JOIN gap AS g ON s.process_id = g.process_id AND s.until_ns >= g.start_ns
     GROUP BY s.take_id
+),
+-- Messages leave a buffer in the order in which they came: the time in which each was put in.
+passed AS (
+    SELECT l.subscription_id, t.taken_ns, b.end_ns
+    FROM store.link_transport AS l
+    JOIN store.take AS t ON l.take_id = t.take_id
+    JOIN store.publication AS b ON l.publication_id = b.publication_id
+    WHERE l.run_id = of_run
+        AND l.method = 'ring_buffer'
+        AND l.subscription_id IN (SELECT subscription_id FROM orphan WHERE method = 'ring_buffer')
+),
+buffered AS (
+    SELECT
+        o.take_id, o.process_id, o.taken_ns, p.recorded_from_ns,
+        coalesce(b.end_ns, o.created_ns, 0) AS since_ns
+    FROM orphan AS o
+    LEFT JOIN presence AS p ON o.process_id = p.process_id
+    ASOF LEFT JOIN passed AS b
+        ON o.subscription_id = b.subscription_id AND o.taken_ns > b.taken_ns
+    WHERE o.method = 'ring_buffer'
+),
+kept AS (
+    SELECT
+        b.take_id,
+        b.since_ns < b.recorded_from_ns AS is_before_tracing,
+        g.covered_until_ns >= b.since_ns AS has_gap
+    FROM buffered AS b
+    ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id AND b.taken_ns >= g.start_ns
 )
 SELECT
     of_run::BIGINT AS run_id,
     o.take_id,
     o.subscription_id,
     CASE
+        WHEN k.has_gap THEN 'publisher_gap'
+        WHEN k.is_before_tracing THEN 'before_tracing'
+        WHEN o.stamp_ns IS NULL AND o.method <> 'ring_buffer' AND o.is_loss_affected
+            THEN 'receiver_gap'
         WHEN o.stamp_ns IS NULL THEN 'no_stamp'
-        WHEN coalesce(
-            j.is_before_tracing, o.stamp_ns < (SELECT min(begin_ns) FROM host_begin)
-        ) THEN 'before_tracing'
+        WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))
+            THEN 'before_tracing'
         WHEN j.has_gap THEN 'publisher_gap'
         WHEN j.has_none_left THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
@@ -92,9 +176,10 @@ SELECT
             FROM store.nearest_message
             WHERE run_id = of_run AND publication_id IS NULL
         ) THEN 'ambiguous'
-        WHEN j.take_id IS NULL OR NOT (j.has_ended OR j.has_stampless)
+        WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)
             THEN 'publisher_not_traced'
         ELSE 'unknown'
     END AS reason
 FROM orphan AS o
 LEFT JOIN judged AS j ON o.take_id = j.take_id
+LEFT JOIN kept AS k ON o.take_id = k.take_id

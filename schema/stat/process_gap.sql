@@ -1,27 +1,91 @@
 -- name: derive.process_gap
--- description: Gaps of the traces that each process was recorded in, for ASOF joins as with
---     derive.recording_gap.
--- grain: one row per process and gap in one of its traces
--- needs: store.publication, store.take, store.callback_instance, derive.recording_gap,
---     derive.exposed_trace
-WITH process_recording AS (
-    SELECT DISTINCT i.run_id, i.process_id, x.recording_id
-    FROM (
-        SELECT run_id, process_id, trace_id FROM store.publication
-        UNION ALL
-        SELECT run_id, process_id, trace_id FROM store.take
-        UNION ALL
-        SELECT run_id, process_id, trace_id FROM store.callback_instance
-    ) AS i
-    JOIN derive.exposed_trace AS x ON i.trace_id = x.trace_id
+-- description: When each process may have done something that is not in its traces, for ASOF joins
+--     as with derive.recording_gap: gaps of its recordings; the time before its first event, if it
+--     existed before; and between two recordings. The tracer tells one process after the other to
+--     stop and to go on, so that a pause lasts from the last event of the process before it to the
+--     first one after it.
+-- grain: one row per process and gap
+-- needs: derive.process_presence, store.loss_interval, store.trace, store.publication, store.take,
+--     store.callback_instance, store.executor_state, store.thread
+WITH recording AS (
+    SELECT
+        run_id, trace_id,
+        min(trace_id) OVER (PARTITION BY run_id, coalesce(uuid, path)) AS recording_id
+    FROM store.trace
+),
+presence AS MATERIALIZED (
+    SELECT run_id, process_id, recording_id, begin_ns, end_ns, first_ns, last_ns, is_born
+    FROM derive.process_presence
+),
+interval_of_process AS MATERIALIZED (
+    SELECT p.run_id, p.process_id, l.kind, l.start_ns, l.end_ns
+    FROM store.loss_interval AS l
+    JOIN recording AS r ON l.trace_id = r.trace_id
+    JOIN presence AS p ON r.recording_id = p.recording_id
+),
+pause AS MATERIALIZED (
+    SELECT run_id, process_id, start_ns, end_ns FROM interval_of_process WHERE kind = 'pause'
+),
+-- What the paused processes did, where there are any.
+moment AS (
+    SELECT process_id, start_ns AS at_ns FROM store.publication
+    UNION ALL
+    SELECT process_id, end_ns FROM store.publication
+    UNION ALL
+    SELECT process_id, taken_ns FROM store.take
+    UNION ALL
+    SELECT process_id, start_ns FROM store.callback_instance
+    UNION ALL
+    SELECT process_id, end_ns FROM store.callback_instance
+    UNION ALL
+    SELECT t.process_id, s.start_ns
+    FROM store.executor_state AS s
+    JOIN store.thread AS t ON s.thread_id = t.thread_id
+),
+active AS MATERIALIZED (
+    SELECT process_id, at_ns
+    FROM moment
+    WHERE process_id IN (SELECT process_id FROM pause) AND at_ns IS NOT NULL
+),
+absence AS (
+    SELECT
+        p.run_id,
+        p.process_id,
+        coalesce(b.at_ns, p.start_ns) AS start_ns,
+        coalesce(a.at_ns, p.end_ns) AS end_ns
+    FROM pause AS p
+    ASOF LEFT JOIN active AS b ON p.process_id = b.process_id AND p.start_ns >= b.at_ns
+    ASOF LEFT JOIN active AS a ON p.process_id = a.process_id AND p.end_ns <= a.at_ns
+),
+following AS (
+    SELECT
+        run_id, process_id, begin_ns, first_ns, is_born,
+        max(end_ns) OVER earlier AS previous_end_ns,
+        max(last_ns) OVER earlier AS previous_last_ns
+    FROM presence
+    WINDOW earlier AS (
+        PARTITION BY run_id, process_id ORDER BY begin_ns, recording_id
+        ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+    )
+),
+gap AS (
+    SELECT run_id, process_id, start_ns, end_ns FROM interval_of_process WHERE kind <> 'pause'
+    UNION ALL
+    SELECT run_id, process_id, start_ns, end_ns FROM absence
+    UNION ALL
+    SELECT run_id, process_id, begin_ns, first_ns - 1
+    FROM following
+    WHERE previous_end_ns IS NULL AND NOT is_born
+    UNION ALL
+    SELECT run_id, process_id, previous_last_ns, first_ns
+    FROM following
+    WHERE begin_ns > previous_end_ns
 )
 SELECT
-    p.run_id,
-    p.process_id,
-    g.start_ns,
-    max(g.covered_until_ns) OVER (
-        PARTITION BY p.run_id, p.process_id ORDER BY g.start_ns, g.covered_until_ns
-        ROWS UNBOUNDED PRECEDING
+    run_id,
+    process_id,
+    start_ns,
+    max(end_ns) OVER (
+        PARTITION BY run_id, process_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
     ) AS covered_until_ns
-FROM process_recording AS p
-JOIN derive.recording_gap AS g ON p.recording_id = g.recording_id
+FROM gap

@@ -3,17 +3,19 @@
 -- description: Why a subscription did not take a message of its topic; the first reason that holds.
 --     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
 --     message in the queue would have ended it. A wait tells only where a single thread reads, and
---     only if it lasted ten times as long as messages usually need, at least a millisecond.
+--     only if it lasted ten times as long as messages usually need, at least a millisecond. A
+--     reader that gets no CPU seems to wait, too.
 --     `overwritten` and `lost_in_transport` are told apart by the depth of the queue alone. Where
 --     the subscription took a message in that time that could not be identified, nothing is said;
 --     nor that messages were overwritten where it took none of the publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
--- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap,
---     store.link_transport, store.take, derive.vain_take, store.executor_state
+-- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap, store.publisher,
+--     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state
 CREATE OR REPLACE MACRO derive.undelivered(of_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
-        publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns
+        publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
+        has_one_clock
     FROM derive.expected_arrival
     WHERE run_id = of_run
 ),
@@ -27,17 +29,24 @@ life AS MATERIALIZED (
 link AS (
     SELECT publication_id, publisher_id, subscription_id, min(take_id) AS take_id
     FROM store.link_transport
-    WHERE run_id = of_run AND subscription_id IS NOT NULL
+    WHERE run_id = of_run AND subscription_id IS NOT NULL AND is_copy IS NOT TRUE
     GROUP BY publication_id, publisher_id, subscription_id
 ),
 missing AS MATERIALIZED (
     SELECT
         a.publication_id, a.publisher_id, s.subscription_id, a.topic_name, a.clock_id,
-        a.arrival_ns, a.source_timestamp_ns IS NULL AS has_no_stamp
+        a.arrival_ns, a.has_one_clock, a.source_timestamp_ns IS NULL AS has_no_stamp
     FROM arrival AS a
     JOIN life AS s ON a.topic_name = s.topic_name AND a.clock_id = s.clock_id
     ANTI JOIN link AS l
         ON a.publication_id = l.publication_id AND s.subscription_id = l.subscription_id
+    ANTI JOIN derive.copied_pair AS c
+        ON a.publisher_id = c.publisher_id AND s.subscription_id = c.subscription_id
+),
+gap AS MATERIALIZED (
+    SELECT process_id, start_ns, covered_until_ns
+    FROM derive.process_gap
+    WHERE run_id = of_run AND EXISTS (SELECT 1 FROM missing)
 ),
 -- The order of messages, where any is missing.
 ordered AS MATERIALIZED (
@@ -61,6 +70,7 @@ pace AS (
     SELECT
         subscription_id,
         greatest(max(taken_ns - arrival_ns), 10_000_000) AS longest_ns,
+        quantile_disc(taken_ns - arrival_ns, 0.5) AS usual_ns,
         greatest(10 * quantile_disc(taken_ns - arrival_ns, 0.5), 1_000_000) AS patience_ns
     FROM delivered
     GROUP BY subscription_id
@@ -112,12 +122,20 @@ known AS (
         s.last_seen_ns, s.replaced_ns, s.host_end_ns,
         coalesce(c.longest_ns, 10_000_000) AS longest_ns,
         coalesce(c.patience_ns, 10_000_000) AS patience_ns,
+        c.usual_ns,
         p.taken_ns AS publisher_taken_ns,
         n.taken_ns AS any_taken_ns,
+        n.arrival_ns AS next_arrival_ns,
         e.arrival_ns > m.arrival_ns AS is_before_first,
+        -- From when on the two could know each other: neither would have had to before.
+        greatest(
+            coalesce(s.created_ns, 0),
+            CASE WHEN m.has_one_clock THEN coalesce(b.created_ns, 0) ELSE 0 END
+        ) AS introduced_ns,
         e.arrival_ns IS NOT NULL AS is_connected
     FROM missing AS m
     JOIN life AS s ON m.subscription_id = s.subscription_id
+    JOIN store.publisher AS b ON m.publisher_id = b.publisher_id
     LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
     LEFT JOIN earliest AS e
         ON m.subscription_id = e.subscription_id AND m.publisher_id = e.publisher_id
@@ -128,27 +146,45 @@ known AS (
     ASOF LEFT JOIN later_of_any AS n
         ON m.subscription_id = n.subscription_id AND m.arrival_ns < n.arrival_ns
 ),
--- When it was certain that the message is not in the queue: the reader waited for long.
-decided AS (
+-- When it was certain that the message is not in the queue: the reader waited for long, after the
+-- message had arrived and before the next one that was taken did. That tells nothing where the
+-- reader may have been kept from the CPU: it took that one late, or as many are missing in a row
+-- as its queue holds.
+waiting AS (
     SELECT
         k.*,
-        CASE
-            WHEN w.end_ns IS NOT NULL
-                AND greatest(w.start_ns, k.arrival_ns) + k.patience_ns
-                <= coalesce(k.any_taken_ns, w.end_ns)
-                THEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns
-        END AS waited_ns
+        CASE WHEN w.end_ns IS NOT NULL THEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns END
+            AS due_by_ns,
+        least(w.end_ns, k.any_taken_ns, k.next_arrival_ns) AS waits_until_ns,
+        k.next_arrival_ns < w.end_ns
+        AND k.any_taken_ns >= w.end_ns
+        AND (
+            w.end_ns - greatest(w.start_ns, k.next_arrival_ns) > 10 * k.usual_ns
+            OR k.row_length >= greatest(k.queue_depth, 2)
+        ) AS is_starved
     FROM (
-        SELECT *, arrival_ns + patience_ns AS due_ns FROM known
+        SELECT
+            *,
+            arrival_ns + patience_ns AS due_ns,
+            count(*) OVER (PARTITION BY subscription_id, next_arrival_ns) AS row_length
+        FROM known
     ) AS k
     ASOF LEFT JOIN long_wait AS w
         ON k.subscription_id = w.subscription_id AND k.due_ns <= w.end_ns
+),
+decided AS (
+    SELECT
+        *,
+        CASE WHEN due_by_ns <= waits_until_ns AND is_starved IS NOT TRUE THEN due_by_ns END
+            AS waited_ns
+    FROM waiting
 ),
 bounded AS (
     SELECT
         *,
         coalesce(
-            least(publisher_taken_ns, waited_ns), least(last_seen_ns, replaced_ns)
+            least(publisher_taken_ns, waited_ns),
+            least(greatest(arrival_ns, last_seen_ns) + longest_ns, replaced_ns)
         ) AS until_ns,
         coalesce(any_taken_ns, least(last_seen_ns, replaced_ns)) AS gone_ns,
         min(CASE WHEN arrival_ns > last_seen_ns THEN arrival_ns END) OVER (
@@ -160,13 +196,14 @@ facts AS (
     SELECT
         b.*,
         g.covered_until_ns >= b.arrival_ns AS has_gap,
+        i.covered_until_ns >= b.introduced_ns AS has_earlier_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
         u.taken_ns <= coalesce(b.waited_ns, b.gone_ns) AS has_unidentified_take,
         q.position - o.position AS newer_count
     FROM bounded AS b
     JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id
-    ASOF LEFT JOIN (SELECT * FROM derive.process_gap WHERE run_id = of_run) AS g
-        ON b.process_id = g.process_id AND b.until_ns >= g.start_ns
+    ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id AND b.until_ns >= g.start_ns
+    ASOF LEFT JOIN gap AS i ON b.process_id = i.process_id AND b.arrival_ns >= i.start_ns
     ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = of_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
@@ -194,11 +231,12 @@ SELECT
         WHEN arrival_ns IS NULL THEN 'unknown'
         WHEN created_ns > arrival_ns THEN 'before_subscription'
         WHEN replaced_ns < arrival_ns THEN 'subscription_ended'
+        WHEN has_gap THEN 'receiver_gap'
         WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
             THEN 'subscription_ended'
-        WHEN has_gap THEN 'receiver_gap'
         WHEN has_failed_take THEN 'take_failed'
         WHEN has_unidentified_take THEN 'unknown'
+        WHEN is_before_first AND has_earlier_gap THEN 'unknown'
         WHEN is_before_first THEN 'before_discovery'
         WHEN waited_ns IS NOT NULL THEN 'not_delivered'
         WHEN newer_count >= queue_depth AND (is_connected OR any_taken_ns IS NOT NULL)

@@ -106,6 +106,21 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             )
         ],
     ),
+    "initialisation_lost": (
+        {
+            # process 2 was seen before anything was lost, 3 in a trace without losses
+            "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n1,1,talker,10,90\n"
+            "2,2,early,2,90\n3,3,late,10,90\n",
+            "trace": "trace_id,path,start_ns,end_ns\n1,lossy,0,100\n2,whole,0,100\n",
+            "publisher": "publisher_id,process_id,is_inferred,is_internal\n"
+            "1,1,true,false\n2,2,true,false\n3,3,true,false\n",
+            "node": "node_id,process_id,is_inferred\n1,1,false\n2,2,false\n3,3,false\n",
+            "loss_interval": "trace_id,kind,cpu,start_ns,end_ns\n1,loss,0,5,6\n",
+            "callback_instance": "callback_instance_id,process_id,trace_id,start_ns,end_ns\n"
+            "1,1,1,20,30\n2,2,1,3,4\n3,3,2,20,30\n",
+        },
+        [("talker 1 on host", 1, "not seen to be created: 1 of 1 publishers")],
+    ),
     "uncertain_owner": (
         {
             "diagnostic": "name,severity,count,detail\n"

@@ -374,3 +374,240 @@ def test_every_take_and_message_is_accounted_for(pair: Pair, analyse: Analyse) -
         "SELECT (SELECT count(*) FROM take) = (SELECT count(DISTINCT take_id) FROM "
         "link_transport) + (SELECT count(*) FROM stat_orphan)"
     )
+
+
+def test_a_gap_goes_before_the_end_of_a_process(pair: Pair, analyse: Analyse) -> None:
+    """What came into the gap may have been taken there; what came long after it was not."""
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.lose()
+    pair.wait(50 * MS)
+    pair.send(3)
+    pair.wait(50 * MS)
+    pair.send(4)
+    assert reasons(analyse(pair)) == {
+        1: None,
+        2: "receiver_gap",
+        3: "subscription_ended",
+        4: "subscription_ended",
+    }
+
+
+def test_a_gap_goes_before_a_failed_take(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.lose()
+    pair.wait(100)
+    pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
+    pair.send(3)
+    pair.hear(3)
+    assert reasons(analyse(pair)) == {1: None, 2: "receiver_gap", 3: None}
+
+
+def test_a_failed_take_goes_before_what_cannot_be_identified(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
+    pair.start(LISTENER, 0xC2)
+    pair.end(LISTENER, 0xC2)
+    pair.send(3)
+    pair.hear(3)
+    assert reasons(analyse(pair)) == {1: None, 2: "take_failed", 3: None}
+
+
+def test_what_cannot_be_identified_goes_before_discovery(pair: Pair, analyse: Analyse) -> None:
+    """The callback may have been handed the message."""
+    pair.create()
+    pair.send(1)
+    pair.start(LISTENER, 0xC2)
+    pair.end(LISTENER, 0xC2)
+    pair.send(2)
+    pair.hear(2)
+    assert reasons(analyse(pair)) == {1: "unknown", 2: None}
+
+
+def test_discovery_goes_before_waiting(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.idle(LISTENER)
+    pair.send(1)
+    pair.wait(20 * MS)
+    pair.send(2)
+    pair.hear(2)
+    pair.go_on()
+    assert reasons(analyse(pair)) == {1: "before_discovery", 2: None}
+
+
+def test_a_gap_may_hide_that_the_two_knew_each_other(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.send(1)
+    pair.add_packet(1_000, pair._now)
+    pair.lose()
+    pair.wait(100)
+    pair.ready(LISTENER)
+    pair.send(2)
+    pair.send(3)
+    pair.hear(3)
+    assert reasons(analyse(pair)) == {1: "receiver_gap", 2: "unknown", 3: None}
+
+
+@pytest.mark.parametrize(("late_ns", "reason"), [(300, "not_delivered"), (310, "overwritten")])
+def test_a_reader_that_gets_no_cpu_seems_to_wait(
+    pair: Pair, analyse: Analyse, late_ns: int, reason: str
+) -> None:
+    """What it takes after the wait had been there for long: the wait says nothing of its queue.
+
+    The usual delay is 30 ns here.
+    """
+    pair.create(depth=1)
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.wait(20 * MS)
+    pair.send(3)
+    pair.wait(late_ns - 10)
+    pair.hear(3)
+    pair.go_on()
+    assert reasons(analyse(pair)) == {1: None, 2: reason, 3: None}
+
+
+@pytest.mark.parametrize(
+    ("depth", "expected"),
+    [(3, ["not_delivered"] * 2), (2, ["overwritten", "lost_in_transport"])],
+)
+def test_as_many_in_a_row_as_the_queue_holds(
+    pair: Pair, analyse: Analyse, depth: int, expected: list[str]
+) -> None:
+    """The reader may have got no CPU while they came, though it took the next one at once."""
+    pair.create(depth=depth)
+    pair.send(1)
+    pair.hear(1)
+    pair.send(2)
+    pair.wait(5 * MS)
+    pair.send(3)
+    pair.wait(5 * MS)
+    pair.send(4)
+    pair.hear(4)
+    pair.go_on()
+    found = reasons(analyse(pair))
+    assert [found[2], found[3]] == expected
+
+
+class Dual(Pair):
+    """A session has the initialisation, another one starts later and has the rest."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.add_source(1, "alpha", "boot")
+        self.talker, self.listener = Thread(100, trace=1), Thread(200, trace=1)
+        self.create()
+        self.wait(MS)
+
+
+def test_before_the_receiver_is_recorded(analyse: Analyse) -> None:
+    """The second session reaches the talker first: that the message was taken does not show."""
+    dual = Dual()
+    dual.publish(dual.talker, 0x10, 1)
+    dual.publish(dual.talker, 0x10, 2)
+    dual.take(dual.listener, 0x30, 2)
+    assert reasons(analyse(dual)) == {1: "receiver_gap", 2: None}
+
+
+def test_before_the_sender_is_recorded(analyse: Analyse) -> None:
+    """The other way round: what was on its way then was stamped before the tracing of its sender.
+
+    Though the trace of the initialisation begins earlier.
+    """
+    dual = Dual()
+    dual.ready(dual.listener)
+    dual.wait(20)
+    stamp = dual._now
+    dual.take(dual.listener, 0x30, stamp)
+    dual.wait(MS)
+    dual.publish(dual.talker, 0x10, dual._now)
+    assert analyse(dual).rows(ORPHANS) == [(stamp, "before_tracing")]
+
+
+def paused(pair: Pair, begin: int, end: int) -> None:
+    """All streams of the trace are silent from `begin` to `end`."""
+    pair.add_packet(1_000, begin)
+    pair.add_packet(end, pair._now)
+
+
+def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse: Analyse) -> None:
+    """The talker was told to stop first: what it sent then is not in the trace."""
+    pair.create()
+    stamped(pair)
+    pair.wait(5 * MS)
+    stamp = pair._now
+    pair.wait(5 * MS)
+    pair.hear(stamp)
+    begin = pair._now
+    pair.wait(10 * MS)
+    end = pair._now
+    pair.ready(LISTENER)
+    pair.wait(5 * MS)
+    later = pair._now
+    pair.wait(5 * MS)
+    pair.hear(later)
+    stamped(pair)
+    paused(pair, begin, end)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_gap"), (later, "publisher_gap")]
+
+
+def test_a_publisher_without_a_topic_may_be_the_sender(pair: Pair, analyse: Analyse) -> None:
+    """Its initialisation was lost, and what it published in the gap as well."""
+    pair.create()
+    pair.publish(OTHER, 0x77, 3)
+    stamped(pair)
+    pair.add_source(1, "alpha", "boot")
+    pair.publish(Thread(300, trace=1), 0x77, 4)
+    pair.lose(trace=1)
+    stamp = pair._now + 1
+    pair.wait(MS)
+    pair.hear(stamp)
+    pair.publish(Thread(300, trace=1), 0x77, 5)
+    stamped(pair)
+    assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
+
+
+def test_a_publisher_without_a_topic_that_was_recorded_is_not(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    pair.publish(OTHER, 0x77, 3)
+    stamped(pair)
+    pair.wait(5 * MS)
+    stamp = pair._now + 5
+    pair.hear(stamp)
+    pair.wait(5 * MS)
+    pair.publish(OTHER, 0x77, 4)
+    stamped(pair)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
+
+
+def test_a_publisher_that_was_created_later_is_not(pair: Pair, analyse: Analyse) -> None:
+    """Of those that there were, all had ended."""
+    pair.create()
+    stamped(pair)
+    pair.wait(20 * MS)
+    stamp = pair._now
+    pair.hear(stamp)
+    pair.wait(20 * MS)
+    pair.publisher(OTHER, 0x10, "/a")
+    pair.publish(OTHER, 0x10, pair._now)
+    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_trace_ends")]
+
+
+def test_the_event_with_the_stamp_was_lost(pair: Pair, analyse: Analyse) -> None:
+    pair.create()
+    stamped(pair)
+    pair.lose()
+    pair.wait(100)
+    pair.take(LISTENER, 0x30, 0, layers="rcl rclcpp")
+    pair.wait(100)
+    pair.take(LISTENER, 0x30, 0, layers="rcl rclcpp")
+    assert analyse(pair).rows(ORPHANS) == [(None, "receiver_gap"), (None, "no_stamp")]

@@ -157,3 +157,51 @@ def test_the_copy_through_the_middleware_is_a_message_too(intra: Intra, analyse:
         "FROM link_transport AS l LEFT JOIN callback_instance AS i USING (take_id) "
         "ORDER BY l.take_id"
     ) == [(1, "ring_buffer", True), (1, "exact", False)]
+
+
+REASONS = "SELECT o.reason FROM stat_orphan AS o JOIN take AS t USING (take_id) ORDER BY t.taken_ns"
+
+
+def test_behind_a_gap_what_was_put_in_is_lost(intra: Intra, analyse: Analyse) -> None:
+    """Once a later message is known, so is that those before it have left the buffer."""
+    intra.publish(0)
+    intra.dequeue(0)
+    intra.system.lose()
+    intra.system.wait(1_000)
+    intra.dequeue(1)
+    intra.publish(2)
+    intra.dequeue(2)
+    intra.dequeue(0)
+    assert analyse(intra.system).column(REASONS) == ["publisher_gap", "no_stamp"]
+
+
+def test_what_is_kept_for_who_comes_late_has_no_publication(intra: Intra, analyse: Analyse) -> None:
+    intra.enqueue(0)
+    intra.dequeue(0)
+    assert analyse(intra.system).column(REASONS) == ["no_stamp"]
+
+
+def test_the_copy_by_the_middleware_is_no_delivery(intra: Intra, analyse: Analyse) -> None:
+    """The second message is overwritten in the buffer; its copy reaches no callback."""
+    system = intra.system
+    intra.publish(0)
+    system.publish(TALKER, 0x10, 1)
+    intra.dequeue(0)
+    intra.publish(1)
+    system.add("ros2:rcl_publish", TALKER, publisher_handle=0x10, message=0xA)
+    system.add("ros2:rmw_publish", TALKER, rmw_publisher_handle=0x1010, message=0xA, timestamp=2)
+    system.take(LISTENER, 0x20, 2)
+    intra.publish(2)
+    intra.dequeue(2)
+    model = analyse(system)
+    assert model.rows("SELECT method, is_copy FROM link_transport ORDER BY take_id") == [
+        ("ring_buffer", False),
+        ("exact", True),
+        ("ring_buffer", False),
+    ]
+    assert model.value("SELECT count(*) FROM stat_delivery WHERE status = 'delivered'") == 2
+    assert model.value("SELECT count(*) FROM derive.flow_transport") == 2
+    assert model.value(
+        "SELECT count(*) FROM stat_delivery WHERE status <> 'delivered' AND publication_id IN "
+        "(SELECT publication_id FROM link_transport WHERE is_copy)"
+    ) == 1  # fmt: skip

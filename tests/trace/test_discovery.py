@@ -119,7 +119,7 @@ def test_metadata_of_another_kind(tmp_path: Path) -> None:
 
 def test_empty_metadata(tmp_path: Path) -> None:
     (tmp_path / "metadata").touch()
-    fails([tmp_path], "`metadata` is empty, the recording did not get started", "record again")
+    fails([tmp_path], "`metadata` is empty, nothing of it was written yet", "then copy it again")
 
 
 @pytest.mark.parametrize("size", [20, 100, 4000])

@@ -48,6 +48,9 @@ class Faults(Protocol):
     def is_packet_lost(self) -> bool:
         """Whether the packet that is now full is lost."""
 
+    def is_losing(self, time: int) -> bool:
+        """Whether what happens at `time` is lost."""
+
     def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
         """An event is not in the trace."""
 
@@ -125,8 +128,10 @@ class StreamWriter:
         if time < self._silent_until:
             self._lose(tracepoint, time, context, "pause")
             return
-        if self._to_lose:
-            self._to_lose -= 1
+        is_losing = self._faults is not None and self._faults.is_losing(time)
+        if is_losing or self._to_lose:
+            self._to_lose = 0 if is_losing else self._to_lose - 1
+            self._is_full = True
             self._discarded += 1
             self._lose(tracepoint, time, context, "loss")
             return

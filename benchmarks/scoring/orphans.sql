@@ -1,0 +1,57 @@
+-- Reasons that `stat_orphan` gives for takes without a publication, beside what became of the
+-- message's events. Compared row by row; the reasons that are right for each are in `accepted`.
+WITH accepted AS (
+    FROM (VALUES
+        ('sent, late start', 'before_tracing'),
+        ('sent, pause', 'publisher_gap'),
+        ('sent, loss', 'publisher_gap'),
+        ('sent, packets', 'publisher_gap'),
+        ('sent, truncation', 'publisher_gap'),
+        ('sent, truncation', 'publisher_trace_ends'),
+        ('sent, stop', 'publisher_trace_ends'),
+        ('sent, stop', 'publisher_gap'),
+        -- The event that has the stamp is missing itself.
+        ('taken, late start', 'receiver_gap'),
+        ('taken, pause', 'receiver_gap'),
+        ('taken, loss', 'receiver_gap'),
+        ('taken, packets', 'receiver_gap'),
+        ('taken, truncation', 'receiver_gap'),
+        -- The message was kept for subscriptions that come late, or nothing of it is traced.
+        -- Taken from a ring buffer, with a gap in between.
+        ('recorded', 'publisher_gap'),
+        ('kept', 'no_stamp'),
+        ('no event', 'no_stamp'),
+        ('twin', 'ambiguous')
+    ) AS a(truth, reason)
+),
+orphan AS (
+    SELECT o.take_id, o.reason, h.hostname AS host, p.pid, r.tid, t.taken_ns
+    FROM analysed.store.orphan_take AS o
+    JOIN analysed.store.take AS t ON o.take_id = t.take_id
+    JOIN analysed.store.thread AS r ON t.thread_id = r.thread_id
+    JOIN analysed.store.process AS p ON t.process_id = p.process_id
+    JOIN analysed.store.host AS h ON p.host_id = h.host_id
+),
+matched AS (
+    SELECT o.take_id, o.reason, any_value(m.truth) AS truth, any_value(m.undecided) AS undecided
+    FROM orphan AS o
+    JOIN truth_time AS t
+        ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
+        AND o.taken_ns = t.ts_ns
+    JOIN truth_origin AS m ON t.id = m.take_id
+    GROUP BY o.take_id, o.reason
+)
+SELECT
+    m.truth,
+    m.reason,
+    coalesce(
+        m.undecided,
+        -- One of them was recorded, and another one that was not may have sent it.
+        CASE WHEN m.reason = 'unknown' THEN 'several publishers' END
+    ) AS undecided,
+    count(*) AS messages,
+    coalesce(bool_or(a.reason IS NOT NULL), false) AS is_right
+FROM matched AS m
+LEFT JOIN accepted AS a ON m.truth = a.truth AND m.reason = a.reason
+GROUP BY ALL
+ORDER BY ALL;

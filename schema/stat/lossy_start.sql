@@ -1,0 +1,26 @@
+-- name: derive.lossy_start
+-- description: Processes of which events may have been lost while they were created: a gap other
+--     than a pause lies before the first run of a callback, or before the process was seen at all.
+-- grain: one row per process
+-- needs: derive.process_presence, store.callback_instance, store.loss_interval, store.trace
+WITH recording AS (
+    SELECT trace_id, min(trace_id) OVER (PARTITION BY run_id, coalesce(uuid, path)) AS recording_id
+    FROM store.trace
+),
+loss AS (
+    SELECT r.recording_id, min(l.start_ns) AS start_ns
+    FROM store.loss_interval AS l
+    JOIN recording AS r ON l.trace_id = r.trace_id
+    WHERE l.kind <> 'pause'
+    GROUP BY r.recording_id
+),
+started AS (
+    SELECT process_id, min(start_ns) AS start_ns
+    FROM store.callback_instance
+    GROUP BY process_id
+)
+SELECT DISTINCT p.run_id, p.process_id
+FROM derive.process_presence AS p
+JOIN loss AS l ON p.recording_id = l.recording_id
+LEFT JOIN started AS s ON p.process_id = s.process_id
+WHERE l.start_ns <= greatest(p.first_ns, s.start_ns)

@@ -1,0 +1,85 @@
+-- name: derive.process_presence
+-- description: Where and from when on each process was recorded. A session that has nothing but
+--     its initialisation does not count: what it did then is not in it. A process that existed
+--     before is recorded from its first event on, as the tracer tells one process after the other
+--     that it begins; one whose first events may have been lost, from the begin of the recording.
+-- grain: one row per process and recording (the chunks of one trace) that it did something in
+-- needs: store.trace, store.process, store.publication, store.take, store.callback_instance,
+--     store.node, store.publisher, store.subscription, store.loss_interval
+WITH recording AS (
+    SELECT
+        run_id,
+        trace_id,
+        min(trace_id) OVER chunks AS recording_id,
+        min(start_ns) OVER chunks AS begin_ns,
+        max(end_ns) OVER chunks AS end_ns
+    FROM store.trace
+    WHERE domain IS DISTINCT FROM 'kernel'
+    WINDOW chunks AS (PARTITION BY run_id, coalesce(uuid, path))
+),
+lossy AS (
+    SELECT r.run_id, r.recording_id, min(l.start_ns) AS start_ns
+    FROM store.loss_interval AS l
+    JOIN recording AS r ON l.trace_id = r.trace_id
+    WHERE l.kind <> 'pause'
+    GROUP BY r.run_id, r.recording_id
+),
+instance AS (
+    SELECT run_id, process_id, trace_id, min(start_ns) AS first_ns, max(end_ns) AS last_ns
+    FROM store.publication
+    GROUP BY run_id, process_id, trace_id
+    UNION ALL
+    SELECT run_id, process_id, trace_id, min(taken_ns), max(taken_ns)
+    FROM store.take
+    GROUP BY run_id, process_id, trace_id
+    UNION ALL
+    SELECT
+        run_id, process_id, trace_id, min(start_ns), max(greatest(start_ns, coalesce(end_ns, 0)))
+    FROM store.callback_instance
+    GROUP BY run_id, process_id, trace_id
+),
+stay AS (
+    SELECT
+        i.run_id, i.process_id, r.recording_id, r.begin_ns, r.end_ns,
+        min(i.first_ns) AS first_ns, max(i.last_ns) AS last_ns
+    FROM instance AS i
+    JOIN recording AS r ON i.trace_id = r.trace_id
+    GROUP BY i.run_id, i.process_id, r.recording_id, r.begin_ns, r.end_ns
+),
+creation AS (
+    SELECT run_id, process_id, created_ns FROM store.node
+    UNION ALL
+    SELECT run_id, process_id, created_ns FROM store.publisher
+    UNION ALL
+    SELECT run_id, process_id, created_ns FROM store.subscription
+),
+-- Its first object was seen to be created before it did anything.
+born AS (
+    SELECT s.process_id, s.recording_id
+    FROM stay AS s
+    JOIN creation AS c
+        ON s.run_id = c.run_id
+        AND s.process_id = c.process_id
+        AND c.created_ns >= s.begin_ns
+        AND c.created_ns <= s.first_ns
+    GROUP BY s.process_id, s.recording_id
+)
+SELECT
+    s.run_id,
+    s.process_id,
+    s.recording_id,
+    s.begin_ns,
+    s.end_ns,
+    CASE WHEN p.first_seen_ns >= s.begin_ns THEN p.first_seen_ns ELSE s.first_ns END AS first_ns,
+    s.last_ns,
+    b.process_id IS NOT NULL AS is_born,
+    CASE
+        WHEN b.process_id IS NOT NULL THEN s.begin_ns
+        WHEN l.start_ns <= s.first_ns THEN s.begin_ns
+        WHEN p.first_seen_ns >= s.begin_ns THEN p.first_seen_ns
+        ELSE s.first_ns
+    END AS recorded_from_ns
+FROM stay AS s
+JOIN store.process AS p ON s.process_id = p.process_id
+LEFT JOIN born AS b ON s.process_id = b.process_id AND s.recording_id = b.recording_id
+LEFT JOIN lossy AS l ON s.recording_id = l.recording_id
