@@ -461,7 +461,7 @@ CREATE TABLE store.link_transport (
     candidate_count  BIGINT,                     -- Publications that it could have been
     is_self_loop     BOOLEAN NOT NULL,           -- Received by the publishing node itself
     is_loss_affected BOOLEAN NOT NULL,           -- A gap of the trace may hide a better partner
-    is_copy          BOOLEAN NOT NULL            -- Of what a ring buffer carries as well: no callback gets it
+    is_copy          BOOLEAN                     -- Of what a ring buffer carries as well: no callback gets it; NULL: no
 );
 
 -- One row per network packet and clock that received it from another.

@@ -3,6 +3,8 @@
 WITH accepted AS (
     FROM (VALUES
         ('sent, late start', 'before_tracing'),
+        -- Within a millisecond of the moment in which its process joined.
+        ('sent, late start', 'publisher_gap'),
         ('sent, pause', 'publisher_gap'),
         ('sent, loss', 'publisher_gap'),
         ('sent, packets', 'publisher_gap'),

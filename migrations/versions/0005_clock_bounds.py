@@ -41,7 +41,7 @@ def upgrade() -> None:
         sa.Column(
             "is_copy",
             sa.Boolean(),
-            comment="Of what a ring buffer carries as well: no callback gets it",
+            comment="Of what a ring buffer carries as well: no callback gets it; NULL: no",
         ),
         schema="store",
     )

@@ -712,7 +712,11 @@ link_transport = _table(
     _count("candidate_count", "Publications that it could have been"),
     _flag("is_self_loop", "Received by the publishing node itself"),
     _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
-    _flag("is_copy", "Of what a ring buffer carries as well: no callback gets it"),
+    _column(
+        "is_copy",
+        Boolean,
+        "Of what a ring buffer carries as well: no callback gets it; NULL: no",
+    ),
 )
 
 link_packet = _table(
