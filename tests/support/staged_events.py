@@ -19,7 +19,7 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 
-from msgflow.db.connection import connect
+from msgflow.db.connection import attach, open_memory
 from msgflow.db.derive import derive
 from msgflow.db.store import delete, store
 from msgflow.ingest import model, reconciled, staging
@@ -236,8 +236,9 @@ class Analysis:
     def __init__(self, empty_database: Path, directory: Path) -> None:
         path = directory / "analysis.duckdb"
         shutil.copyfile(empty_database, path)
-        self.connection = connect(path, read_only=False)
+        self.connection = open_memory()
         self.connection.execute("SET threads = 1")
+        attach(self.connection, path)
         staging.attach(self.connection, Path(":memory:"))
         self._tables = self._tables_of("raw"), self._tables_of("staging")
         self._views = self._views_of_staging()
