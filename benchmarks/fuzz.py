@@ -50,7 +50,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
 SECONDS_OF_CPU = 30
-SECONDS = 180
+# Of waiting for nothing, even where other processes have the machine.
+SECONDS = 900
 ADDRESS_SPACE = 8 << 30
 LARGEST_FILE = 400 << 20
 BAD = ("traceback", "mistake", "crash", "hang", "damage", "unreported")
