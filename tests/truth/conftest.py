@@ -26,7 +26,14 @@ _LENGTHS = {
 }
 _SHORT = 0.15
 # Flows in them pass ring buffers, messages taken without a callback, or calls of services.
-_WITH_GAPS = ("intra_process", "mixed_intra_process", "python", "layers", "services")
+_WITH_GAPS = (
+    "intra_process",
+    "mixed_intra_process",
+    "overwritten_copies",
+    "python",
+    "layers",
+    "services",
+)
 # Which run filled a cache, and so which flow a message is on, is a guess in these.
 _DOUBTFUL = ("reentrant",)
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
-from ingested import Ingested
+from ingested import Ingested, ingest_one
+from scoring import compare_simulated
 
 from msgflow.db.check import run_checks
+from msgflow.sim import Recording, simulate
 
 RECORDED = (
     "partial_sync",
@@ -109,3 +112,27 @@ def test_the_trace_of_trace_compass(recordings: Callable[[str], Ingested]) -> No
         "JOIN subscription AS s USING (subscription_id) "
         "WHERE d.status <> 'delivered' AND NOT s.is_internal GROUP BY ALL ORDER BY ALL"
     ) == [("/topic_a", "before_discovery", 5), ("/topic_a", "subscription_ended", 40)]
+
+
+HANDOVER = 30_000_000
+FAULTY = {
+    "starved": Recording(),
+    "overwritten_copies": Recording(),
+    "pipeline": Recording(
+        start_ns=100_000_000, pauses=((250_000_000, 300_000_000),), handover_ns=HANDOVER
+    ),
+    "two_hosts": Recording(start_ns=100_000_000, is_dual_session=True, handover_ns=HANDOVER),
+    "mixed_intra_process": Recording(losses=((4_000_000, 6_000_000), (150_000_000, 170_000_000))),
+}
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_no_reason_is_false(tmp_path: Path, name: str) -> None:
+    """Also where readers get no CPU, processes leave one by one, and events are lost."""
+    simulation = simulate(name, tmp_path / "trace", factor=0.1, recording=FAULTY[name])
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    _, drops = compare_simulated(path, simulation.truth)
+    assert drops is not None
+    assert sum(drop.messages for drop in drops if drop.is_right) >= 4
+    assert [drop for drop in drops if not drop.is_right and not drop.undecided] == []
