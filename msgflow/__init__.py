@@ -3,7 +3,7 @@
 import msgflow
 
 with msgflow.open_db("msgflow.duckdb") as database:
-    database.ingest("~/.ros/tracing/session")
+    database.ingest("traces/session")
     print(database.query("e2e-latency").to_pandas())
 """
 

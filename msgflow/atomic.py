@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+
+_SUFFIX = ".part"
 
 
 @contextmanager
@@ -20,7 +24,8 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         UsageError: the file cannot be created there.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    _remove_abandoned(path)
+    temporary = path.with_name(f".{path.name}.{mark()}{_SUFFIX}")
     try:
         yield temporary
         temporary.replace(path)
@@ -32,3 +37,14 @@ def replacing(path: Path) -> Iterator[Path]:
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Remove what killed processes have left of `path`."""
+    prefix = f".{path.name}."
+    with suppress(OSError):
+        for entry in os.scandir(path.parent):
+            name = entry.name
+            is_ours = name.startswith(prefix) and name.endswith(_SUFFIX)
+            if is_ours and is_abandoned(name[len(prefix) : -len(_SUFFIX)]):
+                os.unlink(entry.path)

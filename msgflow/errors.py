@@ -14,6 +14,7 @@ class ExitCode(IntEnum):
     TRACE = 3
     DATABASE = 4
     INTERRUPTED = 130
+    TERMINATED = 143
 
 
 class MsgflowError(Exception):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from typing import Annotated
 
 import typer
@@ -24,6 +25,7 @@ from msgflow.cli import (
     ui,
 )
 from msgflow.cli.root import RootGroup
+from msgflow.query.interrupt import terminate
 from msgflow.version import __version__
 
 app = typer.Typer(
@@ -73,4 +75,7 @@ def root(
 
 def main() -> None:
     """Run the program; its exit codes are those of `msgflow.errors.ExitCode`."""
+    # Where whoever started it wants SIGTERM ignored, it is.
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, terminate)
     app()

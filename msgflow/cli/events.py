@@ -119,7 +119,7 @@ def command(
 
 def _write(selection: Selection, form: EventFormat, output: Path | None) -> None:
     from msgflow.atomic import replacing
-    from msgflow.cli.output import count, data_stream, print_note, print_status
+    from msgflow.cli.output import count, data_stream, print_note, print_status, terminal
     from msgflow.cli.progress import reading_progress
     from msgflow.events.listing import write_events
     from msgflow.events.tables import write_event_tables
@@ -127,7 +127,8 @@ def _write(selection: Selection, form: EventFormat, output: Path | None) -> None
     if output is None:
         if form is EventFormat.PARQUET and sys.stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        if not write_events(selection, form, data_stream()):
+        stream = data_stream()
+        if not write_events(selection, form, terminal(stream) if stream.isatty() else stream):
             print_note("no events")
         return
     with reading_progress() as progress:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import shutil
 import sys
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, cast
 
 import typer
 
@@ -35,7 +36,7 @@ def print_note(text: str) -> None:
 
 def print_status(text: str) -> None:
     """Print what was done."""
-    typer.echo(text, err=True)
+    typer.echo(_shown(text), err=True)
 
 
 def print_result(result: QueryResult, form: Format | None, path: Path | None) -> None:
@@ -61,7 +62,7 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
         stdout = data_stream()
         if form is Format.PARQUET and stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        write_result(result, form, stdout)
+        write_result(result, form, terminal(stdout) if stdout.isatty() else stdout)
     if path is None and not len(result):
         print_note("no rows")
     for note in result.notes:
@@ -108,6 +109,8 @@ def print_lines(lines: Iterable[str]) -> None:
         UsageError: stdout is closed.
     """
     stream = data_stream()
+    if stream.isatty():
+        stream = terminal(stream)
     for line in lines:
         stream.write(f"{line}\n".encode())
 
@@ -136,6 +139,43 @@ def data_stream() -> IO[bytes]:
     return sys.stdout.buffer
 
 
+class _Terminal:
+    """A terminal as a binary stream for data, in which control characters are made visible."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")
+        self.closed = False
+
+    def write(self, data: bytes) -> int:
+        text = self._decoder.decode(bytes(data))
+        self._stream.write(_shown(text).encode())
+        return len(data)
+
+    def flush(self) -> None:
+        self._stream.flush()
+
+    def writable(self) -> bool:
+        return True
+
+    def isatty(self) -> bool:
+        return True
+
+
+def terminal(stream: IO[bytes]) -> IO[bytes]:
+    """Return a terminal as a stream for data from traces: it shows control characters."""
+    return cast("IO[bytes]", _Terminal(stream))
+
+
+def _shown(text: str) -> str:
+    if text.isprintable():
+        return text
+    from msgflow.export.human import printable
+
+    return printable(text, keep="\n\r\t")
+
+
 def _labelled(label: str, color: str, text: str) -> None:
+    text = _shown(text)
     styled = label if os.environ.get("NO_COLOR") else typer.style(label, fg=color, bold=True)
     typer.echo(f"{styled}: {text}", err=True)

@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.errors import ExitCode, MsgflowError
+from msgflow.query.interrupt import Terminated
 from msgflow.version import __version__
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
@@ -55,6 +56,8 @@ class RootGroup(TyperGroup):
             code = ExitCode.INTERRUPTED if _is_interrupt(error) else _unexpected(error)
         if code == ExitCode.INTERRUPTED:
             print_error("interrupted")
+        if code == ExitCode.TERMINATED:
+            print_error("terminated")
         sys.exit(int(code or 0))
 
     def invoke(self, ctx: Any) -> Any:
@@ -67,6 +70,9 @@ class RootGroup(TyperGroup):
             # Python flushes stdout once more when it exits, which must not complain either.
             discard_stdout()
             raise typer.Exit(ExitCode.OK) from None
+        except Terminated:
+            # The libraries below give all that is like Ctrl-C its exit code.
+            raise typer.Exit(ExitCode.TERMINATED) from None
         return value
 
 

@@ -10,6 +10,7 @@ import typer
 
 from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption, FormatOption, OutputOption
 from msgflow.errors import UsageError
+from msgflow.text_file import read_text
 
 DEFAULT_LIMIT = 1_000
 
@@ -45,11 +46,5 @@ def _statements(text: str | None, file: Path | None) -> str:
     if (text is None) == (file is None):
         raise UsageError("give SQL, or a file with -f", 'msgflow sql "SELECT * FROM run"')
     if file is not None:
-        try:
-            return file.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "not UTF-8 text"
-            raise UsageError(
-                f"cannot read the file: {reason.lower()} — {file}", "give a file with SQL with -f"
-            ) from None
+        return read_text(file, "cannot read the file", "give a file with SQL with -f")
     return sys.stdin.read() if text == "-" else str(text)

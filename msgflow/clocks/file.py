@@ -8,19 +8,27 @@ from __future__ import annotations
 
 import re
 import tomllib
+from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from msgflow.errors import UsageError
+from msgflow.text_file import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 METHODS = ("none", "messages")
 _FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
 _EXAMPLE = "robot-b: {offset_ns: -350000000, drift_ppb: 20}"
-_INTEGER = re.compile(r"[-+]?\d[\d_]*")
+# Digits in groups, as YAML and TOML have them, and no more of them than a time has.
+_INTEGER = re.compile(r"[-+]?[0-9]+(_[0-9]+)*")
+_MOST_DIGITS = 40
+_MOST_SHOWN = 60
+_TOML_KEY = re.compile(
+    r"""\s*(\[\s*["']?(?P<table>[^"'\]]*?)["']?\s*\]|["']?(?P<key>[^"'.=\s]+)["']?\s*[.=])"""
+)
 _LARGEST_NS = 2**62
 # A thousandth: no clock that counts seconds is worse.
 _LARGEST_DRIFT_PPB = 1_000_000
@@ -78,16 +86,7 @@ def read_clock_sync(given: str | Path) -> ClockSync:
     if isinstance(given, str) and given in METHODS:
         return ClockSync(given)
     path = Path(given)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise UsageError(
-            f"neither {' nor '.join(METHODS)} nor a file that can be read: {reason} — {path}",
-            _EXAMPLE,
-        ) from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"not a text file in UTF-8 — {path}", _EXAMPLE) from error
+    text = read_text(path, f"neither {' nor '.join(METHODS)} nor a file that can be read", _EXAMPLE)
     sync = ClockSync("file", path)
     entries = _toml(text, sync) if _is_toml(path) else _yaml(text, sync)
     clocks = tuple(_clock(sync, *entry) for entry in entries)
@@ -111,26 +110,41 @@ def _toml(text: str, sync: ClockSync) -> Iterator[_Entry]:
         where = re.search(r"\(at line (\d+)", str(error))
         line = int(where[1]) if where else text.count("\n") + 1
         sync.fail(line, str(error).partition(" (at ")[0].lower())
+    except (RecursionError, ValueError) as error:  # the latter: a number of thousands of digits
+        raise UsageError(f"not a TOML file of clocks — {sync.path}", _EXAMPLE) from error
+    lines = _toml_lines(text)
     for name, value in root.items():
-        line = _toml_line(text, name)
+        line = next(iter(lines.get(name, ())), 1)
         fields = value if isinstance(value, dict) else {"offset_ns": value}
         yield (
             name,
             line,
             {
-                key: (str(field), max(line, _toml_line(text, key, line)))
+                key: (_toml_scalar(field), _at_or_after(lines.get(key, ()), line))
                 for key, field in fields.items()
             },
         )
 
 
-def _toml_line(text: str, key: str, first: int = 1) -> int:
-    """Return the line, from `first` on, that defines a key; the parser does not tell."""
-    pattern = re.compile(
-        rf"""^\s*(\[\s*["']?{re.escape(key)}["']?\s*\]|["']?{re.escape(key)}["']?\s*[.=])"""
-    )
-    lines = text.splitlines()[first - 1 :]
-    return next((first + at for at, line in enumerate(lines) if pattern.match(line)), first)
+def _toml_lines(text: str) -> dict[str, list[int]]:
+    """Return the lines that may define each key, in order; the parser does not tell."""
+    found: dict[str, list[int]] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := _TOML_KEY.match(line):
+            found.setdefault(match["table"] or match["key"], []).append(number)
+    return found
+
+
+def _at_or_after(lines: Sequence[int], first: int) -> int:
+    at = bisect_left(lines, first)
+    return lines[at] if at < len(lines) else first
+
+
+def _toml_scalar(value: object) -> str:
+    if isinstance(value, int) and not isinstance(value, bool):
+        # Python refuses to write out numbers that no clock has.
+        return str(value) if abs(value) < _LARGEST_NS else "9" * _MOST_DIGITS
+    return "a mapping" if isinstance(value, dict) else str(value)
 
 
 def _yaml(text: str, sync: ClockSync) -> Iterator[_Entry]:
@@ -143,7 +157,7 @@ def _yaml(text: str, sync: ClockSync) -> Iterator[_Entry]:
         mark = error.problem_mark or error.context_mark
         what = " ".join(str(error.problem or error.context or "not YAML").split())
         sync.fail(1 if mark is None else mark.line + 1, what, _EXAMPLE)
-    except (YAMLError, RecursionError) as error:
+    except (YAMLError, RecursionError, ValueError) as error:
         raise UsageError(f"not a YAML file — {sync.path}", _EXAMPLE) from error
     if root is None:
         return
@@ -180,8 +194,11 @@ def _clock(sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, i
             sync.fail(field_line, f"a clock has no {key}", f"it has {', '.join(_FIELDS)}{quoted}")
         if not text:
             sync.fail(field_line, f"{key} has no value", _EXAMPLE)
+        shown = text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"
         if not _INTEGER.fullmatch(text):
-            sync.fail(field_line, f"{key} is not a whole number — {text}", _EXAMPLE)
+            sync.fail(field_line, f"{key} is not a whole number — {shown}", _EXAMPLE)
+        if len(text) > _MOST_DIGITS:
+            sync.fail(field_line, f"{key} is beyond what clocks have — {shown}", _EXAMPLE)
         numbers[key] = int(text)
         limit = _LARGEST_DRIFT_PPB if key == "drift_ppb" else _LARGEST_NS
         if abs(numbers[key]) >= limit or (key == "uncertainty_ns" and numbers[key] < 0):

@@ -11,6 +11,7 @@ import duckdb
 from msgflow.db.definition import remember, require_ours
 from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
+from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
 from msgflow.query.failure import database_errors, in_words
 
@@ -95,6 +96,7 @@ def open_file(
         shut_in(con)
         con.execute("SET lock_configuration = true")
     remove_abandoned(path, is_ours_alone=not read_only)
+    remove_abandoned_workspaces(path.absolute().parent)
     return con
 
 
@@ -170,7 +172,10 @@ def recorded_revision(con: duckdb.DuckDBPyConnection) -> str | None:
     ).fetchone()
     if row is None or row[0] != 3:
         return None
-    revision = con.execute("SELECT version_num FROM store.alembic_version").fetchone()
+    try:
+        revision = con.execute("SELECT version_num FROM store.alembic_version").fetchone()
+    except duckdb.BinderException:  # another table of that name
+        return None
     return None if revision is None or revision[0] is None else str(revision[0])
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -21,12 +19,14 @@ from msgflow.db.connection import (
     require_known,
 )
 from msgflow.db.definition import require_ours
+from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
 from msgflow.query.failure import database_errors
 from msgflow.resources import resource_directory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from alembic.config import Config
     from sqlalchemy.engine import Connection
@@ -67,14 +67,12 @@ def create(path: Path) -> None:
 
 def _replace_by_new(path: Path) -> None:
     try:
-        with (
-            database_errors(path),
-            tempfile.TemporaryDirectory(prefix=".msgflow-", dir=path.parent) as directory,
-        ):
-            fresh = Path(directory) / "new.duckdb"
+        with database_errors(path), workspace(path) as directory:
+            fresh = directory / "new.duckdb"
             con = open_file(fresh, read_only=False)
             try:
                 _bring_to_head(con)
+                con.execute("CHECKPOINT")  # closing would fail silently, and leave a log behind
             finally:
                 con.close()
             os.replace(fresh, path)

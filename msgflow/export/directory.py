@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 _PARTITION = "run_id="
+_ASIDE = ".export."
+_SUFFIX = ".part"
 
 
 @contextmanager
@@ -32,8 +34,9 @@ def replacing_entries(
     Raises:
         UsageError: one exists already, or the directory cannot be written.
     """
+    _clean_up(directory)
     _refuse_existing(directory, names, force)
-    aside = directory / f".export.{os.getpid()}.part"
+    aside = directory / f"{_ASIDE}{mark()}{_SUFFIX}"
     is_new = not directory.exists()
     try:
         try:
@@ -67,6 +70,16 @@ def _publish(directory: Path, aside: Path, names: Sequence[str]) -> None:
                 shutil.rmtree(directory / name, ignore_errors=True)
                 (old / name).rename(directory / name)
         raise
+
+
+def _clean_up(directory: Path) -> None:
+    """Remove what killed exports left aside; what one had moved there to replace goes back."""
+    for aside in directory.glob(f"{_ASIDE}*{_SUFFIX}"):
+        if is_abandoned(aside.name.removeprefix(_ASIDE).removesuffix(_SUFFIX)):
+            for old in (aside / "old").glob("*"):
+                if not (directory / old.name).exists():
+                    old.rename(directory / old.name)
+            shutil.rmtree(aside, ignore_errors=True)
 
 
 def _refuse_existing(directory: Path, names: Sequence[str], force: bool) -> None:

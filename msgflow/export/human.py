@@ -47,7 +47,7 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
         return _number(value, unit, is_handle)
     if isinstance(value, list):
         return ", ".join(format_cell(item, unit, is_handle=is_handle) for item in value)
-    return _printable(str(value))
+    return printable(str(value))
 
 
 def short_symbol(symbol: str) -> str:
@@ -86,10 +86,17 @@ def _number(value: float, unit: str | None, is_handle: bool) -> str:
     return f"{value:.3g}"
 
 
-def _printable(text: str) -> str:
-    # Names come from traces: no terminal shall obey what stands in them.
+def printable(text: str, keep: str = "") -> str:
+    """Return text without control characters, which stand there as in Python: names come from
+    traces, and no terminal shall obey what is in them.
+
+    Args:
+        text: any.
+        keep: characters to leave as they are.
+    """
     if text.isprintable():
         return text
     return "".join(
-        character if character.isprintable() else repr(character)[1:-1] for character in text
+        character if character.isprintable() or character in keep else repr(character)[1:-1]
+        for character in text
     )

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from msgflow.errors import UsageError
+from msgflow.text_file import read_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -77,13 +78,7 @@ def read_links(path: Path) -> LinksFile:
     Raises:
         UsageError: the file cannot be read, is not YAML, or not of the form above.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"cannot read the file: {reason} — {path}", _EXAMPLE) from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"not a text file in UTF-8 — {path}", _EXAMPLE) from error
+    text = read_text(path, "cannot read the file", _EXAMPLE)
     root = _compose(text, path)
     reader = _Reader(LinksFile(path, ()))
     return LinksFile(path, reader.links(root))
@@ -103,7 +98,7 @@ def _compose(text: str, path: Path) -> Any:
         raise UsageError(
             f"{path}, line {line}: {what}", "quote patterns that begin with *, as in '*_raw'"
         ) from error
-    except (YAMLError, RecursionError) as error:
+    except (YAMLError, RecursionError, ValueError) as error:
         raise UsageError(f"not a YAML file — {path}", _EXAMPLE) from error
 
 

@@ -23,6 +23,12 @@ _DAMAGE = re.compile(
     r"corrupt|checksum|deserializ|invalid unicode|could not read|failed to load metadata",
     re.I,
 )
+_OF_FILES = (
+    duckdb.IOException,
+    duckdb.FatalException,
+    duckdb.TransactionException,
+    duckdb.OutOfMemoryException,
+)
 _DAMAGED_KINDS = (duckdb.InternalException, duckdb.FatalException, duckdb.SerializationException)
 
 
@@ -73,12 +79,11 @@ def _kind(error: BaseException) -> str | None:
     if not isinstance(error, duckdb.Error) or isinstance(error, duckdb.InterruptException):
         return None
     text = str(error)
-    is_memory = isinstance(error, duckdb.OutOfMemoryException)
-    if _FULL.search(text) and (
-        is_memory or isinstance(error, duckdb.IOException | duckdb.FatalException)
-    ):
+    if isinstance(error, _OF_FILES) and _FULL.search(text):
         return "full"
-    if isinstance(error, duckdb.IOException) and _REFUSED.search(text):
+    if isinstance(error, duckdb.IOException | duckdb.TransactionException) and _REFUSED.search(
+        text
+    ):
         return "refused"
     if isinstance(error, _DAMAGED_KINDS):
         return "damaged"

@@ -22,18 +22,30 @@ _T = TypeVar("_T")
 _SECONDS_BETWEEN_ATTEMPTS = 0.05
 
 
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, where the command line treats it as Ctrl-C."""
+
+
+def terminate(number: int, frame: FrameType | None) -> None:
+    """End what runs as Ctrl-C does: the handler of SIGTERM of the command line."""
+    raise Terminated
+
+
 class Interrupts:
     """What is known of Ctrl-C: whether it came, and whether it still counts."""
 
     def __init__(self) -> None:
         self._is_noted = False
         self._is_final = False
+        self._kind: type[KeyboardInterrupt] = KeyboardInterrupt
         self._lock = threading.Lock()
 
     def on_signal(self, number: int, frame: FrameType | None) -> None:
         """Note Ctrl-C; the second one is raised at once, for work that does not ask for long."""
+        if number == signal.SIGTERM:
+            self._kind = Terminated
         if self._is_noted and not self._is_final:
-            raise KeyboardInterrupt
+            raise self._kind
         self._is_noted = True
 
     def note(self) -> None:
@@ -43,7 +55,7 @@ class Interrupts:
     def check(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C came in time."""
         if self._is_noted and not self._is_final:
-            raise KeyboardInterrupt
+            raise self._kind
 
     def make_final(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C came before; from now on it comes too late.
@@ -61,30 +73,35 @@ class Interrupts:
                 connection.interrupt()
 
 
+# Handlers that may be replaced for a while: Python's own, and that of the command line.
+_HANDLERS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: terminate}
+
+
 @contextmanager
 def noted_interrupts() -> Iterator[Interrupts]:
     """Note Ctrl-C instead of raising it; inside of another such block, share what that noted.
 
     Only the main thread receives signals. Where the program that uses msgflow handles Ctrl-C
-    itself, or ignores it, that stays so.
+    itself, or ignores it, that stays so. SIGTERM is noted in the command line only.
     """
     if threading.current_thread() is not threading.main_thread():
         yield Interrupts()
         return
-    previous = signal.getsignal(signal.SIGINT)
-    outer = getattr(previous, "__self__", None)
-    if isinstance(outer, Interrupts):
-        yield outer
-        return
+    before = {number: signal.getsignal(number) for number in _HANDLERS}
+    for handler in before.values():
+        outer = getattr(handler, "__self__", None)
+        if isinstance(outer, Interrupts):
+            yield outer
+            return
     interrupts = Interrupts()
-    if previous is not signal.default_int_handler:
-        yield interrupts
-        return
-    signal.signal(signal.SIGINT, interrupts.on_signal)
+    ours = [number for number, handler in before.items() if handler is _HANDLERS[number]]
     try:
+        for number in ours:
+            signal.signal(number, interrupts.on_signal)
         yield interrupts
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number in ours:
+            signal.signal(number, before[number])
 
 
 def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:

@@ -16,7 +16,11 @@ MINIMUM_NS = -(2**63)
 MAXIMUM_NS = 2**63 - 1
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _INTEGER = re.compile(r"-?\d+")
-_OFFSET = re.compile(r"(?P<sign>\+?)(?P<number>\d+(?:\.\d+)?)(?P<unit>ns|us|µs|ms|s|min|h)?")
+# More digits than any id or time has, which Python would refuse to read.
+_MOST_DIGITS = 40
+_OFFSET = re.compile(
+    r"(?P<sign>\+?)(?P<number>\d{1,40}(?:\.\d{1,40})?)(?P<unit>ns|us|µs|ms|s|min|h)?"
+)
 _UNIT_NS = {
     "ns": 1,
     "us": 1_000,
@@ -63,8 +67,8 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
     if text == "all":
         return tuple(ordered)
     found = [run for run in ordered if run.name == text]
-    if not found and _INTEGER.fullmatch(text):
-        found = [run for run in ordered if run.run_id == int(text)]
+    if not found and (run_id := _integer(text)) is not None:
+        found = [run for run in ordered if run.run_id == run_id]
     if len(found) > 1:
         ids = " or ".join(f"--run {run.run_id}" for run in found)
         raise UsageError(f"several runs have this name — {text}", f"choose by id: {ids}")
@@ -72,6 +76,10 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
         known = ", ".join(f"{run.name} ({run.run_id})" for run in ordered[-10:])
         raise UsageError(f"there is no such run — {text}", f"the runs are {known}")
     return tuple(found)
+
+
+def _integer(text: str) -> int | None:
+    return int(text) if len(text) <= _MOST_DIGITS and _INTEGER.fullmatch(text) else None
 
 
 def is_run_name(text: str) -> bool:
@@ -150,8 +158,8 @@ def _read(text: str | int, runs: Sequence[Run], option: str) -> int:
     if isinstance(text, int):
         return text
     text = text.strip()
-    if _INTEGER.fullmatch(text):
-        return int(text)
+    if (time_ns := _integer(text)) is not None:
+        return time_ns
     if (offset := _OFFSET.fullmatch(text)) and (offset["sign"] or offset["unit"]):
         return _run_start(runs, option) + _to_ns(offset["number"], offset["unit"] or "s")
     try:

@@ -53,4 +53,4 @@ def write_meta(
         "rows": {name: table.count for name, table in truth.tables.items()},
         **outcome,
     }
-    path.write_text(json.dumps(content, indent=2) + "\n")
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

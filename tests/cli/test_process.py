@@ -185,3 +185,33 @@ def test_parquet_is_not_written_to_a_terminal(small_database: Path) -> None:
     os.close(leader)
     assert done.returncode == 2
     assert b"-o FILE.parquet" in done.stderr
+
+
+@pytest.mark.parametrize("form", ["table", "csv", "json", "jsonl", "markdown"])
+def test_a_terminal_obeys_no_name(small_database: Path, form: str) -> None:
+    """Control characters in names show; a file and a pipe get them as they are."""
+    text = "SELECT 'a' || chr(27) || '[31m' || chr(155) || '2J' || chr(7) || 'é' AS \"na\\me\""
+    shown = on_terminal(command("sql", text, "--db", small_database, "--format", form))
+    assert not {character for character in shown.decode() if not character.isprintable()} - {"\n"}
+    assert "é" in shown.decode()
+    assert "\\x9b" in shown.decode()
+    exact = subprocess.run(
+        command("sql", text, "--db", small_database, "--format", "csv"),
+        capture_output=True,
+        check=True,
+    ).stdout
+    assert "\x1b[31m\x9b2J\x07é".encode() in exact
+
+
+def test_messages_obey_no_name(small_database: Path) -> None:
+    leader, follower = pty.openpty()
+    arguments = command("query", "info-runs", "--run", "a\x1b[31m", "--db", small_database)
+    done = subprocess.run(
+        arguments, stderr=follower, check=False, env=os.environ | {"NO_COLOR": "1"}
+    )
+    os.close(follower)
+    said = os.read(leader, 65536)
+    os.close(leader)
+    assert done.returncode == 2
+    assert b"\\x1b[31m" in said
+    assert b"\x1b" not in said

@@ -46,7 +46,13 @@ STAGES = (
 )
 
 
-def interrupted_at(stage: str, trace: Path, database: Path, signals: int = 1) -> tuple[int, str]:
+def interrupted_at(
+    stage: str,
+    trace: Path,
+    database: Path,
+    signals: int = 1,
+    number: signal.Signals = signal.SIGINT,
+) -> tuple[int, str]:
     """Return exit code and stderr of an ingest that gets Ctrl-C when `stage` begins."""
     arguments = [stage, "ingest", str(trace), "--db", str(database)]
     with subprocess.Popen(
@@ -58,7 +64,7 @@ def interrupted_at(stage: str, trace: Path, database: Path, signals: int = 1) ->
         assert process.stdout is not None
         assert process.stdout.readline() == f"{stage}\n"
         for _ in range(signals):
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
         _, errors = process.communicate(timeout=60)
     return process.returncode, errors
 
@@ -70,6 +76,30 @@ def test_an_interrupt_leaves_nothing(trace: Path, new_database: Path, stage: str
         "error: interrupted\n",
     )
     assert os.listdir(new_database.parent) == []
+
+
+@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("ignored", [False, True])
+def test_a_termination_leaves_nothing(
+    trace: Path, new_database: Path, stage: str, ignored: bool
+) -> None:
+    """Also where Ctrl-C is ignored, as in the background jobs of a shell."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if ignored else None
+    try:
+        ended = interrupted_at(stage, trace, new_database, number=signal.SIGTERM)
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
+    assert ended == (ExitCode.TERMINATED, "error: terminated\n")
+    assert os.listdir(new_database.parent) == []
+
+
+def test_a_termination_that_comes_too_late_is_none(database: Path, other_trace: Path) -> None:
+    code, errors = interrupted_at(
+        "closing the database", other_trace, database, number=signal.SIGTERM
+    )
+    assert code == ExitCode.OK
+    assert "as run pair (2)" in errors
 
 
 @pytest.mark.parametrize("stage", ["reading the traces", "linking messages"])
@@ -104,6 +134,6 @@ def test_an_ingest_runs_in_any_thread(new_database: Path, trace: Path) -> None:
 
 
 def test_the_handler_of_the_program_is_back_afterwards(new_database: Path, trace: Path) -> None:
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     ingest([trace], new_database)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before

@@ -1,0 +1,48 @@
+"""Small files that users write: regular, of bounded size, UTF-8."""
+
+from __future__ import annotations
+
+import os
+import stat
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# Nobody writes more by hand, and parsers of YAML take a hundred times as much memory.
+MOST_BYTES = 1_000_000
+
+
+def read_text(path: Path, what: str, hint: str) -> str:
+    """Return the text of a file.
+
+    Args:
+        path: the file; a pipe, a device and the like are refused, not waited for.
+        what: how an error begins that says that it cannot be read.
+        hint: what errors recommend.
+
+    Raises:
+        UsageError: no such file, or none of this kind.
+    """
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise UsageError(f"{what}: not a regular file — {path}", hint)
+            content = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(f"{what}: {reason} — {path}", hint) from error
+    except ValueError as error:  # such as a NUL in the path
+        raise UsageError(f"{what}: {error} — {path}", hint) from error
+    if len(content) > MOST_BYTES:
+        raise UsageError(f"{what}: larger than {MOST_BYTES // 1_000} kB — {path}", hint)
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        raise UsageError(f"not a text file in UTF-8 — {path}", hint) from error
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
