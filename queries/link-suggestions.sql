@@ -13,6 +13,7 @@
 -- column: inputs VARCHAR[]          Topics of the inputs
 -- column: outputs VARCHAR[]         Topics of the outputs
 -- column: evidence VARCHAR          What was seen
+-- column: doubt VARCHAR             Why it may be incomplete or misleading; NULL: no particular reason
 -- column: process VARCHAR           Process name of the node
 -- column: pid INTEGER               Process id of the node
 -- column: host VARCHAR              Host of the node
@@ -202,6 +203,11 @@ partial AS (
     FROM synchronous
     GROUP BY node_id, inputs
 ),
+received AS (
+    SELECT node_id, list(DISTINCT topic_name ORDER BY topic_name) AS topics
+    FROM input
+    GROUP BY node_id
+),
 candidate AS (
     SELECT node_id, kind, inputs, outputs, evidence FROM periodic
     UNION ALL
@@ -214,10 +220,37 @@ SELECT
     c.inputs,
     c.outputs,
     c.evidence,
+    nullif(
+        concat_ws(
+            '; ',
+            CASE
+                WHEN count(*) OVER (PARTITION BY c.node_id) > 1 THEN
+                    'the node has several candidates, which may share inputs, or be one'
+            END,
+            CASE
+                WHEN len(list_filter(r.topics, lambda topic: NOT list_contains(c.inputs, topic))) > 0
+                    THEN printf(
+                        'the node also receives %s, which may be inputs as well',
+                        array_to_string(
+                            list_filter(
+                                r.topics, lambda topic: NOT list_contains(c.inputs, topic)
+                            ),
+                            ', '
+                        )
+                    )
+            END,
+            CASE
+                WHEN c.kind = 'partial_sync' AND len(c.inputs) >= 4 THEN
+                    'of so many inputs some may belong to another set, or only be more frequent'
+            END
+        ),
+        ''
+    ) AS doubt,
     n.process,
     n.pid,
     n.host,
     n.is_name_repeated
 FROM candidate AS c
 JOIN named_node AS n ON c.node_id = n.node_id
+JOIN received AS r ON c.node_id = r.node_id
 ORDER BY n.run_id, node, n.host, n.pid, c.kind, c.outputs, c.inputs, c.evidence, c.node_id

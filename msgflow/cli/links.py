@@ -58,7 +58,7 @@ def suggest(
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Print candidates found in the data as a file to review; nothing is applied."""
-    from msgflow.cli.output import print_runs, print_text
+    from msgflow.cli.output import count, print_note, print_runs, print_text
     from msgflow.database import Database
     from msgflow.links import suggest_links
 
@@ -73,7 +73,14 @@ def suggest(
     words = ["msgflow", "links", "apply", str(output or "FILE")]
     words += ["--run", run] if run is not None else []
     words += ["--db", str(database)] if database != DEFAULT_DATABASE else []
-    text = suggest_links(result.to_arrow().to_pylist(), shlex.join(words))
+    rows = result.to_arrow().to_pylist()
+    text = suggest_links(rows, shlex.join(words))
+    doubtful = sum(row["doubt"] is not None for row in rows)
+    if doubtful:
+        print_note(
+            f"{doubtful} of {count(len(rows), 'candidate')} are doubtful, see the comments: "
+            + ", ".join(dict.fromkeys(row["node"] for row in rows if row["doubt"]))
+        )
     print_text(lambda width, color: text, output)
 
 

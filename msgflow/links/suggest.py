@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 _HEAD = (
     "Candidates for indirect links, found in what was traced. Only the author of a node knows what"
-    " it does with messages that it keeps: review every entry, delete what is wrong, then"
+    " it does with messages that it keeps: review every entry, delete what is wrong, then run the"
+    " command below. Not everything is found: nodes whose callbacks overlap on several threads,"
+    " and merges within a node that share inputs, may be missing or incomplete."
 )
 _PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
 _WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
@@ -38,6 +40,7 @@ def suggest_links(rows: Sequence[Mapping[str, Any]], command: str) -> str:
 def _entry(row: Mapping[str, Any]) -> list[str]:
     lines = [
         *(f"  {line}" for line in _comment(f"{row['node']}: {row['evidence']}")),
+        *(f"  {line}" for line in _comment(f"Doubtful: {row['doubt']}." if row["doubt"] else "")),
         f"  - kind: {row['kind']}",
         f"    node: {_quoted(row['node'])}",
     ]

@@ -6,7 +6,11 @@ import csv
 from collections.abc import Callable
 from pathlib import Path
 
+import duckdb
+from golden import fill
 from typer.testing import Result
+
+from msgflow.db.derive import derive
 
 Msgflow = Callable[..., Result]
 
@@ -49,6 +53,18 @@ def test_without_runs_or_files(msgflow: Msgflow, fresh_database: Path, tmp_path:
     assert result.exit_code == 2
     assert "the database holds no run" in result.stderr
     assert msgflow("links", "apply", file, "--db", tmp_path / "none.duckdb").exit_code == 4
+
+
+def test_what_is_doubtful_of_suggestions_is_said(msgflow: Msgflow, fresh_database: Path) -> None:
+    case = "several_candidates_of_one_node"
+    cases = Path(__file__).parents[1] / "query" / "cases" / "link-suggestions"
+    with duckdb.connect(str(fresh_database)) as con:
+        fill(con, cases / case / "input")
+        derive(con, 1)
+    result = msgflow("links", "suggest", "--db", fresh_database)
+    assert result.exit_code == 0
+    assert "2 of 2 candidates are doubtful, see the comments: /merge\n" in result.stderr
+    assert result.stdout.count("# Doubtful: the node has several candidates") == 2
 
 
 def test_suggestions_are_for_one_run(msgflow: Msgflow, fresh_database: Path) -> None:

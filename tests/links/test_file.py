@@ -97,12 +97,16 @@ def test_suggestions_can_be_read_back(tmp_path: Path) -> None:
         "inputs": ["/a", "yes", "x: y"],
         "outputs": ["/c#d"],
         "evidence": "its timer\npublished " + "much " * 60,
+        "doubt": "the node also receives\n- /x",
         "process": "fusion",
         "pid": 42,
         "host": "true",
         "is_name_repeated": True,
     }
     text = suggest_links([row], "msgflow links apply FILE")
+    assert "  # Doubtful: the node also receives - /x." in text.splitlines()
+    certain = suggest_links([row | {"doubt": None}], "msgflow links apply FILE")
+    assert "Doubtful" not in certain
     (link,) = read_links(write(tmp_path, text)).links
     assert link.node.value == "/no"
     assert [item.value for item in link.inputs] == row["inputs"]
