@@ -13,7 +13,7 @@
 -- column: inputs VARCHAR[]          Topics of the inputs
 -- column: outputs VARCHAR[]         Topics of the outputs
 -- column: evidence VARCHAR          What was seen
--- column: doubt VARCHAR             Why it may be incomplete or misleading; NULL: no particular reason
+-- column: doubt VARCHAR             Why it may be incomplete or misleading; NULL: nothing known
 -- column: process VARCHAR           Process name of the node
 -- column: pid INTEGER               Process id of the node
 -- column: host VARCHAR              Host of the node
