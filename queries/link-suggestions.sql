@@ -228,8 +228,8 @@ SELECT
                     'the node has several candidates, which may share inputs, or be one'
             END,
             CASE
-                WHEN len(list_filter(r.topics, lambda topic: NOT list_contains(c.inputs, topic))) > 0
-                    THEN printf(
+                WHEN NOT list_has_all(c.inputs, r.topics) THEN
+                    printf(
                         'the node also receives %s, which may be inputs as well',
                         array_to_string(
                             list_filter(
