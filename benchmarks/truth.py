@@ -52,6 +52,8 @@ LONG = "long_recording"
 # Recall of the half an hour in which clocks drift apart by 36 ms.
 LOWEST_RECALL = {LONG: 0.999}
 
+# So small that a second of a system fills some.
+_SMALL = 4096
 # What recordings do to a second of a system.
 RECORDINGS = {
     PERFECT: Recording(),
@@ -74,6 +76,34 @@ RECORDINGS = {
     "dual": Recording(start_ns=SECOND // 3, is_dual_session=True, clock_error_ns=3_000),
     "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
     "chunk_missing": Recording(rotations=(SECOND // 3, SECOND // 2), missing_chunk=1),
+    "brim": Recording(
+        lost_event_share=0.8, longest_loss=400, filled_share=0.3, packet_bytes=_SMALL
+    ),
+    "one_cpu": Recording(
+        lost_event_share=0.8,
+        longest_loss=400,
+        packet_bytes=_SMALL,
+        lossy_cpus=(1,),
+    ),
+    "late_one_cpu": Recording(
+        start_ns=SECOND // 5,
+        lost_event_share=0.8,
+        longest_loss=400,
+        packet_bytes=_SMALL,
+        lossy_cpus=(1,),
+    ),
+    "stopped_at_rotation": Recording(
+        pauses=((SECOND // 2, SECOND * 3 // 4),), rotations=(SECOND // 3, SECOND * 2 // 3)
+    ),
+    "snapshots": Recording(
+        snapshots=(SECOND // 3, SECOND // 2, SECOND * 9 // 10), kept_packets=3, packet_bytes=_SMALL
+    ),
+    "last_snapshot": Recording(
+        snapshots=(SECOND // 2, SECOND * 3 // 5, SECOND * 9 // 10),
+        kept_packets=12,
+        is_last_snapshot_only=True,
+        packet_bytes=_SMALL,
+    ),
     "per_process": Recording(buffers=Buffers.PER_PROCESS, clock_error_ns=3_000),
     "drift": Recording(realtime_offset_ns=300_000, slew_ppm=20),
     "behind": Recording(realtime_offset_ns=-200_000, slew_ppm=-20),
@@ -95,6 +125,11 @@ FAULTY_SYSTEMS = ("pipeline", "two_hosts")
 # What every system is recorded with once, since what it costs depends on what the system does.
 EVERY_LAYOUT = "jazzy"
 EVERY_FAULT = ("loss", "packets", "truncated", "rotated", "chunk_missing")
+# Where losses meet threads that move, and messages that come twice.
+GAP_SYSTEMS = ("container", "container_multi_threaded")
+GAP_RECORDINGS = (
+    "brim", "one_cpu", "late_one_cpu", "pause", "stopped_at_rotation", "snapshots", "last_snapshot",
+)  # fmt: skip
 # What comes and goes in these does so after a second.
 WHOLE = ("losses", "restarts", "container_restarts")
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
@@ -150,6 +185,11 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                     not is_faulty
                     or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
                     or (layout == EVERY_LAYOUT and recording in EVERY_FAULT)
+                    or (
+                        layout == EVERY_LAYOUT
+                        and system in GAP_SYSTEMS
+                        and recording in GAP_RECORDINGS
+                    )
                 )
                 if arguments.quick:
                     is_usual = (system, layout) in QUICK and recording in {PERFECT, "loss"}

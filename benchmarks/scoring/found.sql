@@ -17,6 +17,10 @@ instance AS (
     SELECT 'callback_instance', callback_instance_id, thread_id, start_ns
     FROM analysed.store.callback_instance
     UNION ALL
+    SELECT 'is_' || c.kind, i.callback_instance_id, i.thread_id, i.start_ns
+    FROM analysed.store.callback_instance AS i
+    JOIN analysed.store.callback AS c ON i.callback_id = c.callback_id
+    UNION ALL
     SELECT 'callback_end', callback_instance_id, thread_id, end_ns
     FROM analysed.store.callback_instance
     WHERE end_ns IS NOT NULL
@@ -57,6 +61,20 @@ link AS (
         false
     FROM analysed.store.executor_state
     WHERE end_ns IS NOT NULL
+    UNION ALL
+    SELECT
+        'kind', c.kind, 'callback_instance', i.callback_instance_id, 'is_' || c.kind,
+        i.callback_instance_id, false
+    FROM analysed.store.callback_instance AS i
+    JOIN analysed.store.callback AS c ON i.callback_id = c.callback_id
+    WHERE c.kind <> 'unknown'
+    UNION ALL
+    SELECT
+        'called_with', t.method, 'take', t.take_id, 'callback_instance', i.callback_instance_id,
+        false
+    FROM analysed.store.callback_instance AS i
+    JOIN analysed.store.take AS t ON i.take_id = t.take_id
+    WHERE t.method <> 'callback_only'
     UNION ALL
     -- The middleware's own takes carry no stamp; nobody subscribes to them.
     SELECT 'take', method, 'take', take_id, 'take', take_id, false

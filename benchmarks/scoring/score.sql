@@ -32,7 +32,9 @@ found AS (
         count(from_id) AS right_count,
         count(*) FILTER (from_id IS NULL AND NOT is_guess) AS wrong,
         count(*) FILTER (from_id IS NULL AND is_guess) AS misguessed,
-        count(from_id) - count(DISTINCT (from_id, to_id)) FILTER (from_id IS NOT NULL)
+        -- What a loss tore in two may have a link on either side.
+        count(from_id) - count(DISTINCT (from_id, to_id, found_from_id, found_to_id))
+            FILTER (from_id IS NOT NULL)
         - coalesce(any_value(t.several), 0) AS repeated
     FROM verdict
     LEFT JOIN twice AS t USING (kind)

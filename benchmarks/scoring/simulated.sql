@@ -88,6 +88,9 @@ named AS (
     SELECT 'callback_end', callback_instance_id::VARCHAR, host, pid, tid, end_ns
     FROM simulated_callback_instance
     UNION ALL
+    SELECT 'is_' || kind, callback_instance_id::VARCHAR, host, pid, tid, start_ns
+    FROM simulated_callback_instance
+    UNION ALL
     SELECT 'state_start', id, host, pid, tid, start_ns FROM state
     UNION ALL
     SELECT 'state_end', id, host, pid, tid, end_ns FROM state
@@ -285,6 +288,22 @@ SELECT
 FROM simulated_callback_instance AS c
 LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
 WHERE c.end_ns IS NOT NULL
+UNION ALL
+SELECT
+    'kind', 'callback_instance', c.callback_instance_id::VARCHAR, 'is_' || c.kind,
+    c.callback_instance_id::VARCHAR,
+    r.is_start AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM unknown_process),
+    'derive.link_transport'
+FROM simulated_callback_instance AS c
+JOIN recorded AS r ON r.kind = 'callback_instance' AND c.callback_instance_id::VARCHAR = r.id
+UNION ALL
+SELECT
+    'called_with', 'take', t.take_id::VARCHAR, 'callback_instance',
+    c.callback_instance_id::VARCHAR, w.id IS NOT NULL AND t.is_whole, 'derive.link_transport'
+FROM simulated_callback_instance AS c
+JOIN (SELECT id AS take_id, is_whole FROM recorded WHERE kind = 'take') AS t
+    ON c.take_id::VARCHAR = t.take_id
+LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
 UNION ALL
 -- Those that end; whether they must be found is not judged.
 SELECT

@@ -10,6 +10,7 @@ from msgflow.sim.robot import demo
 from msgflow.sim.scenario import (
     annotated,
     autoware,
+    container,
     delivery,
     executors,
     intra_process,
@@ -41,6 +42,8 @@ def scenarios() -> Mapping[str, Scenario]:
         nested.nested(),
         intra_process.intra_process(),
         intra_process.mixed_intra_process(),
+        container.container(),
+        container.container_multi_threaded(),
         delivery.overload(),
         delivery.losses(),
         starvation.starved(),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
+from itertools import chain
 from random import Random
 from typing import TYPE_CHECKING
 from uuid import UUID
@@ -139,11 +140,18 @@ class Recorder:
 
     # What a stream asks when it is recorded with faults.
 
-    def lost_events(self) -> int:
-        """How many events are lost behind the packet that is now full."""
+    def lost_events(self, cpu: int) -> int:
+        """How many events are lost behind the packet of a CPU that is now full."""
+        if self._recording.lossy_cpus and cpu not in self._recording.lossy_cpus:
+            return 0
         if self._random.random() >= self._recording.lost_event_share:
             return 0
         return self._random.randint(1, self._recording.longest_loss)
+
+    def is_filled(self) -> bool:
+        """Whether the packet that is now full ends with its last event."""
+        share = self._recording.filled_share
+        return share > 0 and self._random.random() < share
 
     def is_packet_lost(self) -> bool:
         """Whether the packet that is now full is lost."""
@@ -231,13 +239,26 @@ class Recorder:
             writer = self._writers[pid] = self._trace(
                 session,
                 buffering,
-                breaks=(
-                    *(Break(shown(begin), shown(end)) for begin, end in self._recording.pauses),
-                    *(Break(shown(time), shown(time)) for time in self._recording.rotations),
+                breaks=tuple(
+                    Break(shown(begin), shown(end), is_rotation=is_rotation)
+                    for begin, end, is_rotation in self._breaks()
                 ),
                 begin=shown(self._recording.start_ns),
             )
         return writer
+
+    def _breaks(self) -> Iterator[tuple[int, int, bool]]:
+        """Begin and end of what ends packets, and whether others follow in a directory of its own.
+
+        A session that is rotated while it is stopped goes on in the next chunk when it is started.
+        """
+        recording = self._recording
+        times = (*recording.rotations, *recording.snapshots)
+        for begin, end in recording.pauses:
+            yield begin, end, any(begin < time < end for time in times)
+        for time in times:
+            if not any(begin < time < end for begin, end in recording.pauses):
+                yield time, time, True
 
     def _trace(
         self,
@@ -271,13 +292,18 @@ class Recorder:
         if recording.missing_chunk:
             missing = self._clock.elapsed(sorted(recording.rotations)[recording.missing_chunk - 1])
         ordered = sorted(breaks, key=lambda one: one.begin)
+        is_snapshot = bool(recording.snapshots) and not is_faultless
+        followed = [one for one in ordered if one.is_rotation]
+        if is_snapshot:
+            paths = chain((first,), paths)
         continued = tuple(
             replace(
                 one,
                 directory=next(paths),
-                is_missing=one.begin == missing,
+                is_missing=one.begin == missing
+                or (recording.is_last_snapshot_only and one is not followed[-1]),
             )
-            if one.begin == one.end
+            if one.is_rotation
             else one
             for one in ordered
         )
@@ -295,6 +321,8 @@ class Recorder:
             breaks=continued,
             faults=None if recording.is_perfect or is_faultless else self,
             ending=lambda cpu: None if is_faultless else self._ending(cpu),
+            packet_bytes=0 if is_faultless else recording.packet_bytes,
+            kept_packets=recording.kept_packets if is_snapshot else 0,
         )
 
     def _chunks(self, base: Path, buffering: tuple[str, int, str]) -> Iterator[Path]:
@@ -303,6 +331,8 @@ class Recorder:
         place = f"ust/uid/{number}/64-bit"
         if scheme == "pid":
             place = f"ust/pid/{name}-{number}-{_date(self._identity.epoch_ns):%Y%m%d-%H%M%S}"
+        for number in range(len(self._recording.snapshots)):
+            yield base / f"snapshot-1-{number}" / place
         if not self._recording.rotations:
             yield base / place
             return

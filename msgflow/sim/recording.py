@@ -24,7 +24,11 @@ class Recording:
         is_dual_session: a second session, `snapshot`, has the initialisation events from before
             `start_ns`; the one that starts then is `runtime`.
         pauses: recording is stopped and started again at these times.
-        rotations: the trace is continued in a further chunk of the archive from these times on.
+        rotations: the trace is continued in a further chunk of the archive from these times on;
+            within a pause, when that ends.
+        snapshots: at these times what is in the buffers is recorded, and nothing else is.
+        kept_packets: so many packets of each stream the buffers of snapshots hold.
+        is_last_snapshot_only: the others were recorded too, but are not there.
         missing_chunk: which chunk is not there, counted from 1 behind the first; 0: all are.
         buffers: one trace per user, or one per process.
         handover_ns: the tracer tells one process after the other that recording starts or stops;
@@ -34,6 +38,10 @@ class Recording:
             those of processes, or that of the snapshot from that of the rest.
         lost_event_share: behind this share (0..1) of the packets, events are lost for a while.
         longest_loss: how many events are lost at most at once.
+        filled_share: behind this share (0..1) of the packets with a loss, the loss lies between
+            packets: they are filled to the last byte, and the next waits until there is room.
+        lossy_cpus: only on these CPUs events are lost; on all if there are none.
+        packet_bytes: size of a full packet; 0: as is usual in the layout.
         lost_packet_share: this share of the packets is missing.
         cut_streams: so many streams of each trace end in the middle of a packet.
         unfinished_streams: so many others lack their last packet.
@@ -46,6 +54,9 @@ class Recording:
     is_dual_session: bool = False
     pauses: tuple[tuple[int, int], ...] = ()
     rotations: tuple[int, ...] = ()
+    snapshots: tuple[int, ...] = ()
+    kept_packets: int = 4
+    is_last_snapshot_only: bool = False
     missing_chunk: int = 0
     buffers: Buffers = Buffers.PER_USER
     handover_ns: int = 0
@@ -53,6 +64,9 @@ class Recording:
     clock_error_ns: int = 0
     lost_event_share: float = 0.0
     longest_loss: int = 200
+    filled_share: float = 0.0
+    lossy_cpus: tuple[int, ...] = ()
+    packet_bytes: int = 0
     lost_packet_share: float = 0.0
     cut_streams: int = 0
     unfinished_streams: int = 0
@@ -60,7 +74,7 @@ class Recording:
     slew_ppm: float = 0.0
 
     def __post_init__(self) -> None:
-        for share in (self.lost_event_share, self.lost_packet_share):
+        for share in (self.lost_event_share, self.lost_packet_share, self.filled_share):
             if not 0 <= share <= 1:
                 raise UsageError(f"not a share — {share}", "give a number between 0 and 1")
         if not abs(self.slew_ppm) < 1000:
@@ -77,6 +91,11 @@ class Recording:
             )
         if self.longest_loss < 1:
             raise UsageError("a loss takes at least one event", "give 1 or more")
+        if self.snapshots and (self.kept_packets < 1 or self.rotations or self.is_dual_session):
+            raise UsageError(
+                "snapshots need packets to keep, and go with no rotation and no dual session",
+                "give a number of packets, and snapshots alone",
+            )
         self._check_times()
         if self.is_dual_session and (self.start_ns == 0 or self.buffers is Buffers.PER_PROCESS):
             raise UsageError(
@@ -91,7 +110,12 @@ class Recording:
                     f"a {name} must end after it has begun — {bad[0]}", "give its begin first"
                 )
         previous = self.start_ns
-        for begin, end in sorted((*self.pauses, *((time, time) for time in self.rotations))):
+        apart = (
+            (time, time)
+            for time in (*self.rotations, *self.snapshots)
+            if not any(begin < time < end for begin, end in self.pauses)
+        )
+        for begin, end in sorted((*self.pauses, *apart)):
             if begin <= previous:
                 raise UsageError(
                     "pauses and rotations must follow the start and each other",

@@ -81,6 +81,10 @@ class Stream:
 
     def end_packet(self, end_ns: int | None) -> PacketRow:
         """Return the packet as a row of `PACKET_SCHEMA`."""
+        discarded = self.discarded_event_count
+        if self.lost_packet_count != 0 and discarded != 0:
+            # What was discarded in lost packets, and what behind them, nothing tells.
+            discarded = None
         row = (
             self.trace_index,
             self.stream_index,
@@ -92,7 +96,7 @@ class Stream:
             end_ns,
             self.last_event_ns,
             self.event_count,
-            self.discarded_event_count,
+            discarded,
             self.lost_packet_count,
             False,
         )

@@ -2,7 +2,9 @@
 -- title: The tracer discarded events
 -- description: Events were lost because the buffers were full. What happened in those gaps is
 --     missing, nothing is paired across them, and results near them are marked is_loss_affected.
---     A packet that was cut off, whose events nobody counted, is a damage of the trace.
+--     A packet that was cut off, whose events nobody counted, is a damage of the trace. Where packets
+--     are missing as well, nobody knows how many of the discarded events were in them: these are
+--     not counted.
 -- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
 --     take them away.
 -- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
@@ -28,7 +30,8 @@ loss AS (
     GROUP BY g.trace_id
 ),
 fullest AS (
-    SELECT trace_id, max(event_count) AS events
+    SELECT
+        trace_id, max(event_count) AS events, bool_or(discarded_event_count IS NULL) AS is_uncounted
     FROM store.packet
     GROUP BY trace_id
 )
@@ -37,8 +40,9 @@ SELECT
     t.path AS subject,
     coalesce(l.events, l.places) AS count,
     printf(
-        '%s in %s, %.3f s in all; --subbuf-size=%dM would have held the largest '
+        '%s%s in %s, %.3f s in all; --subbuf-size=%dM would have held the largest '
         || 'burst',
+        CASE WHEN l.events IS NOT NULL AND f.is_uncounted THEN 'at least ' ELSE '' END,
         CASE WHEN l.events = 1 THEN '1 event'
             ELSE coalesce(format('{:,}', l.events), 'unknown') || ' events' END,
         derive.counted(l.places, 'place'),

@@ -1,39 +1,51 @@
 -- name: finding.stream_ends_early
 -- title: Streams end before their trace
--- description: The last packet of a CPU's stream ends well before the end of the trace, while
---     packets of other CPUs go on: events of that CPU may be missing from then on.
+-- description: The last packet of a CPU's stream ends well before the end of the recording, in
+--     whichever chunk or snapshot that is, while packets of other CPUs go on: events of that CPU may
+--     be missing from then on.
 -- cause: Files are cut off (no space, power lost, copied while written), or the last buffers were
 --     not written.
 -- cure: Stop the session before copying; check free space; compare the sizes of the files with the
 --     originals.
--- grain: one row per trace
+-- grain: one row per recording, by the trace that ends last
 -- severity: warning
 -- needs: store.packet, main.trace, derive.counted
-WITH stream AS (
+WITH packet AS (
     SELECT
-        run_id, trace_id, cpu_id, stream_class_id, stream_instance_id,
-        max(coalesce(end_ns, last_event_ns)) AS end_ns
-    FROM store.packet
-    GROUP BY run_id, trace_id, cpu_id, stream_class_id, stream_instance_id
+        t.run_id,
+        min(t.trace_id) OVER (PARTITION BY t.run_id, coalesce(t.uuid::VARCHAR, t.path))
+            AS recording_id,
+        t.path, p.cpu_id, p.stream_class_id, p.stream_instance_id, p.begin_ns,
+        coalesce(p.end_ns, p.last_event_ns) AS end_ns
+    FROM store.packet AS p
+    JOIN main.trace AS t ON p.trace_id = t.trace_id
+    WHERE t.domain IS DISTINCT FROM 'kernel'
 ),
-trace_end AS (
-    SELECT trace_id, min(begin_ns) AS start_ns, max(coalesce(end_ns, last_event_ns)) AS end_ns
-    FROM store.packet
-    GROUP BY trace_id
+stream AS (
+    SELECT
+        recording_id, stream_class_id, stream_instance_id, any_value(cpu_id) AS cpu_id,
+        max(end_ns) AS end_ns
+    FROM packet
+    GROUP BY recording_id, stream_class_id, stream_instance_id
+),
+recording AS (
+    SELECT
+        run_id, recording_id, arg_max(path, end_ns) AS path, min(begin_ns) AS start_ns,
+        max(end_ns) AS end_ns
+    FROM packet
+    GROUP BY run_id, recording_id
 )
 SELECT
-    t.run_id,
-    t.path AS subject,
+    r.run_id,
+    r.path AS subject,
     count(*) AS count,
     printf(
         '%s (CPU %s) end up to %.3f s early',
         derive.counted(count(*), 'stream'),
         string_agg(DISTINCT coalesce(s.cpu_id::VARCHAR, '?'), ', '),
-        max(e.end_ns - s.end_ns) / 1e9
+        max(r.end_ns - s.end_ns) / 1e9
     ) AS detail
 FROM stream AS s
-JOIN trace_end AS e ON s.trace_id = e.trace_id
-JOIN main.trace AS t ON s.trace_id = t.trace_id
-WHERE t.domain IS DISTINCT FROM 'kernel'
-    AND e.end_ns - s.end_ns > greatest(0.05 * (e.end_ns - e.start_ns), 500_000_000)
-GROUP BY t.run_id, t.trace_id, t.path
+JOIN recording AS r ON s.recording_id = r.recording_id
+WHERE r.end_ns - s.end_ns > greatest(0.05 * (r.end_ns - r.start_ns), 500_000_000)
+GROUP BY r.run_id, r.recording_id, r.path

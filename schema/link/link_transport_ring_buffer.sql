@@ -2,7 +2,9 @@
 -- kind: macro
 -- description: Messages between nodes of one process, by the slot of the ring buffer: what is taken
 --     out was put in last, unless the buffer was cleared or made anew meanwhile, or a gap of the
---     trace may hide that it was used again.
+--     trace may hide that the slot was used again. The slots are used in turn: that takes as many
+--     messages as the buffer has slots, and it is taken that they came no faster than where nothing
+--     is missing.
 -- grain: one row per dequeue whose publication is known
 -- param: only_run BIGINT  Run to look at
 -- needs: store.ring_buffer_event, derive.exposed_trace, derive.recording_gap, store.publication,
@@ -10,7 +12,7 @@
 CREATE OR REPLACE MACRO derive.link_transport_ring_buffer(only_run) AS TABLE
 WITH slot_use AS (
     SELECT
-        run_id, trace_id, process_id, buffer_handle, kind, at_ns, take_id, event_id,
+        run_id, trace_id, process_id, buffer_handle, slot, kind, at_ns, take_id, event_id,
         lag(kind) OVER in_slot AS previous_kind,
         lag(event_id) OVER in_slot AS previous_event_id,
         lag(at_ns) OVER in_slot AS previous_ns,
@@ -35,21 +37,59 @@ cleared AS (
     WHERE c.event_id > s.previous_event_id
 ),
 exposed AS (
-    SELECT s.take_id, s.at_ns, s.previous_ns, x.recording_id
+    SELECT
+        s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
     JOIN derive.exposed_trace AS x ON s.trace_id = x.trace_id
     UNION ALL
-    SELECT s.take_id, s.at_ns, s.previous_ns, x.recording_id
+    SELECT
+        s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
     JOIN derive.exposed_trace AS x ON s.previous_trace_id = x.trace_id
     WHERE s.previous_trace_id <> s.trace_id
 ),
 behind_gap AS (
-    SELECT e.take_id
+    SELECT e.take_id, e.process_id, e.buffer_handle, e.at_ns - e.previous_ns AS stay_ns
     FROM exposed AS e
     ASOF JOIN derive.recording_gap AS g
         ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
+),
+-- How soon the next message was put into a buffer, where no gap lies between the two.
+filled AS (
+    SELECT
+        e.process_id, e.buffer_handle, e.slot, e.at_ns, x.recording_id,
+        lag(e.at_ns) OVER (
+            PARTITION BY e.process_id, e.buffer_handle ORDER BY e.event_id
+        ) AS previous_ns
+    FROM slot_use AS e
+    JOIN derive.exposed_trace AS x ON e.trace_id = x.trace_id
+    WHERE e.kind = 'enqueue'
+        AND (e.process_id, e.buffer_handle) IN (
+            SELECT (process_id, buffer_handle) FROM behind_gap
+        )
+),
+pace AS (
+    SELECT
+        f.process_id, f.buffer_handle,
+        max(f.slot) + 1 AS slot_count,
+        min(
+            CASE
+                WHEN g.covered_until_ns > f.previous_ns OR g.start_ns >= f.previous_ns THEN NULL
+                ELSE f.at_ns - f.previous_ns
+            END
+        ) AS shortest_ns
+    FROM filled AS f
+    ASOF LEFT JOIN derive.recording_gap AS g
+        ON f.recording_id = g.recording_id AND f.at_ns > g.start_ns
+    GROUP BY f.process_id, f.buffer_handle
+),
+-- Where the pace is not known, nothing is.
+doubtful AS (
+    SELECT g.take_id
+    FROM behind_gap AS g
+    LEFT JOIN pace AS p ON g.process_id = p.process_id AND g.buffer_handle = p.buffer_handle
+    WHERE coalesce(g.stay_ns >= p.slot_count * p.shortest_ns, true)
 )
 SELECT
     s.run_id,
@@ -64,7 +104,7 @@ FROM slot_use AS s
 JOIN store.publication AS b ON s.publication_id = b.publication_id
 JOIN store.take AS t ON s.take_id = t.take_id
 ANTI JOIN cleared AS c ON s.take_id = c.take_id
-ANTI JOIN behind_gap AS g ON s.take_id = g.take_id
+ANTI JOIN doubtful AS g ON s.take_id = g.take_id
 WHERE b.run_id = only_run
     AND t.run_id = only_run
     AND s.kind = 'dequeue'

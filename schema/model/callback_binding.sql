@@ -1,8 +1,8 @@
 -- name: staging.callback_binding
 -- description: Runs of callbacks with their callback object and the take that they were called
---     with. The callback_start directly follows the take's last layer on its thread; an rmw take
---     is not for an intra-process run, nor a dequeue for another; the subscriptions agree where
---     both are known.
+--     with. The callback_start directly follows the take's last layer on its thread, with no event
+--     of the executor between the two; an rmw take is not for an intra-process run, nor a dequeue
+--     for another; the subscriptions agree where both are known.
 -- grain: one row per callback_start
 -- needs: staging.callback_run, staging.callback_known, staging.take_chain,
 --     staging.take_subscription
@@ -29,8 +29,8 @@ repeated AS (
 run AS (
     SELECT
         r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process,
-        r.previous_event_id, r.executor_event_id, k.event_id AS callback_event_id, k.kind,
-        k.subscription_event_id
+        r.previous_event_id, r.previous_executor_event_id, k.event_id AS callback_event_id,
+        k.kind, k.subscription_event_id
     FROM staging.callback_run AS r
     LEFT JOIN repeated AS o ON r.start_event_id = o.start_event_id
     LEFT JOIN known AS k
@@ -51,7 +51,9 @@ bound AS (
         t.subscription_event_id
     FROM run AS r
     JOIN taken AS t ON r.previous_event_id = t.end_event_id
-    WHERE coalesce(r.executor_event_id < t.end_event_id, true)
+    -- As recorded: what the executor said after the take stands, whatever else was lost. It is NULL
+    -- only where the thread had no executor event at all.
+    WHERE (r.previous_executor_event_id IS NULL OR r.previous_executor_event_id < t.end_event_id)
         AND r.is_intra_process = (t.method = 'ring_buffer')
         AND r.kind IS DISTINCT FROM 'timer'
         AND r.kind IS DISTINCT FROM 'service'

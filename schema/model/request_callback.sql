@@ -1,7 +1,7 @@
 -- name: staging.request_callback
 -- description: Runs of service callbacks with the request that they were called with: the
---     callback_start directly follows its rmw_take_request on the thread, and the services agree
---     where both are known.
+--     callback_start directly follows its rmw_take_request on the thread, with no event of the
+--     executor between the two, and the services agree where both are known.
 -- grain: one row per request that was taken and led to a run of a callback
 -- needs: staging.service_event, staging.callback_run, staging.callback_binding,
 --     staging.callback_known
@@ -11,7 +11,7 @@ JOIN staging.callback_run AS r ON e.event_id = r.previous_event_id
 JOIN staging.callback_binding AS b ON r.start_event_id = b.start_event_id
 LEFT JOIN staging.callback_known AS k ON b.callback_event_id = k.event_id
 WHERE e.is_request
-    AND coalesce(r.executor_event_id < e.event_id, true)
+    AND (r.previous_executor_event_id IS NULL OR r.previous_executor_event_id < e.event_id)
     AND NOT r.is_intra_process
     AND coalesce(b.kind IN ('service', 'unknown'), true)
     AND coalesce(k.service_event_id = e.service_event_id, true)

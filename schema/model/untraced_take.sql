@@ -6,7 +6,7 @@
 --     it has one thread.
 -- grain: one row per such process
 -- needs: staging.callback_announced, staging.callback_trigger, staging.callback_binding,
---     staging.callback_run, staging.located, raw
+--     staging.callback_run, staging.callback_gap, staging.located, raw
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
     FROM staging.callback_trigger AS t
@@ -65,12 +65,22 @@ waited AS (
     FROM staging.located('ros2_rclcpp_executor_wait_for_work')
     WHERE thread_id IN (SELECT thread_id FROM behind)
 ),
+-- A gap may hide that the thread waited in between.
+interrupted AS (
+    SELECT b.start_event_id
+    FROM behind AS b
+    ASOF JOIN staging.callback_gap AS g
+        ON b.thread_id = g.thread_id AND b.start_event_id >= g.event_id
+    WHERE g.event_id > b.served_event_id
+),
 same_round AS (
     SELECT b.process_id
     FROM behind AS b
+    ANTI JOIN interrupted AS i ON b.start_event_id = i.start_event_id
     ASOF LEFT JOIN waited AS w
         ON b.thread_id = w.thread_id AND b.start_event_id > w.event_id
-    WHERE coalesce(w.event_id < b.served_event_id, true)
+    -- No wait at all was seen before, or only earlier ones.
+    WHERE w.thread_id IS NULL OR w.event_id < b.served_event_id
 )
 SELECT process_id FROM subscription_without_take
 UNION

@@ -1,10 +1,11 @@
 -- name: derive.vain_take
 -- description: Attempts of readers that were told of a message and found none: it had expired. A
---     callback that takes by hand looks whether there is one; finding none says nothing.
+--     callback that takes by hand looks whether there is one; finding none says nothing. Nor does
+--     an attempt behind a run that was never seen to end: it may be inside.
 -- grain: one row per attempt outside of callbacks
 -- needs: store.failed_take, store.callback_instance
 SELECT f.run_id, f.subscription_id, f.thread_id, f.failed_ns
 FROM store.failed_take AS f
 ASOF LEFT JOIN store.callback_instance AS c
     ON f.thread_id = c.thread_id AND f.failed_ns >= c.start_ns
-WHERE coalesce(c.end_ns < f.failed_ns, true)
+WHERE c.thread_id IS NULL OR c.end_ns < f.failed_ns

@@ -39,7 +39,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "loss_interval": "kind,cpu,start_ns,end_ns,event_count\n"
             "loss,0,1000000000,1250000000,20000\nloss,1,3000000000,3250000000,5000\n"
             "pause,,5,6,\n",
-            "packet": "cpu_id,event_count\n0,10000\n1,900\n",
+            "packet": "cpu_id,event_count,discarded_event_count\n0,10000,0\n1,900,25000\n",
         },
         [
             (
@@ -176,9 +176,13 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "unbalanced_callbacks": (
         {
-            # the second is explained by a gap, the last may still be running
-            "callback_instance": "callback_instance_id,start_ns,end_ns,is_loss_affected\n"
-            "1,10,,false\n2,20,,true\n3,30,35,false\n4,40,,false\n"
+            # the second is explained by a gap, the last may still be running; another callback is
+            # cut while others run in it, then comes again
+            "callback_instance": "callback_instance_id,callback_id,start_ns,end_ns,"
+            "is_loss_affected\n"
+            "1,1,10,,false\n2,1,20,,true\n3,1,30,35,false\n4,1,60,,false\n"
+            "5,2,38,,false\n6,2,50,55,false\n",
+            "thread_break": "thread_id,resumed_ns\n1,45\n",
         },
         [("process 1 on host", 1, "1 run of 1 callback")],
     ),
@@ -308,6 +312,51 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_pat
     )
     derive(database, 1)
     assert find(database, [1]) == []
+
+
+def test_the_chunks_of_a_recording_are_one(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path
+) -> None:
+    """A CPU was idle in one of them, another in the last: only the latter may lack events."""
+    fill(
+        database,
+        tmp_path,
+        {
+            **SOUND,
+            "trace": "trace_id,uuid,path\n1,7e90b1e2-0000-4000-8000-000000000001,first\n"
+            "2,7e90b1e2-0000-4000-8000-000000000001,second\n",
+            "packet": "trace_id,cpu_id,stream_instance_id,begin_ns,end_ns\n"
+            "1,0,0,0,5000000000\n1,1,1,0,100\n1,2,2,0,5000000000\n"
+            "2,0,0,5000000000,10000000000\n2,1,1,5000000000,9900000000\n"
+            "2,2,2,5000000000,5000000000\n",
+        },
+    )
+    assert [(f.name, f.subject, f.detail) for f in find(database, [1])] == [
+        ("stream_ends_early", "second", "1 stream (CPU 2) end up to 5.000 s early")
+    ]
+
+
+def test_events_discarded_in_lost_packets_are_not_counted(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path
+) -> None:
+    fill(
+        database,
+        tmp_path,
+        {
+            **SOUND,
+            "loss_interval": "kind,cpu,start_ns,end_ns,event_count\nloss,0,0,1000000000,82\n"
+            "loss,0,2000000000,2500000000,\n",
+            "packet": "event_count,discarded_event_count\n400,82\n400,\n",
+        },
+    )
+    assert [(f.name, f.count, f.detail) for f in find(database, [1])] == [
+        (
+            "discarded_events",
+            82,
+            "at least 82 events in 2 places, 1.500 s in all; --subbuf-size=1M would have held "
+            "the largest burst",
+        )
+    ]
 
 
 @pytest.mark.parametrize(("count", "name"), [("", "damaged_trace"), ("7", "discarded_events")])

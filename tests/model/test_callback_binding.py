@@ -33,6 +33,29 @@ def test_the_callback_directly_behind_the_take(system: RosSystem, analyse: Analy
     ]
 
 
+def test_what_the_executor_said_in_between_stands_beside_a_loss_elsewhere(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """A copy that leads to no callback, then a timer; other CPUs lose events all the while."""
+    system.take(MAIN, 0x10, 777)
+    system.ready(MAIN)
+    system.execute(MAIN, 0x20)
+    late = system.start(MAIN, 0xDD)
+    system.end(MAIN, 0xDD)
+    system.take(MAIN, 0x10, 778)
+    direct = system.start(MAIN, 0xCB)
+    end = system.end(MAIN, 0xCB)
+    system.add_packet(0, end)
+    system.add_packet(0, end, last_event=1, discarded=9, cpu=1)
+    model = analyse(system)
+    assert model.rows(STAMPS) == [(late, None, None), (direct, 778, "rmw")]
+    # What the executor named before it, a loss may hide: nothing says that it is a timer.
+    assert model.column("SELECT kind FROM callback ORDER BY callback_handle") == [
+        "subscription",
+        "unknown",
+    ]
+
+
 def test_initialisation_between_them_does_not_matter(system: RosSystem, analyse: Analyse) -> None:
     """Nor do events of providers that say nothing about the call."""
     system.subscription(MAIN, 0x10, "/chatter", callback=0xCB)

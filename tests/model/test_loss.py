@@ -8,6 +8,7 @@ from staged_events import Analyse, Thread
 
 from msgflow.db.finding import find
 
+MS = 1_000_000
 GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM loss_interval ORDER BY start_ns, cpu"
 
 
@@ -34,6 +35,39 @@ def test_events_are_lost_behind_the_last_event_of_their_packet(
     ]
 
 
+def test_events_are_lost_before_a_packet_that_waited_for_room(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """The one before was full to the last byte. Without a loss, nothing happened in between."""
+    system.add_packet(0, 100)
+    system.add_packet(180, 300, last_event=290, discarded=7)
+    system.add_packet(350, 400, last_event=390)
+    system.add_packet(400, 500, last_event=480, discarded=2)
+    start = system.add("ros2:callback_start", Thread(100), ts=90, callback=0xC1)
+    system.add("ros2:callback_end", Thread(100), ts=200, callback=0xC1)
+    model = analyse(system)
+    assert model.rows(GAPS) == [
+        ("loss", 0, 100, 180, None),
+        ("loss", 0, 290, 300, 7),
+        ("loss", 0, 480, 500, 2),
+    ]
+    assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, None)]
+    assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'discarded_events'") == [
+        ("data_loss", 9)
+    ]
+
+
+def test_packets_are_lost_before_one_that_counts_a_loss(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    system.add_packet(0, 100)
+    system.add_packet(180, 300, last_event=290, discarded=7, lost_packets=2)
+    assert analyse(system).rows(GAPS) == [
+        ("packets", 0, 100, 180, None),
+        ("loss", 0, 290, 300, 7),
+    ]
+
+
 def test_a_packet_may_hold_nothing_but_a_loss(system: RosSystem, analyse: Analyse) -> None:
     system.add_packet(0, 100)
     system.add_packet(100, 200, count=0, discarded=7)
@@ -53,10 +87,10 @@ def test_lost_packets_lie_between_those_around_them(system: RosSystem, analyse: 
 
 def test_a_pause_is_a_silence_of_all_streams(system: RosSystem, analyse: Analyse) -> None:
     for cpu in (0, 1):
-        system.add_packet(0, 100 + cpu, cpu=cpu)
-        system.add_packet(500 - cpu, 600, cpu=cpu)
+        system.add_packet(0, 10 * MS + cpu, cpu=cpu)
+        system.add_packet(50 * MS - cpu, 60 * MS, cpu=cpu)
     model = analyse(system)
-    assert model.rows(GAPS) == [("pause", None, 101, 499, None)]
+    assert model.rows(GAPS) == [("pause", None, 10 * MS + 1, 50 * MS - 1, None)]
     assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'pause'") == [
         ("warning", 1)
     ]
@@ -64,81 +98,167 @@ def test_a_pause_is_a_silence_of_all_streams(system: RosSystem, analyse: Analyse
 
 def test_a_silence_of_one_stream_is_none(system: RosSystem, analyse: Analyse) -> None:
     """Nor are two that do not overlap."""
-    system.add_packet(0, 100)
-    system.add_packet(300, 600)
-    system.add_packet(0, 350, cpu=1)
-    system.add_packet(500, 600, cpu=1)
+    system.add_packet(0, 10 * MS)
+    system.add_packet(30 * MS, 60 * MS)
+    system.add_packet(0, 35 * MS, cpu=1)
+    system.add_packet(50 * MS, 60 * MS, cpu=1)
     assert analyse(system).rows(GAPS) == []
 
 
 def test_traces_pause_apart(system: RosSystem, analyse: Analyse) -> None:
     system.add_source(1, "beta", "boot-b")
-    system.add_packet(0, 600, trace=0)
-    system.add_packet(0, 100, trace=1)
-    system.add_packet(500, 600, trace=1)
+    system.add_packet(0, 60 * MS, trace=0)
+    system.add_packet(0, 10 * MS, trace=1)
+    system.add_packet(50 * MS, 60 * MS, trace=1)
     assert analyse(system).rows("SELECT trace_id, kind, start_ns, end_ns FROM loss_interval") == [
-        (2, "pause", 100, 500)
+        (2, "pause", 10 * MS, 50 * MS)
     ]
 
 
 def test_flushing_at_the_end_is_no_pause(system: RosSystem, analyse: Analyse) -> None:
     """Stopping leaves an empty packet in every stream, long after the last event."""
     for cpu in (0, 1):
-        system.add_packet(0, 100, cpu=cpu)
-        system.add_packet(900, 900, count=0, cpu=cpu)
+        system.add_packet(0, 10 * MS, cpu=cpu)
+        system.add_packet(90 * MS, 90 * MS, count=0, cpu=cpu)
     assert analyse(system).rows(GAPS) == []
 
 
 def test_an_idle_stream_does_not_hide_a_pause(system: RosSystem, analyse: Analyse) -> None:
     """Empty packets of an idle CPU, flushed while tracing was stopped and when it went on."""
-    system.add_packet(0, 100, cpu=0, count=0)
-    system.add_packet(500, 500, cpu=0, count=0)
-    system.add_packet(500, 600, cpu=0, count=0)
-    system.add_packet(0, 100, cpu=1)
-    system.add_packet(500, 600, cpu=1)
-    assert analyse(system).rows(GAPS) == [("pause", None, 100, 500, None)]
+    system.add_packet(0, 10 * MS, cpu=0, count=0)
+    system.add_packet(50 * MS, 50 * MS, cpu=0, count=0)
+    system.add_packet(50 * MS, 60 * MS, cpu=0, count=0)
+    system.add_packet(0, 10 * MS, cpu=1)
+    system.add_packet(50 * MS, 60 * MS, cpu=1)
+    assert analyse(system).rows(GAPS) == [("pause", None, 10 * MS, 50 * MS, None)]
 
 
-def chunks(system: RosSystem, *, numbered: bool = True, lost: int = 0) -> None:
-    """Two of one recording: until 200, and on each of two CPUs from its first event on."""
+@pytest.mark.parametrize(("length", "is_pause"), [(MS - 1, False), (MS, True)])
+def test_nobody_stops_and_starts_within_a_millisecond(
+    system: RosSystem, analyse: Analyse, length: int, is_pause: bool
+) -> None:
+    for cpu in (0, 1):
+        system.add_packet(0, 10 * MS, cpu=cpu)
+        system.add_packet(10 * MS + length, 60 * MS, cpu=cpu)
+    assert bool(analyse(system).rows(GAPS)) is is_pause
+
+
+def events_at(system: RosSystem, *moments: int) -> None:
+    for moment in moments:
+        system.add("ros2:rclcpp_executor_wait_for_work", Thread(100), ts=moment, timeout=-1)
+
+
+@pytest.mark.parametrize(
+    ("distance", "length", "is_pause"),
+    [
+        # As long as the silence between packets, and longer; a little less.
+        (500 * MS, 20 * MS, False),
+        (500 * MS, 25 * MS, False),
+        (500 * MS, 20 * MS - 1, True),
+        # It ends less than a second before, or has ended by then.
+        (1_000 * MS - 1, 20 * MS, False),
+        (1_000 * MS, 20 * MS, True),
+    ],
+)
+def test_a_silence_as_is_usual_there_is_no_pause(
+    system: RosSystem, analyse: Analyse, distance: int, length: int, is_pause: bool
+) -> None:
+    """Something else ended the packets, and the next ones begin with their first events."""
+    end = 2_000 * MS
+    for cpu in (0, 1):
+        system.add_packet(0, end, cpu=cpu)
+        system.add_packet(end + 20 * MS, 2_100 * MS, cpu=cpu)
+    usual_end = end - distance
+    events_at(system, usual_end - length)
+    events_at(system, *range(usual_end, end, 10 * MS), end, end + 20 * MS)
+    expected = [("pause", None, end, end + 20 * MS, None)] if is_pause else []
+    assert analyse(system).rows(GAPS) == expected
+
+
+@pytest.mark.parametrize(("distance", "is_pause"), [(4_000 * MS - 1, False), (4_000 * MS, True)])
+def test_long_silences_are_compared_with_what_is_farther_away(
+    system: RosSystem, analyse: Analyse, distance: int, is_pause: bool
+) -> None:
+    """A second of silence with the four seconds around it; here with those behind it."""
+    for cpu in (0, 1):
+        system.add_packet(0, 1_000 * MS, cpu=cpu)
+        system.add_packet(2_000 * MS, 9_000 * MS, cpu=cpu)
+    events_at(system, *range(900 * MS, 1_001 * MS, 10 * MS))
+    quiet = 2_000 * MS + distance
+    events_at(system, *range(2_000 * MS, quiet, 10 * MS), quiet, quiet + 1_000 * MS)
+    expected = [("pause", None, 1_000 * MS, 2_000 * MS, None)] if is_pause else []
+    assert analyse(system).rows(GAPS) == expected
+
+
+def test_a_pause_is_no_usual_silence(system: RosSystem, analyse: Analyse) -> None:
+    """Stopped twice for as long."""
+    for cpu in (0, 1):
+        for begin in (0, 100 * MS, 200 * MS):
+            system.add_packet(begin, begin + 50 * MS, cpu=cpu)
+    events_at(system, *(begin + at for begin in (0, 100 * MS, 200 * MS) for at in (0, 50 * MS)))
+    events_at(system, 25 * MS, 125 * MS, 225 * MS)
+    assert analyse(system).rows(GAPS) == [
+        ("pause", None, 50 * MS, 100 * MS, None),
+        ("pause", None, 150 * MS, 200 * MS, None),
+    ]
+
+
+def chunks(
+    system: RosSystem, *, numbered: bool = True, lost: tuple[int, int] = (0, 0), opened: int
+) -> None:
+    """Two of one recording: until 200 ms, and on each of two CPUs from its first event on.
+
+    The second begins with an empty packet of each CPU.
+    """
     for chunk in (0, 1):
         system.add_source(chunk, "alpha", "boot", "recording")
     for cpu in (0, 1):
-        system.add_packet(0, 200, cpu=cpu, trace=0, numbered=numbered)
+        system.add_packet(0, 200 * MS + cpu, cpu=cpu, trace=0, numbered=numbered)
         system.add_packet(
-            500 + cpu,
-            700,
-            cpu=cpu,
-            trace=1,
-            numbered=numbered,
-            lost_packets=lost,
-        )
+            opened + cpu, opened + cpu, count=0, cpu=cpu, trace=1, numbered=numbered,
+            lost_packets=lost[cpu],
+        )  # fmt: skip
+        system.add_packet(opened + MS // 2 + cpu, 700 * MS, cpu=cpu, trace=1, numbered=numbered)
 
 
 def test_chunks_of_a_recording_follow_each_other(system: RosSystem, analyse: Analyse) -> None:
-    """The first packet of a CPU behind a rotation begins with its first event."""
-    chunks(system)
+    """The first packet of a CPU in the second is empty, the next begins with its first event."""
+    chunks(system, opened=200 * MS + 12_000)
     assert analyse(system).rows(GAPS) == []
+
+
+def test_stopped_at_a_rotation(system: RosSystem, analyse: Analyse) -> None:
+    """The numbers go on: nothing but the time is missing."""
+    chunks(system, opened=500 * MS)
+    assert analyse(system).rows(GAPS) == [("pause", None, 200 * MS + 1, 500 * MS, None)]
+
+
+def test_stopped_while_packets_of_one_stream_are_lost(system: RosSystem, analyse: Analyse) -> None:
+    chunks(system, opened=500 * MS, lost=(0, 2))
+    assert analyse(system).rows(GAPS) == [
+        ("packets", 1, 200 * MS + 1, 500 * MS + 1, None),
+        ("pause", None, 200 * MS + 1, 500 * MS, None),
+    ]
 
 
 def test_a_chunk_is_missing(system: RosSystem, analyse: Analyse) -> None:
     """As its packets are. A run does not go on behind them, nor one on both sides of another."""
-    chunks(system, lost=3)
+    chunks(system, lost=(3, 3), opened=500 * MS)
     before, after = Thread(100), Thread(100, trace=1)
-    start = system.add("ros2:callback_start", before, ts=150, callback=0xC1)
-    end = system.add("ros2:callback_end", after, ts=600, callback=0xC1)
+    start = system.add("ros2:callback_start", before, ts=150 * MS, callback=0xC1)
+    end = system.add("ros2:callback_end", after, ts=600 * MS, callback=0xC1)
     model = analyse(system)
     assert model.rows(GAPS) == [
-        ("packets", 0, 200, 500, None),
-        ("packets", 1, 200, 501, None),
+        ("packets", 0, 200 * MS, 500 * MS, None),
+        ("packets", 1, 200 * MS + 1, 500 * MS + 1, None),
     ]
     assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, None)]
     assert model.column("SELECT resumed_ns FROM thread_break") == [end]
 
 
 def test_a_silence_between_chunks_without_numbers(system: RosSystem, analyse: Analyse) -> None:
-    chunks(system, numbered=False)
-    assert analyse(system).rows(GAPS) == [("pause", None, 200, 500, None)]
+    chunks(system, numbered=False, opened=500 * MS)
+    assert analyse(system).rows(GAPS) == [("pause", None, 200 * MS + 1, 500 * MS, None)]
 
 
 def test_a_gap_of_a_chunk_holds_for_the_recording(system: RosSystem, analyse: Analyse) -> None:
@@ -174,12 +294,12 @@ def test_nothing_is_paired_across_a_pause(system: RosSystem, analyse: Analyse) -
     system.add_source(1, "beta", "boot-b")
     here, there = Thread(100, cpu=1), Thread(100, trace=1)
     starts = [system.start(thread, 0xC1) for thread in (here, there)]
-    system.wait(500)
+    system.wait(5 * MS)
     ends = [system.end(thread, 0xC1) for thread in (here, there)]
     for cpu in (0, 1):
         system.add_packet(1_000, starts[0], cpu=cpu)
-        system.add_packet(ends[0], 2_000, cpu=cpu)
-    system.add_packet(1_000, 2_000, trace=1)
+        system.add_packet(ends[0], 6 * MS, cpu=cpu)
+    system.add_packet(1_000, 6 * MS, trace=1)
     assert analyse(system).rows(
         "SELECT trace_id, start_ns, end_ns FROM callback_instance ORDER BY 1"
     ) == [(1, starts[0], None), (2, starts[1], ends[1])]

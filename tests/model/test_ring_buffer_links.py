@@ -117,6 +117,30 @@ def test_a_gap_may_have_begun_before_the_message(intra: Intra, analyse: Analyse)
     ]
 
 
+@pytest.mark.parametrize(("stay", "is_linked"), [(1_999, True), (2_000, False)])
+def test_a_gap_too_short_for_the_buffer_to_come_round(
+    intra: Intra, analyse: Analyse, stay: int, is_linked: bool
+) -> None:
+    """It has two slots, and messages came a microsecond apart, or more."""
+    for slot, pause in ((0, 980), (1, 5_000)):
+        intra.publish(slot)
+        intra.system.wait(pause)
+    for slot in (0, 1):
+        intra.dequeue(slot)
+    published = intra.publish(0)
+    put = published + 10
+    # What comes behind the gap says nothing of how fast they come.
+    intra.system.add_packet(0, put + 600, last_event=put + 500, discarded=3, cpu=3)
+    intra.system.add_packet(put + 600, 50_000, cpu=3)
+    intra.system.add_packet(0, 50_000, cpu=0)
+    intra.system.wait(stay - 10)
+    taken = intra.dequeue(0)
+    assert taken == put + stay
+    rows = analyse(intra.system).rows(LINKS)
+    assert len(rows) == 2 + is_linked
+    assert ((published, taken, "ring_buffer") in rows) is is_linked
+
+
 def test_buffers_of_other_processes_are_others(intra: Intra, analyse: Analyse) -> None:
     intra.publish(0)
     other = Thread(200)

@@ -207,6 +207,15 @@ def test_timers_come_first_in_a_round(system: RosSystem, analyse: Analyse) -> No
     assert uncertain(analysis) == [("unknown_owner", 2)]
 
 
+def test_a_gap_may_hide_the_begin_of_a_round(system: RosSystem, analyse: Analyse) -> None:
+    receive(system, 0x30, 0xC9)
+    system.lose()
+    system.ready(MAIN)
+    system.execute(MAIN, 0x21)
+    run(system, 0xC1)
+    assert analyse(system).rows(CALLBACKS)[0] == (0xC1, "timer", 1)
+
+
 def test_several_threads_keep_no_such_order(system: RosSystem, analyse: Analyse) -> None:
     """The timer's callback group may have been busy."""
     receive(system, 0x30, 0xC9, OTHER)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
 from collections import Counter
@@ -26,7 +27,22 @@ FAULTS = {
     "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
     "chunk": Recording(rotations=(SECOND // 3, SECOND // 2), missing_chunk=1),
     "per_process": Recording(buffers=Buffers.PER_PROCESS),
+    "brim": Recording(lost_event_share=0.5, filled_share=0.5, packet_bytes=4096),
+    "one_cpu": Recording(lost_event_share=0.9, packet_bytes=4096, lossy_cpus=(1,)),
+    "stopped": Recording(
+        pauses=((SECOND // 2, SECOND * 3 // 4),), rotations=(SECOND // 3, SECOND * 2 // 3)
+    ),
+    "snapshots": Recording(
+        snapshots=(SECOND // 3, SECOND // 2, SECOND), kept_packets=2, packet_bytes=4096
+    ),
+    "last_snapshot": Recording(
+        snapshots=(SECOND // 2, SECOND),
+        kept_packets=9,
+        is_last_snapshot_only=True,
+        packet_bytes=4096,
+    ),
 }
+LOSSES = ("loss", "brim", "one_cpu")
 CAUSES = {
     "late": "late start",
     "loss": "loss",
@@ -35,6 +51,11 @@ CAUSES = {
     "unfinished": "truncation",
     "chunk": "packets",
     "dual": "late start",
+    "brim": "loss",
+    "one_cpu": "loss",
+    "stopped": "pause",
+    "snapshots": "packets",
+    "last_snapshot": "packets",
 }
 
 
@@ -84,9 +105,9 @@ def test_the_truth_names_exactly_what_is_missing(bt2, made, name):
     assert sum(events.values()) == simulation.event_count
     assert {row[4] for row in rows} == ({CAUSES[name]} if name in CAUSES else set())
     # LTTng counts what it discards while it records, and numbers packets.
-    assert (discarded > 0) is (name == "loss")
+    assert (discarded > 0) is (name in LOSSES)
     assert discarded <= len(rows)
-    assert (packets > 0) is (name in {"packets", "chunk"})
+    assert (packets > 0) is (name in {"packets", "chunk", "snapshots"})
 
 
 def test_counters_rise_with_every_loss(made):
@@ -103,6 +124,83 @@ def test_counters_rise_with_every_loss(made):
         total += last
     ((count,),) = duckdb.sql(f"SELECT count(*) FROM '{simulation.truth['unrecorded']}'").fetchall()
     assert total == count > 50
+
+
+HEADER = struct.Struct("<I16sIQQQQQQQI")
+
+
+def _packets(directory):
+    """Begin, end, sequence number and discarded events of the packets, by CPU."""
+    found = {}
+    for stream in sorted(directory.glob("ros2_*")):
+        data, offset = stream.read_bytes(), 0
+        packets = found[int(stream.name.removeprefix("ros2_"))] = []
+        while offset < len(data):
+            *_, begin, end, _, size, sequence, discarded, _ = HEADER.unpack_from(data, offset)
+            packets.append((begin, end, sequence, discarded))
+            offset += size // 8
+    return found
+
+
+def test_a_packet_that_is_filled_is_followed_by_a_hole_with_the_loss(made):
+    """The packet behind the hole counts it; without a loss packets are continuous."""
+    (directory,) = made("brim").trace_directories
+    holes = []
+    for packets in _packets(directory).values():
+        for (_, end, _, before), (begin, _, _, after) in itertools.pairwise(packets):
+            assert begin == end or after > before
+            holes.append(begin - end)
+    assert min(holes) == 0
+    assert max(holes) > SECOND // 100
+    (directory,) = made("loss").trace_directories
+    for packets in _packets(directory).values():
+        assert all(b[0] == a[1] for a, b in itertools.pairwise(packets))
+
+
+def test_only_one_cpu_loses_events(made):
+    (directory,) = made("one_cpu").trace_directories
+    losing = {cpu for cpu, packets in _packets(directory).items() if packets[-1][3]}
+    assert losing == {1}
+
+
+def test_a_chunk_begins_with_an_empty_packet_of_every_cpu(made):
+    """A few microseconds behind the last one of the chunk before; the next has the first event."""
+    before, *chunks = map(_packets, made("rotated").trace_directories)
+    filled = 0
+    for chunk in chunks:
+        for cpu, packets in chunk.items():
+            begin, end, sequence, _ = packets[0]
+            assert begin == end
+            assert sequence == before[cpu][-1][2] + 1
+            assert 0 <= begin - before[cpu][-1][1] <= 10_000
+            assert all(later[0] > begin for later in packets[1:])
+            filled += len(packets) > 1
+        before = chunk
+    assert filled
+
+
+def test_a_session_that_is_rotated_while_stopped_goes_on_when_started(made):
+    first, second, third = map(_packets, made("stopped").trace_directories)
+    assert {packets[0][0] - first[cpu][-1][1] < 20_000 for cpu, packets in second.items()} == {True}
+    for cpu, packets in third.items():
+        assert packets[0][0] - second[cpu][-1][1] == SECOND // 4
+        assert packets[0][2] == second[cpu][-1][2] + 1
+
+
+def test_a_snapshot_has_what_is_in_the_buffers(made):
+    """The newest packets of each CPU, also those that the snapshot before it has."""
+    for directory in made("snapshots").trace_directories:
+        assert directory.parts[-5].startswith("snapshot-1-")
+        assert all(len(packets) <= 2 for packets in _packets(directory).values())
+    (only,) = made("last_snapshot").trace_directories
+    assert only.parts[-4].startswith("snapshot") or only.parts[-5] == "snapshot-1-1"
+    ends = [
+        end
+        for packets in _packets(only).values()
+        for (_, end, *_), _ in itertools.pairwise(packets)
+    ]
+    # The earlier one ended the packets of all CPUs at one time.
+    assert max(ends.count(end) for end in ends) > 1
 
 
 def test_a_snapshot_has_the_initialisation_events(made):
@@ -194,7 +292,10 @@ def test_faults_do_not_change_what_happens(made):
         ({"lost_packet_share": -0.1}, "share"),
         ({"pauses": ((2, 1),)}, "pause"),
         ({"start_ns": 5, "pauses": ((1, 2),)}, "follow"),
-        ({"pauses": ((1, 5),), "rotations": (3,)}, "follow"),
+        ({"snapshots": (3,), "rotations": (4,)}, "snapshots"),
+        ({"snapshots": (3,), "kept_packets": 0}, "snapshots"),
+        ({"snapshots": (3, 3)}, "follow"),
+        ({"filled_share": 2}, "share"),
         ({"pauses": ((2, 4),), "rotations": (2,)}, "follow"),
         ({"pauses": ((2, 4),), "rotations": (4,)}, "follow"),
         ({"pauses": ((2, 4), (4, 5))}, "follow"),

@@ -143,6 +143,22 @@ class TestDiscardedEvents:
             write_index(write(tmp_path / str(number), *packets), 0, packets)
         assert column(read_rows(tmp_path), "discarded_event_count") == [0, 4, 0, 2, 1]
 
+    def test_what_lost_packets_discarded_is_not_known(
+        self, tmp_path: Path, read_rows: Read
+    ) -> None:
+        """Nor what of the rise came behind them; where the counter stands still, it was nothing."""
+        packets = [
+            Packet(
+                events(number), begin=number - 1, end=number + 4, discarded=count, sequence=place
+            )
+            for number, count, place in ((1, 2, 0), (11, 9, 4), (21, 10, 5), (31, 10, 8))
+        ]
+        trace = write(tmp_path / "trace", *packets)
+        write_index(trace, 0, packets)
+        rows = read_rows(trace)
+        assert column(rows, "discarded_event_count") == [2, None, 1, 0]
+        assert column(rows, "lost_packet_count") == [0, 3, 0, 2]
+
     def test_other_recordings_count_for_themselves(self, tmp_path: Path, read_rows: Read) -> None:
         for number in range(2):
             packets = [Packet(events(10 * number + 1), discarded=3)]

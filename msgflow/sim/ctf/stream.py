@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from struct import Struct
 from typing import TYPE_CHECKING, Protocol
 
+from msgflow.sim.ctf.packet_memory import Entry, PacketMemory, PacketNumbers
 from msgflow.sim.ctf.tracepoint import Tracepoint, extended
 
 if TYPE_CHECKING:
@@ -24,26 +25,33 @@ _INDEX_HEADER = Struct(">IIII")
 _INDEX_MAGIC = 0xC1F1_DCC1
 _INDEX_ENTRY = Struct(">QQQQQQQQQ")
 _FOR_EVER = 1 << 62
+# How long before the first packet of the next chunk the last ones of a chunk end.
+_ROTATION_NS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
 class Break:
     """Packets end at `begin`, the next ones begin at `end`; what happens between is not recorded.
 
-    With a `directory`, files are continued there; if that `is_missing`, to be deleted.
+    With a `directory`, files are continued there; if that `is_missing`, to be deleted. Where
+    packets are only kept in memory, those that are there are written to the directory instead.
     """
 
     begin: int
     end: int
     directory: Path | None = None
     is_missing: bool = False
+    is_rotation: bool = False
 
 
 class Faults(Protocol):
     """What goes wrong while a stream is recorded."""
 
-    def lost_events(self) -> int:
-        """How many events are lost behind the packet that is now full."""
+    def lost_events(self, cpu: int) -> int:
+        """How many events are lost behind the packet of a CPU that is now full."""
+
+    def is_filled(self) -> bool:
+        """Whether no byte of that packet is left over, so that it ends with its last event."""
 
     def is_packet_lost(self) -> bool:
         """Whether the packet that is now full is lost."""
@@ -66,8 +74,11 @@ class Ending:
 class StreamWriter:
     """Writes the events of one CPU. Packets go to disk as they fill up.
 
-    Events must come in the order of time. A packet ends at the time of the event that did not
-    fit, which is where the next one begins, as LTTng does it.
+    Events must come in the order of time. As LTTng does it, a packet ends at the time of the
+    event that did not fit, which is where the next one begins; but behind one that was ended for
+    another reason, or is filled to the last byte, the next one begins with its first event. Losses
+    are counted in the packet that is ended next. A further chunk of the archive begins with an
+    empty packet.
     """
 
     def __init__(
@@ -82,6 +93,7 @@ class StreamWriter:
         breaks: Iterable[Break] = (),
         faults: Faults | None = None,
         ending: Ending | None = None,
+        kept_packets: int = 0,
     ) -> None:
         """Open the files.
 
@@ -95,12 +107,15 @@ class StreamWriter:
             breaks: in the order of time.
             faults: what goes wrong; nothing if None.
             ending: how the last file ends; completely if None.
+            kept_packets: so many are kept in memory, older ones are overwritten, and only breaks
+                write them; 0: each is written once it is full.
         """
         self._uuid = uuid.bytes
         self._cpu = cpu
         self._origin = origin
         self._packet_bytes = packet_bytes
-        self._begin = begin + origin
+        # None: the packet begins with its first event.
+        self._begin: int | None = begin + origin
         self._breaks = deque(breaks)
         self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
         self._silent_until = 0
@@ -110,13 +125,15 @@ class StreamWriter:
         # Nothing was written before, so that the first event carries the whole clock value.
         self._last = 0
         self._records: list[bytes] = []
-        self._entries: list[tuple[Tracepoint, int, bytes]] = []
+        self._entries: list[Entry] = []
         self._size = _HEADER.size
         self._sequence = 0
         self._discarded = 0
         self._to_lose = 0
         self._is_full = False
-        self._open(directory)
+        self._memory = PacketMemory(kept_packets, self._overwritten) if kept_packets else None
+        if self._memory is None:
+            self._open(directory)
 
     def emit(self, tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
         """Append one event at `time` (ns since time 0), if the trace has such events."""
@@ -143,13 +160,19 @@ class StreamWriter:
         if size > self._packet_bytes or self._is_full:
             if self._faults is not None and not self._is_full:
                 self._is_full = True
-                self._to_lose = self._faults.lost_events()
+                self._to_lose = self._faults.lost_events(self._cpu)
                 if self._to_lose:
+                    if self._faults.is_filled():
+                        self._write_packet(self._last, self._packet_bytes, is_full=True)
+                        self._begin = None
+                        self._is_full = False
                     self.emit(tracepoint, time, context, *values)
                     return
             self._is_full = False
             self._write_packet(cycles, self._packet_bytes, is_full=True)
             size = _HEADER.size + len(record)
+        if self._begin is None:
+            self._begin = cycles
         tracepoint.count += 1
         self._records.append(record)
         if self._faults is not None:
@@ -178,6 +201,10 @@ class StreamWriter:
     def close(self, end: int) -> None:
         """Write what is left as a last packet, which ends at time `end` (empty or not)."""
         self._pass_breaks(end)
+        if self._memory is not None:
+            self._end_packet(end)
+            self._memory.close()
+            return
         if end > self._silent_until:
             self._end_packet(end, self._ending)
         self._close()
@@ -186,14 +213,33 @@ class StreamWriter:
         """Do what is due at `time` or before it."""
         while self._breaks and self._breaks[0].begin <= time:
             due = self._breaks.popleft()
-            self._end_packet(due.begin)
-            self._begin = due.end + self._origin
-            self._silent_until = due.end
-            if due.directory is not None:
+            if due.directory is None:
+                self._end_packet(due.begin)
+            elif self._memory is not None:
+                self._flush(due.begin)
+                if not due.is_missing:
+                    self._open(due.directory)
+                    self._memory.write(self._write)
+                    self._close()
+            else:
+                # The buffers are ended one after the other before any is opened again.
+                if due.end > due.begin:
+                    self._end_packet(due.begin)
+                else:
+                    self._flush(due.begin - _ROTATION_NS // (self._cpu + 1))
                 self._close()
                 self._open(due.directory)
                 self._is_missing = due.is_missing
+                self._begin = due.end + self._origin
+                self._write_packet(self._begin, PAGE_BYTES)
+            self._begin = None
+            self._silent_until = due.end
         self._next_break = self._breaks[0].begin if self._breaks else _FOR_EVER
+
+    def _flush(self, end: int) -> None:
+        """End the packet at `end`, or with its last event after that, if there is any in it."""
+        if self._records or self._begin is not None:
+            self._end_packet(max(end, self._last - self._origin))
 
     def _end_packet(self, end: int, ending: Ending | None = None) -> None:
         self._is_full = False
@@ -205,29 +251,25 @@ class StreamWriter:
         self, end: int, size: int, ending: Ending | None = None, *, is_full: bool = False
     ) -> None:
         content_bits, packet_bits = self._size * 8, size * 8
-        sequence, begin = self._sequence, self._begin
-        header = _HEADER.pack(
-            _MAGIC, self._uuid, _STREAM_ID, self._cpu,
-            begin, end, content_bits, packet_bits, sequence, self._discarded, self._cpu,
-        )  # fmt: skip
-        entry = _INDEX_ENTRY.pack(
-            self._offset, packet_bits, content_bits, begin, end,
-            self._discarded, _STREAM_ID, self._cpu, sequence,
-        )  # fmt: skip
+        begin = end if self._begin is None else self._begin
+        numbers = (begin, end, content_bits, packet_bits, self._sequence, self._discarded)
+        header = _HEADER.pack(_MAGIC, self._uuid, _STREAM_ID, self._cpu, *numbers, self._cpu)
         kept = self._kept(ending, is_full=is_full)
         if kept is None:
-            self._withdraw(0, "packets" if ending is None else "truncation")
-        else:
+            self._withdraw(self._entries, "packets" if ending is None else "truncation")
+        elif ending is not None and ending.is_last_packet_cut:
+            # A packet that is not whole cannot be relied on, even what there is of it.
+            self._withdraw(self._entries, "truncation")
             self._file.write(header)
             self._file.writelines(self._records[:kept])
-            if ending is not None and ending.is_last_packet_cut:
-                # A packet that is not whole cannot be relied on, even what there is of it.
-                self._withdraw(0, "truncation")
-                self._file.writelines(record[:-1] for record in self._records[kept : kept + 1])
+            self._file.writelines(record[:-1] for record in self._records[kept : kept + 1])
+        else:
+            content = b"".join((header, *self._records, bytes(size - self._size)))
+            if self._memory is None:
+                self._write(content, numbers)
             else:
-                self._file.write(bytes(size - self._size))
-                self._index.write(entry)
-                self._offset += size
+                self._memory.keep(content, numbers, self._entries)
+                self._entries = []
         self._records.clear()
         self._entries.clear()
         self._size = _HEADER.size
@@ -244,9 +286,25 @@ class StreamWriter:
             return None
         return len(self._records)
 
-    def _withdraw(self, kept: int, cause: str) -> None:
-        """Only the first `kept` events of the packet are recorded."""
-        for tracepoint, time, context in self._entries[kept:]:
+    def _write(self, content: bytes, numbers: PacketNumbers) -> None:
+        """Append a packet to the files."""
+        begin, end, content_bits, packet_bits, sequence, discarded = numbers
+        self._file.write(content)
+        self._index.write(
+            _INDEX_ENTRY.pack(
+                self._offset, packet_bits, content_bits, begin, end,
+                discarded, _STREAM_ID, self._cpu, sequence,
+            )
+        )  # fmt: skip
+        self._offset += len(content)
+
+    def _overwritten(self, events: Iterable[Entry]) -> None:
+        """The events of a packet are not recorded: others took its place in memory."""
+        self._withdraw(events, "packets")
+
+    def _withdraw(self, events: Iterable[Entry], cause: str) -> None:
+        """Events that were emitted are not recorded."""
+        for tracepoint, time, context in events:
             tracepoint.count -= 1
             self._lose(tracepoint, time, context, cause)
 

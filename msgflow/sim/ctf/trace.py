@@ -64,11 +64,19 @@ class TraceWriter:
         breaks: Sequence[Break] = (),
         faults: Faults | None = None,
         ending: Callable[[int], Ending | None] = lambda cpu: None,
+        packet_bytes: int = 0,
+        kept_packets: int = 0,
     ) -> None:
-        """Make the directories and open the files; `ending` is asked for each CPU."""
+        """Make the directories and open the files; `ending` is asked for each CPU.
+
+        Packets have `packet_bytes`, as many as usual in the layout if 0; for `kept_packets` see
+        `StreamWriter`.
+        """
         self.directory = directory
         chunks = (chunk.directory for chunk in breaks)
-        self.directories = (directory, *(chunk for chunk in chunks if chunk is not None))
+        self.directories = tuple(
+            dict.fromkeys((directory, *(chunk for chunk in chunks if chunk is not None)))
+        )
         self._missing = [chunk.directory for chunk in breaks if chunk.is_missing]
         text = metadata_text(
             layout,
@@ -87,11 +95,12 @@ class TraceWriter:
                 identity.uuid,
                 cpu,
                 identity.uptime_ns,
-                layout.packet_bytes,
+                packet_bytes or layout.packet_bytes,
                 begin=begin,
                 breaks=breaks,
                 faults=faults,
                 ending=ending(cpu),
+                kept_packets=kept_packets,
             )
             for cpu in range(cpu_count)
         )

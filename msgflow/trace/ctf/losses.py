@@ -71,7 +71,10 @@ class LossCounter:
         self._of_stream[id(stream)] = header.discarded
         if counts:
             self._counters[recording] = header.discarded
-        return Losses(None if packet.is_cut else discarded, lost, problem)
+        if packet.is_cut or (lost and discarded):
+            # What was discarded in packets that are not there, and what behind them, nothing tells.
+            return Losses(None, lost, problem)
+        return Losses(discarded, lost, problem)
 
 
 def recording_of(stream: Stream, uuid: str | None, path: str) -> Recording:
