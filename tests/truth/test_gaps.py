@@ -1,0 +1,57 @@
+"""What is said near gaps is true: losses of one CPU, holes between packets, snapshots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import duckdb
+import pytest
+from ingested import ingest_one, require_reader
+from scoring import compare_simulated
+
+from msgflow.sim import Recording, simulate
+
+SECOND = 1_000_000_000
+SMALL = {"packet_bytes": 4096, "lost_event_share": 0.8, "longest_loss": 400}
+# Recording, the gaps that it has to show, and whether all that happened must be found.
+RECORDINGS: dict[str, tuple[Recording, set[str], bool]] = {
+    "brim": (Recording(**SMALL, filled_share=0.3), {"loss"}, False),
+    "one_cpu": (Recording(**SMALL, lossy_cpus=(1,), start_ns=SECOND // 5), {"loss"}, False),
+    "rotated": (Recording(rotations=(SECOND // 3, SECOND // 2)), set(), True),
+    "stopped": (
+        Recording(pauses=((SECOND // 3, SECOND // 2),), rotations=(SECOND // 4, SECOND * 2 // 5)),
+        {"pause"},
+        False,
+    ),
+    "last_snapshot": (
+        Recording(
+            snapshots=(SECOND // 3, SECOND * 3 // 5),
+            kept_packets=12,
+            is_last_snapshot_only=True,
+            packet_bytes=4096,
+        ),
+        {"packets"},
+        False,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
+    require_reader()
+    recording, gaps, is_complete = RECORDINGS[name]
+    simulation = simulate(
+        "container_multi_threaded", tmp_path / "trace", factor=0.07, recording=recording
+    )
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    scores, _ = compare_simulated(database, simulation.truth)
+    found = {score.kind: score for score in scores}
+    assert {kind for kind, score in found.items() if score.wrong} == set()
+    for kind in ("kind", "called_with", "transport", "direct", "executor_state"):
+        assert found[kind].found > 0
+    if is_complete:
+        assert {kind for kind, score in found.items() if score.missing} == set()
+    with duckdb.connect(str(database), read_only=True) as connection:
+        rows = connection.execute("SELECT DISTINCT kind FROM loss_interval").fetchall()
+    assert {kind for (kind,) in rows} == gaps
