@@ -2,9 +2,9 @@
 -- title: The tracer discarded events
 -- description: Events were lost because the buffers were full. What happened in those gaps is
 --     missing, nothing is paired across them, and results near them are marked is_loss_affected.
---     A packet that was cut off, whose events nobody counted, is a damage of the trace. Where packets
---     are missing as well, nobody knows how many of the discarded events were in them: these are
---     not counted.
+--     A packet that was cut off, whose events nobody counted, is a damage of the trace. Where
+--     packets are missing as well, nobody knows how many of the discarded events were in them:
+--     these are not counted.
 -- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
 --     take them away.
 -- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE

@@ -1,8 +1,8 @@
 -- name: finding.stream_ends_early
 -- title: Streams end before their trace
 -- description: The last packet of a CPU's stream ends well before the end of the recording, in
---     whichever chunk or snapshot that is, while packets of other CPUs go on: events of that CPU may
---     be missing from then on.
+--     whichever chunk or snapshot that is, while packets of other CPUs go on: events of that CPU
+--     may be missing from then on.
 -- cause: Files are cut off (no space, power lost, copied while written), or the last buffers were
 --     not written.
 -- cure: Stop the session before copying; check free space; compare the sizes of the files with the
