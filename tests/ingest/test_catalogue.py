@@ -19,6 +19,7 @@ from msgflow.trace import COMMON_SCHEMA
 
 TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]", "INTEGER[]"}
 TRACEPOINT_KEYS = {
+    "aliases",
     "name",
     "description",
     "fields",
