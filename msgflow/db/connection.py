@@ -136,6 +136,8 @@ def _prepare(con: duckdb.DuckDBPyConnection) -> None:
     # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with
     # all on the right. Behind filters it expects few where there are thousands.
     con.execute("SET asof_loop_join_threshold = 0")
+    # For connections made of this one, too, which have the settings of the database.
+    con.execute("SET GLOBAL asof_loop_join_threshold = 0")
 
 
 @contextlib.contextmanager

@@ -264,7 +264,7 @@ class _Maker:
         rows = self.rows_on(paths) if self.through is not None else None
         (count,) = run_page_query(self.connection, "segment_count", values)["count"].to_pylist()
         head["count"] = count
-        used = len(self.parts.pack({})) * 4 // 3 + 400_000
+        used = len(self.page(head | {"notes": self.notes}).encode())
         room = self.max_size - used
         if room < 0:
             raise UsageError(

@@ -92,12 +92,8 @@ class Shared:
         self._base, self.pages = self._open()
 
     def _open(self) -> tuple[duckdb.DuckDBPyConnection, Pages]:
+        # Each request has a connection of its own to the same database, made of this one.
         base = connect(self.path, read_only=True, memory_limit=self._memory_limit)
-        # A connection of its own for each request has the settings of the database, not those of
-        # the connection that it comes from.
-        base.execute("SET GLOBAL asof_loop_join_threshold = 0")
-        base.execute("SET enable_external_access = false")
-        base.execute("SET lock_configuration = true")
         return base, Pages()
 
     def require_same(self, generation: str | None) -> None:

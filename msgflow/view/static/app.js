@@ -6,12 +6,20 @@ import { ServedSource } from "./source.js";
 import { embedded } from "./embedded.js";
 import { records } from "./columns.js";
 import { OverviewPage } from "./overview.js";
+import { PathsPage } from "./paths.js";
 import { TimelinePage } from "./timeline.js";
+import { GraphPage } from "./graph.js";
+import { ExecutorsPage } from "./executors.js";
+import { ComparePage } from "./compare.js";
 import { failed, waiting } from "./notice.js";
 
 const PAGES = {
   overview: ["Overview", OverviewPage],
+  paths: ["Paths", PathsPage],
   timeline: ["Timeline", TimelinePage],
+  graph: ["Graph", GraphPage],
+  executors: ["Executors", ExecutorsPage],
+  compare: ["Compare", ComparePage],
 };
 
 class App {

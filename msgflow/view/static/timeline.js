@@ -188,7 +188,8 @@ export class TimelinePage {
     this.abort = new AbortController();
     const { signal } = this.abort;
     const { from, to } = this.renderer.view;
-    const margin = (to - from) * MARGIN;
+    // A file has all it holds at hand: only a server is asked for more than what is seen.
+    const margin = this.app.source.isServed ? (to - from) * MARGIN : 0;
     const params = { start: Math.floor(Math.max(from - margin, 0)), end: Math.ceil(Math.min(to + margin, this.length + 1)) };
     this.status.dataset.busy = "1";
     this.say("reading …");

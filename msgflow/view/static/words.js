@@ -41,8 +41,14 @@ export function duration(ns) {
   const size = Math.abs(ns);
   const [scale, unit] = UNITS.find(([least]) => size >= least) ?? UNITS[3];
   const value = ns / scale;
-  const digits = scale === 1 ? 0 : Math.max(0, 3 - Math.floor(Math.log10(Math.abs(value)) / 3) * 0);
-  return `${trimmed(value, Math.min(digits, 3))} ${unit}`;
+  return `${trimmed(value, scale === 1 ? 0 : 3)} ${unit}`;
+}
+
+// Three digits are enough beside an arrow.
+export function brief(ns) {
+  const size = Math.abs(ns);
+  const [scale, unit] = UNITS.find(([least]) => size >= least) ?? UNITS[3];
+  return `${Number((ns / scale).toPrecision(3)).toLocaleString("en-US")} ${unit}`;
 }
 
 function trimmed(value, digits) {

@@ -1,0 +1,64 @@
+// Charts by uPlot in the colours of the page, with labels as people read durations.
+
+import { h, color } from "./dom.js";
+import { duration } from "./words.js";
+
+const drawn = new Set();
+
+// Series: {label, color, values, width, points, fill, paths, stepped}; x: numbers.
+// Options: height, xFormat, yFormat, title, onClick(index), xLabel, yLabel.
+export function chart(x, series, options = {}) {
+  const frame = h("div", { className: "chart", role: "img", "aria-label": options.title ?? "chart" });
+  const place = { frame, plot: null };
+  const draw = () => {
+    place.plot?.destroy();
+    frame.replaceChildren();
+    const width = Math.max(frame.clientWidth || frame.parentElement?.clientWidth || 600, 240);
+    const axis = (format, label, size) => ({
+      stroke: color("soft"), grid: { stroke: color("line"), width: 1 }, ticks: { stroke: color("line") },
+      values: (_, splits) => splits.map((value) => format(value)), label, labelSize: label ? 22 : 0, labelFont: "12px system-ui, sans-serif",
+      font: "11px system-ui, sans-serif", size,
+    });
+    place.plot = new globalThis.uPlot({
+      width, height: options.height ?? 240, legend: { show: series.length > 1, live: false },
+      cursor: { points: { show: Boolean(options.onClick) }, drag: { x: true, y: false } },
+      scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), (high ?? 1) * 1.05 || 1] } },
+      axes: [axis(options.xFormat ?? String, options.xLabel, 44), axis(options.yFormat ?? duration, options.yLabel, 74)],
+      series: [{}, ...series.map((one) => ({
+        label: one.label, stroke: color(one.color), width: one.width ?? 1.5, spanGaps: false,
+        fill: one.fill ? alpha(color(one.color), 0.35) : undefined,
+        points: { show: Boolean(one.points), size: 5, fill: color(one.color), stroke: color(one.color) },
+        paths: one.points ? () => null : one.bars ? globalThis.uPlot.paths.bars({ size: [1, Infinity], align: 1 })
+          : one.stepped ? globalThis.uPlot.paths.stepped({ align: 1 }) : undefined,
+        dash: one.dash,
+      }))],
+    }, [x, ...series.map((one) => one.values)], frame);
+    if (options.onClick) {
+      place.plot.over.addEventListener("click", () => {
+        const at = place.plot.cursor.idx;
+        if (at !== null && at !== undefined) options.onClick(at);
+      });
+      place.plot.over.style.cursor = "pointer";
+    }
+  };
+  place.draw = draw;
+  drawn.add(place);
+  requestAnimationFrame(draw);
+  return frame;
+}
+
+function alpha(text, share) {
+  const match = /^#(..)(..)(..)$/.exec(text);
+  if (!match) return text;
+  return `rgba(${match.slice(1).map((part) => parseInt(part, 16)).join(",")},${share})`;
+}
+
+export function redrawCharts() {
+  for (const place of drawn) {
+    if (!place.frame.isConnected) drawn.delete(place);
+    else place.draw();
+  }
+}
+
+addEventListener("resize", () => redrawCharts());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redrawCharts());

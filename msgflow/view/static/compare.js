@@ -1,0 +1,96 @@
+// Two runs: what is longer or shorter, and the distributions of a path one over the other.
+
+import { h, clear } from "./dom.js";
+import { current, replace } from "./state.js";
+import { count, duration, percent } from "./words.js";
+import { dataTable, besides } from "./table.js";
+import { command, failed, notes, waiting } from "./notice.js";
+import { chart, redrawCharts } from "./chart.js";
+
+const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (transport)" };
+
+export class ComparePage {
+  constructor(app, root) {
+    this.app = app;
+    this.root = root;
+    this.ready = this.build();
+  }
+
+  async build() {
+    const { app } = this;
+    const others = app.runs.filter((run) => run !== app.run);
+    if (!others.length) {
+      clear(this.root, h("section", {}, h("h2", {}, "Compare"), h("p", {}, app.source.isServed ? "There is only one run in this database: ingest another one to compare it with." : "This report is about one run: msgflow report --compare RUN adds another.")));
+      return;
+    }
+    const asked = current();
+    this.other = others.find((run) => String(run.run_id) === asked.other) ?? others[others.length - 1];
+    this.what = asked.what in KINDS_OF ? asked.what : "paths";
+    const choice = h("select", { "aria-label": "run to compare with", on: { change: () => { this.other = others.find((run) => String(run.run_id) === choice.value); this.show(); } } },
+      others.map((run) => h("option", { value: String(run.run_id), selected: run === this.other }, run.name)));
+    const what = h("select", { "aria-label": "what to compare", on: { change: () => { this.what = what.value; this.show(); } } },
+      Object.entries(KINDS_OF).map(([value, text]) => h("option", { value, selected: value === this.what }, text)));
+    const only = h("input", { type: "checkbox", checked: true, on: { change: () => { this.all = !only.checked; this.rows(); } } });
+    this.body = h("div");
+    this.picture = h("div");
+    clear(this.root, h("section", {}, h("h2", {}, "Compare"), h("div", { className: "tools" }, h("span", {}, "A:"), choice, h("span", {}, `B: ${app.run.name}`), what, h("label", {}, only, "only what differs")), this.body, this.picture));
+    await this.show();
+  }
+
+  async show() {
+    replace({ page: "compare", other: this.other.run_id, what: this.what });
+    this.app.linksMoved();
+    clear(this.body, waiting("comparing, with confidence intervals from resampling: this may take a minute …"));
+    clear(this.picture);
+    try {
+      this.table = await this.app.fetch("compare", { other: this.other.run_id, what: this.what });
+      this.rows();
+    } catch (error) {
+      if (error.name !== "AbortError") clear(this.body, failed(error));
+    }
+  }
+
+  rows() {
+    const { table } = this;
+    const differs = (row) => ["B is longer", "B is shorter", "only in A", "only in B"].includes(table.verdict[row]);
+    const changed = new Set();
+    for (let row = 0; row < table.rows; row++) if (differs(row)) changed.add(table.subject[row]);
+    const subjects = new Set(table.subject);
+    clear(this.body,
+      h("p", {}, `${count(changed.size, "subject")} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B).`),
+      dataTable(table, { label: "comparison", only: (row) => this.all || differs(row), nothing: "No difference is shown.",
+        columns: ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "effect", "a_count", "b_count", "a_share", "b_share"],
+        onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),
+      notes(table.meta.notes), command(table.meta.command));
+    if (this.what === "paths" && table.rows) {
+      let most = 0;
+      for (let row = 1; row < table.rows; row++) if (Math.abs(table.difference_ns[row] || 0) > Math.abs(table.difference_ns[most] || 0)) most = row;
+      this.overlay(table.subject[most]);
+    }
+  }
+
+  async overlay(subject) {
+    this.subject = subject;
+    clear(this.picture, waiting("counting flows of both runs …"));
+    try {
+      const sides = await Promise.all([this.other, this.app.run].map(async (run) => {
+        const paths = await this.app.fetch("path", { run: run.run_id });
+        const row = paths.path.indexOf(subject);
+        return row < 0 ? null : this.app.fetch("path_share", { run: run.run_id, path: paths.path_id[row] });
+      }));
+      const known = sides.filter(Boolean).filter((side) => side.rows);
+      if (!known.length) { clear(this.picture, h("p", {}, `No flow reached the end of ${subject}.`)); return; }
+      const x = [...new Set(known.flatMap((side) => Array.from(side.latency)))].sort((a, b) => a - b);
+      const values = (side) => { if (!side?.rows) return x.map(() => null); let at = 0; return x.map((latency) => { while (at < side.rows && side.latency[at] <= latency) at++; return at ? side.share[at - 1] : 0; }); };
+      clear(this.picture, h("h3", { className: "path-title" }, subject), h("p", { className: "soft" }, "Share of the flows that took no longer, of both runs."),
+        chart(x, [{ label: `A: ${this.other.name}`, color: "second", values: values(sides[0]), stepped: true, dash: [6, 3], width: 2 }, { label: `B: ${this.app.run.name}`, color: "timer", values: values(sides[1]), stepped: true, width: 2 }],
+          { xFormat: duration, yFormat: (value) => percent(value, 0), height: 300, title: "distributions of both runs" }),
+        besides("as a table", ["A", "B"].map((name, place) => (sides[place] ? [h("h4", {}, name), dataTable(sides[place], { label: `distribution of ${name}` })] : h("p", {}, `not in ${name}`)))));
+    } catch (error) {
+      clear(this.picture, failed(error));
+    }
+  }
+
+  recolor() { redrawCharts(); }
+  leave() {}
+}

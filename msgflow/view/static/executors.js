@@ -1,0 +1,103 @@
+// Executors: what their threads did over time, and who kept whom waiting.
+
+import { h, clear, color } from "./dom.js";
+import { count, duration, moment, percent } from "./words.js";
+import { address } from "./state.js";
+import { dataTable, besides } from "./table.js";
+import { command, failed, notes, waiting } from "./notice.js";
+import { fill, section } from "./overview.js";
+
+const STATES = [["execute", "execute"], ["callback", "execute"], ["process", "process"], ["wait", "wait"]];
+
+export class ExecutorsPage {
+  constructor(app, root) {
+    this.app = app;
+    this.root = root;
+    this.ready = this.build();
+  }
+
+  async build() {
+    const { app } = this;
+    const over = section("What executor threads did");
+    const blame = section("Who kept whom waiting");
+    const waits = section("How long callbacks waited");
+    clear(this.root, over.root, blame.root, waits.root);
+    await Promise.all([
+      fill(over, async () => {
+        const [usage, shares] = await Promise.all([app.query("executor-usage"), app.fetch("executor_share")]);
+        this.strips = { usage, shares, places: [] };
+        if (!usage.rows) return h("p", {}, "No executor is known: the trace has no callbacks.");
+        const list = h("div", { className: "strips" });
+        for (let row = 0; row < usage.rows; row++) {
+          const canvas = h("canvas", { className: "strip", role: "img", "aria-label": `states of thread ${usage.tid[row]} over time` });
+          this.strips.places.push({ canvas, thread: usage.thread_id[row] });
+          const busy = usage.seen_ns[row] ? usage.callback_ns[row] / usage.seen_ns[row] : NaN;
+          list.append(h("div", { className: "strip-row" },
+            h("div", {}, h("b", {}, `${usage.process[row] ?? "?"} ${usage.tid[row]}`), h("div", { className: "soft" }, `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${percent(busy)} in callbacks`)), canvas));
+        }
+        requestAnimationFrame(() => this.drawStrips());
+        return [h("p", { className: "soft" }, "Each column is a piece of the run, filled with the share of time in each state. Click to see it in the timeline."), list,
+          h("div", { className: "legend" }, [["execute", "execute (or in callbacks, where the executor tells nothing)"], ["process", "process: looking for work"], ["wait", "wait"]].map(([name, text]) =>
+            h("span", { className: "legend-item" }, h("span", { className: `swatch color-${name}` }), text))),
+          besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "process_ns", "execute_ns", "callback_ns", "callbacks", "callback_share"] })),
+          notes(usage.meta.notes), command(usage.meta.command)];
+      }),
+      fill(blame, async () => {
+        const table = await app.query("interference");
+        return [dataTable(table, { label: "interference", sort: { name: "overlap_max_ns", down: true }, shown: 20, nothing: "No callback waited for another one.",
+          columns: ["node", "callback", "meanwhile_node", "meanwhile_callback", "waits", "runs", "overlap_min_ns", "overlap_max_ns", "worst_ns", "share"] }), notes(table.meta.notes), command(table.meta.command)];
+      }),
+      fill(waits, async () => {
+        const table = await app.query("executor-wait");
+        return [dataTable(table, { label: "waits", sort: { name: "busy_worst_ns", down: true }, shown: 20, nothing: "No callback is known to have waited.",
+          columns: ["node", "callback", "count", "delayed_min", "delayed_max", "wait_median_ns", "wait_max_ns", "busy_worst_ns", "busy_total_min_ns", "busy_total_max_ns", "meanwhile", "unknown", "loss_affected"] }), notes(table.meta.notes), command(table.meta.command)];
+      }),
+    ]);
+    this.onResize = () => this.drawStrips();
+    addEventListener("resize", this.onResize);
+  }
+
+  drawStrips() {
+    if (!this.strips) return;
+    const { shares, places } = this.strips;
+    const byThread = new Map();
+    for (let row = 0; row < shares.rows; row++) {
+      const thread = shares.thread_id[row];
+      if (!byThread.has(thread)) byThread.set(thread, []);
+      byThread.get(thread).push(row);
+    }
+    const whole = this.app.run.length || 1;
+    for (const { canvas, thread } of places) {
+      const ratio = devicePixelRatio || 1;
+      const box = canvas.getBoundingClientRect();
+      if (!box.width) continue;
+      canvas.width = box.width * ratio;
+      canvas.height = box.height * ratio;
+      const context = canvas.getContext("2d");
+      context.scale(ratio, ratio);
+      context.fillStyle = color("panel");
+      context.fillRect(0, 0, box.width, box.height);
+      const filled = new Map();
+      const rows = byThread.get(thread) ?? [];
+      for (const [state, shade] of STATES) {
+        context.fillStyle = color(shade);
+        for (const row of rows) {
+          if (shares.state[row] !== state) continue;
+          const x = (shares.start_at[row] / whole) * box.width;
+          const width = Math.max((shares.length[row] / whole) * box.width, 1) + 0.3;
+          const below = filled.get(shares.start_at[row]) ?? 0;
+          const high = (shares.busy[row] / shares.length[row]) * box.height;
+          context.fillRect(x, box.height - below - high, width, high);
+          filled.set(shares.start_at[row], below + high);
+        }
+      }
+      canvas.onclick = (event) => {
+        const at = (event.offsetX / box.width) * whole;
+        location.hash = address({ page: "timeline", from: Math.max(0, Math.round(at - whole / 100)), to: Math.round(at + whole / 100), flow: null });
+      };
+    }
+  }
+
+  recolor() { this.drawStrips(); }
+  leave() { if (this.onResize) removeEventListener("resize", this.onResize); }
+}

@@ -1,0 +1,154 @@
+// Paths: latency of each, and of the chosen one how it is distributed, over time, and made up.
+
+import { h, svg, clear, color } from "./dom.js";
+import { address, current, replace } from "./state.js";
+import { count, duration, moment, percent, title } from "./words.js";
+import { dataTable, besides } from "./table.js";
+import { command, failed, notes, waiting } from "./notice.js";
+import { chart, redrawCharts } from "./chart.js";
+import { pathNumbers } from "./overview.js";
+
+const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "superseded", "lost", "edge", "loss_affected", "lost_reasons"];
+const FATES = [["reached", "reached the end", "good"], ["superseded", "superseded by a newer input", "color-faint"], ["lost", "lost", "error"], ["edge", "cut by recording", "wait"]];
+
+export class PathsPage {
+  constructor(app, root) {
+    this.app = app;
+    this.root = root;
+    this.ready = this.build();
+  }
+
+  async build() {
+    clear(this.root, waiting("looking for paths and their flows …"));
+    const [table, paths] = await Promise.all([this.app.query("e2e-latency"), this.app.fetch("path")]);
+    this.table = table;
+    this.ids = pathNumbers(table, paths);
+    if (!table.rows) {
+      clear(this.root, h("section", {}, h("h2", {}, "Paths"), h("p", {}, "There are no paths: no message is known to have been taken."), notes(table.meta.notes)));
+      return;
+    }
+    const asked = Number(current().path);
+    let row = this.ids.indexOf(asked);
+    if (row < 0) {
+      row = 0;
+      for (let other = 1; other < table.rows; other++) if ((table.p99_ns[other] || -1) > (table.p99_ns[row] || -1)) row = other;
+    }
+    this.list = h("div");
+    this.detail = h("div");
+    clear(this.root, h("section", {}, h("h2", {}, count(table.rows, "path")), this.list, notes(table.meta.notes), command(table.meta.command)), this.detail);
+    await this.choose(row, asked !== this.ids[row]);
+  }
+
+  async choose(row, isNew) {
+    this.row = row;
+    if (isNew) { replace({ page: "paths", path: this.ids[row] }); this.app.linksMoved(); }
+    clear(this.list, dataTable(this.table, {
+      columns: COLUMNS, label: "paths", sort: { name: "p99_ns", down: true }, picked: (other) => other === this.row,
+      onPick: (other) => this.choose(other, true), data: (other) => ({ path: String(this.ids[other]) }),
+    }));
+    clear(this.detail, waiting("counting flows …"));
+    try {
+      clear(this.detail, await this.picture(row));
+    } catch (error) {
+      clear(this.detail, failed(error));
+    }
+  }
+
+  async picture(row) {
+    const { app, table } = this;
+    const path = this.ids[row];
+    const [histogram, shares, points, slowest] = await Promise.all(
+      ["path_histogram", "path_share", "path_point", "path_slowest"].map((name) => app.fetch(name, { path })));
+    const parts = h("div", {}, waiting("taking the latency apart …"));
+    app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path)))
+      .catch((error) => clear(parts, failed(error)));
+    const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null,
+      flow: Number.isNaN(source.take_id[at]) || source.take_id[at] === null ? `${source.root_kind[at]}:${source.root_id[at]}` : `take:${source.take_id[at]}` });
+    return [
+      h("section", {}, h("h2", { className: "path-title" }, table.path[row]), this.fates(row)),
+      histogram.rows ? h("div", { className: "charts" },
+        h("section", {}, h("h3", {}, "Latency over time"),
+          h("p", { className: "soft" }, points.rows && points.count.some((n) => n > 1) ? `The slowest flow of each of ${points.rows} pieces of time, and the median of the piece. Click a point to see its flow.` : "Click a point to see its flow."),
+          chart(Array.from(points.root_at), pointSeries(points), {
+            xFormat: (value) => `${+(value / 1e9).toFixed(6)} s`, title: "latency over time", onClick: (at) => { location.hash = toFlow(points, at); } }),
+          besides("as a table", dataTable(points, { columns: ["root_at", "latency", "median", "count", "missing"], label: "latency over time", onPick: (at) => { location.hash = toFlow(points, at); } }))),
+        h("section", {}, h("h3", {}, "Histogram"),
+          chart(Array.from(histogram.low), [{ label: "flows", color: "timer", values: Array.from(histogram.count), bars: true, fill: true }],
+            { xFormat: duration, yFormat: (value) => value.toLocaleString("en-US"), title: "histogram of the latency" }),
+          besides("as a table", dataTable(histogram, { columns: ["low", "width", "count"], label: "histogram" }))),
+        h("section", {}, h("h3", {}, "Share of the flows that took no longer"),
+          chart(Array.from(shares.latency), [{ label: "share", color: "timer", values: Array.from(shares.share), stepped: true }],
+            { xFormat: duration, yFormat: (value) => percent(value, 0), title: "distribution of the latency" }),
+          besides("as a table", dataTable(shares, { label: "distribution" }))),
+        h("section", {}, h("h3", {}, "Slowest flows"),
+          dataTable(slowest, { columns: ["root_at", "latency"], label: "slowest flows", onPick: (at) => { location.hash = toFlow(slowest, at); } }))) : h("p", {}, "No flow reached the end of this path."),
+      h("section", {}, h("h2", {}, "What the latency consists of"), parts),
+    ];
+  }
+
+  fates(row) {
+    const { table } = this;
+    const total = table.roots[row];
+    if (!total) return h("p", {}, "No flow began in the time shown.");
+    const track = h("div", { className: "fates", role: "img", "aria-label": "completeness" });
+    const legend = h("div", { className: "legend" });
+    for (const [name, text, shade] of FATES) {
+      const number = table[name][row];
+      const shadeName = shade.replace("color-", "");
+      if (number) {
+        const piece = h("span", { className: "fate" });
+        piece.style.width = `${(100 * number) / total}%`;
+        piece.style.background = color(shadeName);
+        track.append(piece);
+      }
+      const swatch = h("span", { className: "swatch" });
+      swatch.style.background = color(shadeName);
+      legend.append(h("span", { className: "legend-item" }, swatch, `${text}: ${number.toLocaleString("en-US")} (${percent(number / total)})`));
+    }
+    return [h("p", {}, `${count(total, "flow")} began; ${duration(table.median_ns[row])} median, ${duration(table.p95_ns[row])} p95, ${duration(table.p99_ns[row])} p99, ${duration(table.max_ns[row])} at most.`),
+      track, legend, table.lost_reasons[row] && h("p", { className: "soft" }, `Reasons: ${table.lost_reasons[row]}`)];
+  }
+
+  breakdown(breakdown, path) {
+    const rows = [];
+    for (let row = 0; row < breakdown.rows; row++) if (breakdown.path_id[row] === path) rows.push(row);
+    if (!rows.length) return h("p", {}, "No flow reached the end of this path.");
+    const most = Math.max(...rows.map((row) => Math.abs(breakdown.mean_ns[row])));
+    const whole = rows.reduce((sum, row) => sum + Math.max(breakdown.total_ns[row], 0), 0) || 1;
+    const stack = h("div", { className: "stack", role: "img", "aria-label": "stacked breakdown" });
+    const kinds = [...new Set(rows.map((row) => breakdown.part[row]))];
+    const shade = (kind) => PART_COLORS[kind] ?? "faint";
+    for (const row of rows) {
+      const share = Math.max(breakdown.total_ns[row], 0) / whole;
+      const piece = h("span", { className: `piece${share > 0.06 ? "" : " thin"}`, title: `${breakdown.part[row]} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
+        share > 0.06 ? duration(breakdown.mean_ns[row]) : "");
+      piece.style.width = `${100 * share}%`;
+      piece.style.background = color(shade(breakdown.part[row]));
+      stack.append(piece);
+    }
+    const legend = h("div", { className: "legend" }, kinds.map((kind) => {
+      const swatch = h("span", { className: "swatch" });
+      swatch.style.background = color(shade(kind));
+      return h("span", { className: "legend-item" }, swatch, title(kind));
+    }));
+    return [stack, legend, dataTable(breakdown, { only: (row) => breakdown.path_id[row] === path, label: "breakdown",
+      columns: ["hop", "part", "node", "what", "median_ns", "mean_ns", "p95_ns", "max_ns", "share", "flows", "overlaps"] }),
+    most === 0 && h("p", {}, "All parts are zero."), notes(breakdown.meta.notes), command(breakdown.meta.command)];
+  }
+
+  recolor() { if (this.row !== undefined) { redrawCharts(); this.choose(this.row, false); } }
+  leave() {}
+}
+
+const PART_COLORS = {
+  callback: "subscription", cache: "indirect", executor: "process", transport: "transport", service: "service", request: "call",
+  response: "call", rclcpp: "publication", rcl: "publication", rmw: "publication", dds: "publication", publish: "publication", take: "take",
+};
+
+function pointSeries(points) {
+  const several = points.count.some((number) => number > 1);
+  const latency = Array.from(points.latency, (value) => (Number.isNaN(value) ? null : value));
+  const series = [{ label: several ? "slowest" : "latency", color: several ? "process" : "timer", values: latency, points: true }];
+  if (several) series.push({ label: "median", color: "timer", values: Array.from(points.median, (value) => (Number.isNaN(value) ? null : value)), width: 1.5 });
+  return series;
+}

@@ -1,0 +1,288 @@
+"""What recordings and machines may hold against the pages: each says so, nothing breaks."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from served import Page, Served
+
+from msgflow.cli.report import read_size
+from msgflow.database import open_db
+from msgflow.errors import UsageError
+
+PAGES = ("overview", "paths", "timeline", "graph", "executors", "compare")
+HOSTILE = (
+    "<img src=x onerror=hacked=1>",
+    "</script><script>hacked=1</script>",
+    '"><svg onload=hacked=1>',
+    "javascript:hacked=1",
+    "</title></style><style>*{display:none}</style>",
+    "{{hacked=1}} ${hacked=1} %3Cscript%3E",
+    "\u202eevil\u0000\x1b[31m\u2028",
+    "https://evil.example/x.png",
+)
+_RENAMED = """
+UPDATE store.{table} SET {column} = $names[1 + {key} % len($names)] || coalesce({column}, '')
+"""
+
+
+def renamed(source: Path, path: Path, names: tuple[str, ...]) -> Path:
+    """Return a copy of a database in which every name is a hostile one."""
+    shutil.copyfile(source, path)
+    with duckdb.connect(str(path)) as connection:
+        for table, column, key in (
+            ("host", "hostname", "host_id"),
+            ("process", "name", "process_id"),
+            ("thread", "name", "thread_id"),
+            ("node", "full_name", "node_id"),
+            ("publisher", "topic_name", "length(coalesce(topic_name, ''))"),
+            ("subscription", "topic_name", "length(coalesce(topic_name, ''))"),
+            ("service", "service_name", "length(coalesce(service_name, ''))"),
+            ("client", "service_name", "length(coalesce(service_name, ''))"),
+            ("callback", "symbol", "callback_id"),
+            ("run", "name", "run_id"),
+        ):
+            sql = _RENAMED.format(table=table, column=column, key=key)
+            connection.execute(sql, {"names": list(names)})
+    return path
+
+
+def visit(page: Page, address: str, run: int | None = None) -> None:
+    """See every page, with a picked flow where there is one."""
+    page.open(address)
+    for name in PAGES:
+        page.go(f"#/{name}?{'' if run is None else f'run={run}&'}")
+        page.page.wait_for_timeout(100)
+        assert page.page.locator("main .failed").count() == 0, name
+        assert page.page.evaluate("typeof hacked") == "undefined"
+        for made in ("img", "script", "iframe", "a[href^=http]", "a[href^=javascript]"):
+            assert page.page.locator(f"main {made}").count() == 0
+
+
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_names_are_only_ever_text(way: str, systems: Path, tmp_path: Path, page: Page) -> None:
+    path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
+    if way == "file":
+        target = tmp_path / "report.html"
+        with open_db(path) as opened:
+            opened.report(target, run=1)
+        visit(page, target.as_uri())
+        ((number,),) = _first_publication(path)
+        page.go(f"#/timeline?flow=publication:{number}")
+        assert page.flow()
+        page.page.locator("canvas.timeline").hover(position={"x": 400, "y": 120})
+        assert page.page.evaluate("typeof hacked") == "undefined"
+    else:
+        server = Served(path)
+        try:
+            visit(page, server.address, 1)
+        finally:
+            page.page.goto("about:blank")
+            server.close()
+
+
+def _first_publication(path: Path) -> list[tuple[int]]:
+    with duckdb.connect(str(path), read_only=True) as connection:
+        return connection.execute(
+            "SELECT min(publication_id) FROM link_transport WHERE run_id = 1"
+        ).fetchall()
+
+
+def test_names_in_the_address_are_only_ever_text(
+    demo: Path, report: Callable[..., str], page: Page
+) -> None:
+    page.open(report(demo))
+    image = "%3Cimg%20src%3Dx%20onerror%3Dhacked%3D1%3E"
+    drawing = "%22%3E%3Csvg%20onload%3Dhacked%3D1%3E"
+    for text in (image, drawing):
+        for place in (
+            f"timeline?q={text}",
+            f"timeline?flow={text}",
+            f"timeline?from={text}&to=1&hide={text}",
+            f"graph?q={text}",
+            f"paths?path={text}",
+            f"compare?other={text}&what={text}",
+        ):
+            page.go(f"#/{place}")
+            assert page.page.evaluate("typeof hacked") == "undefined"
+    page.page.evaluate("location.hash = '#/%3Cscript%3E'")
+    page.page.wait_for_url("**#/overview*")
+
+
+def test_long_names(demo: Path, tmp_path: Path, page: Page) -> None:
+    path = renamed(demo, tmp_path / "long.duckdb", ("/" + 10_000 * "x",))
+    target = tmp_path / "report.html"
+    with open_db(path) as opened:
+        opened.report(target)
+    visit(page, target.as_uri())
+    wide = page.page.evaluate("document.documentElement.scrollWidth")
+    assert wide <= 1280
+
+
+def test_a_database_without_a_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
+    path = tmp_path / "none.duckdb"
+    shutil.copyfile(empty_database, path)
+    with open_db(path) as opened, pytest.raises(UsageError, match="holds no run"):
+        opened.report(tmp_path / "report.html")
+    server = Served(path)
+    try:
+        page.open(server.address)
+        assert "holds no run yet" in page.page.locator("main").inner_text()
+    finally:
+        page.page.goto("about:blank")
+        server.close()
+
+
+def test_an_empty_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
+    path = tmp_path / "empty.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
+        connection.execute(
+            "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash)"
+            " VALUES (1, 'nothing', now()::TIMESTAMP, '0', '')"
+        )
+    target = tmp_path / "report.html"
+    with open_db(path) as opened:
+        opened.report(target)
+    page.open(target.as_uri())
+    for name in PAGES:
+        page.go(f"#/{name}?x=1")
+        assert "has no events" in page.page.locator("main").inner_text()
+
+
+def test_a_run_without_links(demo: Path, tmp_path: Path, page: Page) -> None:
+    path = tmp_path / "unlinked.duckdb"
+    shutil.copyfile(demo, path)
+    with duckdb.connect(str(path)) as connection:
+        for table in ("link_transport", "link_causal", "link_request", "link_response"):
+            connection.execute(f"DELETE FROM store.{table}")
+    target = tmp_path / "report.html"
+    with open_db(path) as opened:
+        opened.report(target)
+    visit(page, target.as_uri())
+    page.go("#/paths")
+    assert "There are no paths" in page.page.locator("main").inner_text()
+    page.go("#/timeline")
+    assert page.page.evaluate("msgflow.page.renderer.bars.table.rows") > 1000
+
+
+def test_a_long_gap_is_shaded(demo: Path, tmp_path: Path, page: Page) -> None:
+    path = tmp_path / "gap.duckdb"
+    shutil.copyfile(demo, path)
+    later = 1_200_000_000_000
+    with duckdb.connect(str(path)) as connection:
+        ((start, end),) = connection.execute("SELECT start_ns, end_ns FROM store.run").fetchall()
+        middle = (start + end) // 2
+        for table, columns in (("publication", ("start_ns", "end_ns")), ("take", ("taken_ns",))):
+            for column in columns:
+                connection.execute(
+                    f"UPDATE store.{table} SET {column} = {column} + {later}"
+                    f" WHERE {column} > {middle}"
+                )
+        connection.execute(f"UPDATE store.run SET end_ns = end_ns + {later}")
+        connection.execute(
+            "INSERT INTO store.loss_interval SELECT 1, min(trace_id), NULL, 'pause',"
+            f" {middle}, {middle + later}, NULL FROM store.trace"
+        )
+    target = tmp_path / "report.html"
+    with open_db(path) as opened:
+        opened.report(target)
+    visit(page, target.as_uri())
+    page.go("#/timeline?from=0")
+    gaps = page.page.evaluate("msgflow.page.renderer.gaps")
+    assert [gap["length"] for gap in gaps] == [later]
+
+
+def test_five_hundred_nodes(demo: Path, tmp_path: Path, page: Page) -> None:
+    path = tmp_path / "many.duckdb"
+    shutil.copyfile(demo, path)
+    with duckdb.connect(str(path)) as connection:
+        connection.execute(
+            "INSERT INTO store.node BY NAME SELECT 10000 + i AS node_id, 1 AS run_id,"
+            " 1 AS process_id, 'n' || i AS name, '/' AS namespace, '/n' || i AS full_name,"
+            " false AS is_inferred"
+            " FROM range(500) AS r (i)"
+        )
+        connection.execute(
+            "INSERT INTO store.publisher BY NAME SELECT 10000 + i AS publisher_id, 1 AS run_id,"
+            " 1 AS process_id, 10000 + i AS node_id, '/t' || i AS topic_name, false AS is_internal,"
+            " false AS is_inferred FROM range(500) AS r (i)"
+        )
+        connection.execute(
+            "INSERT INTO store.publication BY NAME SELECT 1000000 + i AS publication_id,"
+            " 1 AS run_id, 1 AS trace_id, 10000 + i // 2 AS publisher_id, 1 AS process_id,"
+            " 1 AS thread_id,"
+            " r.start_ns + i * 1000 AS start_ns, r.start_ns + i * 1000 + 10 AS end_ns"
+            " FROM store.run AS r, range(1000) AS s (i)"
+        )
+    target = tmp_path / "report.html"
+    with open_db(path) as opened:
+        opened.report(target)
+    visit(page, target.as_uri())
+    page.go("#/graph")
+    assert "those with the most messages" in page.page.locator(".status").inner_text()
+    page.page.get_by_placeholder("node or topic").fill("/n499")
+    page.page.get_by_placeholder("node or topic").press("Enter")
+    assert "/n499" in (page.page.locator(".graph").text_content() or "")
+    page.go("#/timeline?q=/t499")
+    labels = page.page.evaluate("msgflow.page.renderer.lanes.map(lane => lane.label)")
+    assert "/t499" in labels
+
+
+def test_a_browser_without_what_the_page_needs(
+    demo: Path, report: Callable[..., str], page: Page
+) -> None:
+    page.page.add_init_script("delete window.DecompressionStream")
+    page.page.goto(report(demo))
+    page.page.locator(".failed").wait_for()
+    assert "this browser lacks DecompressionStream" in page.page.locator("main").inner_text()
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1MB", "2 TB", "lots", "1e9", "20GB"])
+def test_sizes_that_make_no_sense(text: str) -> None:
+    with pytest.raises(UsageError, match="cannot read the size"):
+        read_size(text)
+
+
+def test_sizes() -> None:
+    assert read_size("20MB") == 20_000_000
+    assert read_size("1.5 kB") == 1_500
+    assert read_size("77") == 77
+
+
+def test_a_report_says_what_it_left_out(demo: Path, tmp_path: Path, page: Page) -> None:
+    target = tmp_path / "report.html"
+    with open_db(demo) as opened:
+        whole = opened.report(target)
+        assert not whole.notes
+        with pytest.raises(UsageError, match="the pages alone take"):
+            opened.report(target, max_size=100_000)
+        small = opened.report(target, max_size=360_000)
+        assert small.size <= 360_000 < whole.size
+        (note,) = small.notes
+        assert "does not fit into 360,000 bytes" in note
+        page.open(target.as_uri())
+        assert note in page.page.locator(".said").inner_text()
+        page.go("#/timeline")
+        assert "counted in bins" in page.page.locator(".status").inner_text()
+        count = page.page.evaluate("msgflow.page.held.count")
+        table = "msgflow.page.renderer.bars.table"
+        assert page.page.evaluate(f"[...{table}.count].reduce((a, b) => a + b)") == count
+        stretches = page.page.evaluate("msgflow.source.head.stretches")
+        middle = stretches[0]
+        page.go(f"#/timeline?from={middle['start']}&to={middle['end']}")
+        assert page.page.evaluate("msgflow.page.held.bin ?? null") is None
+        cut = opened.report(target, start="1s", end="2s", path_text="/camera/image")
+        assert len(cut.notes) == 2
+        page.page.goto("about:blank")
+        page.open(f"{target.as_uri()}#/timeline")
+        first = page.page.evaluate("Math.min(...msgflow.page.renderer.bars.table.start_at)")
+        assert first > 900_000_000
+        with pytest.raises(UsageError, match="no path has this text"):
+            opened.report(target, path_text="/nothing")
+        with pytest.raises(UsageError, match="nothing was recorded"):
+            opened.report(target, start="20s")

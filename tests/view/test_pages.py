@@ -1,0 +1,210 @@
+"""Every page in a real browser: its numbers are those of the queries, its pictures lead on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from served import Page, Served
+
+from msgflow.database import open_db
+
+Read = Callable[[Path], duckdb.DuckDBPyConnection]
+Report = Callable[..., str]
+Serve = Callable[[Path], Served]
+_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1, "ns"))
+
+
+def shown(ns: int | None) -> str:
+    """Return a duration as pages write it."""
+    if ns is None:
+        return ""
+    if ns == 0:
+        return "0"
+    scale, unit = next((scale, unit) for scale, unit in _UNITS if abs(ns) >= scale)
+    text = f"{ns / scale:,.3f}".rstrip("0").rstrip(".") if scale > 1 else str(ns)
+    return f"{text} {unit}"
+
+
+def cells(page: Page, table: str) -> list[list[str]]:
+    rows = page.page.get_by_role("region", name=table, exact=True).locator("tbody tr")
+    rows.first.wait_for()
+    found: list[list[str]] = rows.evaluate_all(
+        "rows => rows.map(row => [...row.cells].map(cell => cell.textContent))"
+    )
+    return found
+
+
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, read: Read) -> None:
+    with open_db(demo) as opened:
+        latency = opened.query("e2e-latency").to_arrow().to_pylist()
+        parts = opened.query("path-breakdown").to_arrow().to_pylist()
+    page.open(serve(demo).address if way == "served" else report(demo))
+    page.go("#/paths")
+    latency.sort(key=lambda row: -(row["p99_ns"] or 0))
+    durations = ("median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns")
+    counts = ("roots", "reached", "superseded", "lost", "edge", "loss_affected")
+    wanted = [
+        [
+            row["path"],
+            *(shown(row[name]) for name in durations),
+            *(f"{row[name]:,}" for name in counts),
+            row["lost_reasons"] or "",
+        ]
+        for row in latency
+    ]
+    assert cells(page, "paths") == wanted
+    chosen = latency[0]["path"]
+    breakdown = [row for row in parts if row["path"] == chosen]
+    columns = ("median_ns", "mean_ns", "p95_ns", "max_ns")
+    assert [row[1:3] + row[4:8] for row in cells(page, "breakdown")] == [
+        [row["part"], row["node"] or "", *(shown(row[name]) for name in columns)]
+        for row in breakdown
+    ]
+    assert page.page.locator(".chart canvas").count() == 3
+    # The slowest flow, in the timeline.
+    page.page.get_by_role("region", name="slowest flows").locator("tbody tr").first.click()
+    flow = page.flow()
+    ((kind, root),) = (
+        read(demo)
+        .execute(
+            "SELECT root_kind, root_id FROM end_to_end([1], NULL, NULL, 'callback_start',"
+            " 'callback_end', -9223372036854775808, 9223372036854775807) AS e"
+            " JOIN flow_path([1], NULL, NULL) AS p USING (path_id)"
+            " WHERE p.path = ? AND e.is_first ORDER BY latency_ns DESC LIMIT 1",
+            [chosen],
+        )
+        .fetchall()
+    )
+    assert (kind, root) in flow
+
+
+def test_a_point_of_the_latency_leads_to_its_flow(demo: Path, report: Report, page: Page) -> None:
+    page.open(report(demo))
+    page.go("#/paths")
+    plot = page.page.locator(".chart .u-over").first
+    box = plot.bounding_box()
+    assert box is not None
+    plot.hover(position={"x": box["width"] / 2, "y": box["height"] / 2})
+    plot.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
+    page.page.wait_for_url("**/*flow=take*")
+    assert page.flow()
+
+
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page) -> None:
+    with open_db(systems) as opened:
+        rates = opened.query("publication-rate", run=3).to_arrow().to_pylist()
+        latency = opened.query("transport-latency", run=3).to_arrow().to_pylist()
+    page.open(serve(systems).address if way == "served" else report(systems, run=3))
+    page.go("#/graph?run=3")
+    names = page.page.locator(".graph g[role=button]").evaluate_all(
+        "all => all.map(one => one.getAttribute('aria-label'))"
+    )
+    wanted = {row["topic_name"] for row in rates + latency}
+    wanted |= {row["publisher"] for row in rates} | {row["subscriber"] for row in latency}
+    assert sorted(names) == sorted(
+        list(wanted)
+        + [topic for topic in {row["topic_name"] for row in rates + latency}
+           if topic in {row["publisher"] for row in rates} | {row["subscriber"] for row in latency}]
+    )  # fmt: skip
+    titles = page.page.locator(".graph .edge title").all_text_contents()
+    for row in latency:
+        if row["median_ns"] is not None:
+            said = f"{shown(row['median_ns'])} median, {shown(row['p95_ns'])} p95"
+            assert any(said in title for title in titles), row
+    assert page.page.locator(".graph .stroke-indirect").count() >= 2
+    assert page.page.locator(".graph .group-box").count() >= 2
+    first = rates[0]["topic_name"]
+    page.page.locator(f".graph g[aria-label='{first}']").first.click()
+    assert page.page.locator(".graph g[role=button]").count() < len(names)
+    assert f"q={first.replace('/', '%2F')}" in page.page.url
+
+
+def test_services_in_the_graph(systems: Path, serve: Serve, page: Page) -> None:
+    with open_db(systems) as opened:
+        services = opened.query("service-latency", run=1).to_arrow().to_pylist()
+    page.open(serve(systems).address)
+    page.go("#/graph?run=1")
+    assert page.page.locator(".graph .service-shape").count() == len(
+        {row["service_name"] for row in services}
+    )
+    text = page.page.locator(".graph").text_content() or ""
+    assert all(shown(row["round_trip_median_ns"]) in text for row in services if row["answered"])
+
+
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Page) -> None:
+    with open_db(demo) as opened:
+        usage = opened.query("executor-usage").to_arrow().to_pylist()
+        blame = opened.query("interference").to_arrow().to_pylist()
+    page.open(serve(demo).address if way == "served" else report(demo))
+    page.go("#/executors")
+    assert page.page.locator("canvas.strip").count() == len(usage)
+    page.page.locator("details.beside summary").first.click()
+    durations = ("seen_ns", "wait_ns", "process_ns", "execute_ns", "callback_ns")
+    assert [row[1:2] + row[5:10] for row in cells(page, "executor threads")] == [
+        [row["process"], *(shown(row[name]) for name in durations)] for row in usage
+    ]
+    found = {(row[0], row[1], row[2], row[3], row[7]) for row in cells(page, "interference")}
+    assert found <= {
+        (
+            row["node"], row["callback"], row["meanwhile_node"], row["meanwhile_callback"],
+            shown(row["overlap_max_ns"]),
+        )
+        for row in blame
+    }  # fmt: skip
+    assert found
+    filled = page.page.locator("canvas.strip").first.evaluate(
+        """canvas => {
+            const { width, height } = canvas;
+            const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+            return new Set(new Uint32Array(data.buffer)).size;
+        }"""
+    )
+    assert filled > 1
+
+
+def test_compare(systems: Path, serve: Serve, page: Page) -> None:
+    with open_db(systems) as opened:
+        wanted = opened.compare(2, 3, what="callbacks").result.to_arrow().to_pylist()
+    page.open(serve(systems).address)
+    page.go("#/compare?run=3&other=2&what=callbacks")
+    differs = [
+        row
+        for row in wanted
+        if row["verdict"] in ("B is longer", "B is shorter", "only in A", "only in B")
+    ]
+    table = page.page.get_by_role("region", name="comparison")
+    table.wait_for(timeout=60_000)
+    page.page.get_by_label("only what differs").uncheck()
+    rows = cells(page, "comparison")
+    assert [row[:5] + row[8:9] for row in rows] == [
+        [
+            row["subject"], row["statistic"] or "", shown(row["a_ns"]), shown(row["b_ns"]),
+            shown(row["difference_ns"]), row["verdict"],
+        ]
+        for row in wanted
+    ][: len(rows)]  # fmt: skip
+    subjects = {row["subject"] for row in wanted}
+    said = page.page.locator("main").inner_text()
+    assert f"{len({row['subject'] for row in differs})} subject" in said
+    assert f"of {len(subjects)} differ" in said
+
+
+def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> None:
+    page.open(report(systems, run=3, compare=2, path_text="/BehaviorPlanner"))
+    page.go("#/compare")
+    page.page.locator(".chart canvas").wait_for()
+    labels = page.page.locator(".u-legend").inner_text()
+    assert "A: autoware_two_threads" in labels
+    assert "B: autoware" in labels
+
+
+def test_compare_needs_two(demo: Path, report: Report, page: Page) -> None:
+    page.open(report(demo))
+    page.go("#/compare")
+    assert "report --compare" in page.page.locator("main").inner_text()
