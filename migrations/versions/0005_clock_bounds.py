@@ -45,9 +45,19 @@ def upgrade() -> None:
         ),
         schema="store",
     )
+    op.add_column(
+        "stamp_clock",
+        sa.Column(
+            "segment",
+            sa.BigInteger(),
+            comment="Number of jumps of the clock before it",
+        ),
+        schema="store",
+    )
 
 
 def downgrade() -> None:
-    """Drop the column and the table."""
+    """Drop the columns and the table."""
+    op.drop_column("stamp_clock", "segment", schema="store")
     op.drop_column("link_transport", "is_copy", schema="store")
     op.drop_table("clock_uncertainty", schema="store")

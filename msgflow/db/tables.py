@@ -675,6 +675,7 @@ stamp_clock = _table(
     ),
     _count("drift_ppb", "Change of the difference in the stretch [ppb]"),
     _count("message_count", "Messages that agree with it"),
+    _count("segment", "Number of jumps of the clock before it"),
 )
 
 nearest_message = _table(

@@ -10,6 +10,7 @@ from msgflow.sim.robot import demo
 from msgflow.sim.scenario import (
     annotated,
     autoware,
+    bursts,
     container,
     delivery,
     executors,
@@ -54,6 +55,8 @@ def scenarios() -> Mapping[str, Scenario]:
         lives.container_restarts(),
         stamps.equal_stamps(),
         traffic.host_chain(),
+        bursts.bursts(),
+        bursts.bursts_two_hosts(),
         layers.python(),
         layers.layers(),
         annotated.periodic_async(),

@@ -262,4 +262,6 @@ def _machine(
         clock,
         length,
     )
-    return Machine(host.hostname, clock, recorder, recording, host.stamp_resolution_ns)
+    return Machine(
+        host.hostname, clock, recorder, recording, host.stamp_resolution_ns, host.publish_pace,
+    )  # fmt: skip

@@ -32,6 +32,7 @@ class Machine:
         layout: of its traces.
         tracepoints: the events that can be emitted.
         free_at: for each CPU the time from which on it is free.
+        publish_pace: how long a publication takes from layer to layer, as a share of the usual.
     """
 
     def __init__(
@@ -41,9 +42,11 @@ class Machine:
         recorder: Recorder,
         recording: Recording,
         stamp_resolution: int = 1,
+        publish_pace: float = 1.0,
     ) -> None:
         self.hostname = hostname
         self._stamp_resolution = stamp_resolution
+        self.publish_pace = publish_pace
         self.epoch = epoch
         self.recorder = recorder
         self.layout = recorder.layout

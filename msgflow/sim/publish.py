@@ -62,6 +62,7 @@ def publish(
     world = thread.world
     random = world.random
     machine = thread.machine
+    pace = machine.publish_pace
     tracepoints = machine.tracepoints
     epoch = machine.epoch
     emit = thread.emit
@@ -78,7 +79,7 @@ def publish(
     if publisher.is_rclcpp:
         emit(tracepoints.rclcpp_publish, time, context, publisher.handle, publisher.message)
         message.rclcpp_ns = time + epoch
-        rcl += 250 + int(random() * 900)
+        rcl += int((250 + int(random() * 900)) * pace)
     emit(tracepoints.rcl_publish, rcl, context, publisher.handle, publisher.message)
     size_bytes = publisher.description.size_bytes
     written = write(thread, publisher.rmw_handle, publisher.message, rcl, size_bytes)
@@ -87,7 +88,7 @@ def publish(
     written.add_to_truth(thread, message.publication_id)
     write_publication(thread, publisher, message, instance)
     middleware.send(written.end, message)
-    return written.end + 3_000 + int(random() * 6_000)
+    return written.end + int((3_000 + int(random() * 6_000)) * pace)
 
 
 def write_publication(

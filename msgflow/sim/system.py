@@ -142,6 +142,7 @@ class Host:
         stamp_resolution_ns: what source stamps are a multiple of: a coarse clock gives messages
             that follow each other closely the same stamp.
         recording: how it is recorded; None: as the scenario says.
+        publish_pace: how long a publication takes from layer to layer, as a share of the usual.
     """
 
     hostname: str
@@ -151,6 +152,7 @@ class Host:
     boot: str = ""
     stamp_resolution_ns: int = 1
     recording: Recording | None = None
+    publish_pace: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,21 +57,22 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     machine = thread.machine
     random, layout = thread.world.random, machine.layout
     tracepoints, emit, context = machine.tracepoints, thread.emit, thread.context
+    pace = machine.publish_pace
     duration = int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * random()))
     if layout.is_stamped_by_rmw:
         # The rmw layer reads the clock first and emits the event then.
-        stamp = time + 200 + int(random() * 500)
-        rmw = stamp + 60 + int(random() * 200)
+        stamp = time + int((200 + int(random() * 500)) * pace)
+        rmw = stamp + int((60 + int(random() * 200)) * pace)
         stamp_ns = machine.stamp_ns(stamp)
         emit(tracepoints.rmw_publish, rmw, context, rmw_handle, message, stamp_ns)
         return Written(rmw, stamp_ns, rmw + duration + int(size_bytes * _SENDING_NS_PER_BYTE))
 
-    rmw = time + 260 + int(random() * 700)
+    rmw = time + int((260 + int(random() * 700)) * pace)
     emit(tracepoints.rmw_publish, rmw, context, rmw_handle, message, 0)
-    entered = rmw + 150 + int(random() * 400)
-    stamp = entered + 200 + int(random() * 800)
+    entered = rmw + int((150 + int(random() * 400)) * pace)
+    stamp = entered + int((200 + int(random() * 800)) * pace)
     if not layout.is_stamped_early:
-        stamp += duration + thread.world.tail(1_500)
+        stamp += duration + int(thread.world.tail(1_500) * pace)
         if random() < _HELD_UP:
             stamp += int(random() * _LONGEST_HOLD_UP_NS)
     stamp_ns = machine.stamp_ns(stamp)
@@ -80,10 +81,10 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     dds = []
     for name in layout.dds_write:
         if name == "dds:write":
-            end = stamp + 60 + int(random() * 300)
+            end = stamp + int((60 + int(random() * 300)) * pace)
             emit(tracepoints.dds_write, end, context, writer, message, stamp_ns)
         else:
-            end = end + 150 if end > stamp else entered
+            end = end + int(150 * pace) if end > stamp else entered
             emit(tracepoints.dds_write_pre, end, context, writer, message)
         dds.append((name, end))
     if layout.is_stamped_early:

@@ -1,0 +1,69 @@
+-- name: derive.agreed_difference
+-- kind: macro
+-- description: Differences of two clocks that nearly as many messages allow as the one that most
+--     allow: stretches without a gap of such differences. In each the one in the middle of those
+--     that most allow is furthest from making a message that of another publication. Where they
+--     are far apart the right one is near the greatest: the shortest delays are short.
+-- grain: one row per clock, stretch of time and stretch of differences
+-- param: intervals VARCHAR  Name of rows of clock_id, stretch, least_ns, greatest_ns
+-- needs: derive.clock_limit
+CREATE OR REPLACE MACRO derive.agreed_difference(intervals) AS TABLE
+WITH edge AS (
+    SELECT clock_id, stretch, least_ns AS from_ns, 1 AS step FROM query_table(intervals)
+    UNION ALL
+    SELECT clock_id, stretch, greatest_ns, -1 FROM query_table(intervals)
+),
+level AS (
+    SELECT
+        clock_id, stretch, from_ns,
+        lead(from_ns) OVER by_difference AS until_ns,
+        sum(step) OVER (by_difference ROWS UNBOUNDED PRECEDING) AS vote_count
+    FROM edge
+    WINDOW by_difference AS (PARTITION BY clock_id, stretch ORDER BY from_ns, step)
+),
+high AS (
+    SELECT clock_id, stretch, from_ns, until_ns, vote_count, most_count
+    FROM (
+        SELECT
+            clock_id, stretch, from_ns, until_ns, vote_count,
+            max(vote_count) OVER (PARTITION BY clock_id, stretch) AS most_count
+        FROM level
+        WHERE until_ns > from_ns
+    )
+    WHERE vote_count >= derive.clock_limit().rival_share * most_count
+),
+separated AS (
+    SELECT
+        clock_id, stretch, from_ns, until_ns, vote_count, most_count,
+        sum(CASE WHEN follows THEN 0 ELSE 1 END) OVER (
+            PARTITION BY clock_id, stretch ORDER BY from_ns ROWS UNBOUNDED PRECEDING
+        ) AS region
+    FROM (
+        SELECT
+            clock_id, stretch, from_ns, until_ns, vote_count, most_count,
+            coalesce(
+                from_ns = lag(until_ns) OVER (PARTITION BY clock_id, stretch ORDER BY from_ns),
+                false
+            ) AS follows
+        FROM high
+    )
+),
+best AS (
+    SELECT
+        clock_id, stretch, region, from_ns, until_ns, vote_count, most_count,
+        vote_count = max(vote_count) OVER (PARTITION BY clock_id, stretch, region) AS is_best
+    FROM separated
+)
+SELECT
+    clock_id,
+    stretch,
+    min(from_ns) AS least_ns,
+    max(until_ns) AS greatest_ns,
+    greatest(
+        (min(CASE WHEN is_best THEN from_ns END) + max(CASE WHEN is_best THEN until_ns END)) // 2,
+        max(CASE WHEN is_best THEN until_ns END) - derive.clock_limit().slack_ns
+    ) AS difference_ns,
+    max(vote_count)::BIGINT AS vote_count,
+    any_value(most_count)::BIGINT AS most_count
+FROM best
+GROUP BY clock_id, stretch, region

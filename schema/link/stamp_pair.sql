@@ -1,0 +1,126 @@
+-- name: derive.stamp_pair
+-- kind: macro
+-- description: Messages beside publications that may be theirs. A stamp is made after the message
+--     was written and before the publishing thread went on, so each pair allows an interval of
+--     differences between the clock of stamps and that of the trace; of publications that follow
+--     each other before the thread goes on, each has the time until the next. Some messages per
+--     stretch of time are enough, of every publisher in turn; first those of topics with one
+--     publisher, as others may be of none of a publisher's publications.
+-- grain: one row per clock, message in the sample and publication that it may be of
+-- param: only_run BIGINT  Run to look at
+-- needs: derive.unstamped_publication, derive.unstamped_message, derive.clock_limit
+CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
+WITH published AS MATERIALIZED (
+    SELECT
+        run_id, clock_id, topic_name, publisher_id, written_ns, next_event_ns,
+        row_number() OVER (PARTITION BY publisher_id ORDER BY written_ns, publication_id)
+            AS position
+    FROM derive.unstamped_publication(only_run)
+),
+message AS MATERIALIZED (
+    SELECT run_id, topic_name, source_timestamp_ns, clock_id, taken_ns
+    FROM derive.unstamped_message(only_run)
+),
+extent AS (
+    SELECT
+        run_id, clock_id, start_ns,
+        1 + (end_ns - start_ns) // least(
+            greatest(
+                (end_ns - start_ns) // derive.clock_limit().stretch_ns,
+                derive.clock_limit().least_stretches
+            ),
+            derive.clock_limit().most_stretches,
+            greatest(message_count // derive.clock_limit().stretch_messages, 1)
+        ) AS stretch_ns
+    FROM (
+        SELECT
+            p.run_id, p.clock_id, min(p.written_ns) AS start_ns, max(p.written_ns) AS end_ns,
+            any_value(m.message_count) AS message_count
+        FROM published AS p
+        CROSS JOIN (SELECT count(DISTINCT source_timestamp_ns) AS message_count FROM message) AS m
+        GROUP BY p.run_id, p.clock_id
+    )
+),
+publisher AS (
+    SELECT
+        run_id, clock_id, topic_name, publisher_id,
+        count(*) OVER (PARTITION BY topic_name) AS publisher_count
+    FROM published
+    GROUP BY run_id, clock_id, topic_name, publisher_id
+),
+placed AS (
+    SELECT
+        m.run_id, p.clock_id, p.publisher_id, p.publisher_count, m.source_timestamp_ns,
+        bool_or(m.clock_id = p.clock_id) AS is_taken_here,
+        coalesce(
+            min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END), m.source_timestamp_ns
+        ) AS near_ns
+    FROM message AS m
+    JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
+    GROUP BY m.run_id, p.clock_id, p.publisher_id, p.publisher_count, m.source_timestamp_ns
+),
+turn AS (
+    SELECT
+        q.run_id, q.clock_id, q.publisher_id, q.publisher_count, q.source_timestamp_ns,
+        q.is_taken_here, q.near_ns, x.start_ns, x.stretch_ns,
+        (q.near_ns - x.start_ns) // x.stretch_ns AS stretch,
+        row_number() OVER (
+            PARTITION BY q.publisher_id, (q.near_ns - x.start_ns) // x.stretch_ns
+            ORDER BY hash(q.source_timestamp_ns), q.source_timestamp_ns
+        ) AS turn
+    FROM placed AS q
+    JOIN extent AS x ON q.clock_id = x.clock_id
+),
+sampled AS (
+    SELECT
+        run_id, clock_id, publisher_id, source_timestamp_ns, is_taken_here, near_ns, start_ns,
+        stretch_ns
+    FROM turn
+    QUALIFY row_number() OVER (
+        PARTITION BY clock_id, stretch
+        ORDER BY publisher_count, turn, source_timestamp_ns, publisher_id
+    ) <= derive.clock_limit().sampled_messages
+),
+wanted AS (
+    SELECT
+        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here, s.start_ns,
+        s.stretch_ns, p.position AS latest_position,
+        p.position + unnest(
+            range(
+                -derive.clock_limit().reach,
+                CASE WHEN s.is_taken_here THEN 1 ELSE derive.clock_limit().reach + 1 END
+            )
+        ) AS position
+    FROM sampled AS s
+    ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
+),
+paired AS (
+    SELECT
+        w.run_id, w.clock_id, w.publisher_id, w.start_ns, w.stretch_ns, w.is_taken_here,
+        w.position = w.latest_position AS is_latest,
+        p.written_ns,
+        (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
+        w.source_timestamp_ns - p.written_ns AS greatest_ns,
+        w.source_timestamp_ns
+        - coalesce(p.next_event_ns, p.written_ns + derive.clock_limit().write_ns) AS least_ns,
+        lead(w.source_timestamp_ns - p.written_ns) OVER (
+            PARTITION BY w.publisher_id, w.source_timestamp_ns ORDER BY w.position
+        ) AS later_ns
+    FROM wanted AS w
+    JOIN published AS p ON w.publisher_id = p.publisher_id AND w.position = p.position
+)
+SELECT
+    run_id,
+    clock_id,
+    publisher_id,
+    start_ns,
+    stretch_ns,
+    stretch,
+    written_ns,
+    written_ns - start_ns - stretch * stretch_ns - stretch_ns // 2 AS beyond_middle_ns,
+    is_taken_here,
+    is_latest,
+    greatest(least_ns, later_ns) AS least_ns,
+    greatest_ns
+FROM paired
+WHERE coalesce(later_ns < greatest_ns, true)
