@@ -21,7 +21,7 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- expected only of publishers that usually do.
     'write_ns': 5000000,
     -- The shortest delay from a write to its stamp is known better than this. It counts only where
-    -- threads go on late: else half of the time in which the stamps of most messages may lie is less.
+    -- threads go on late: else half of the time in which most stamps may lie is less.
     'slack_ns': 4000,
     -- So many messages do not agree by chance.
     'quorum': 8,

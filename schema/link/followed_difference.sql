@@ -1,13 +1,13 @@
 -- name: derive.followed_difference
 -- kind: macro
--- description: Which of the differences that messages agree with the clocks have, from stretch to
---     stretch. Clocks of one machine begin together (even few messages may say so), and
---     go on as they went: of the differences that
---     a drift can lead to, the one of most messages. Where none is left the clock has jumped,
---     if two more stretches agree, to the least difference that many agree with: a message is taken soon
---     after it was published. Of messages taken on other clocks nothing says which of several
---     differences is right. Where messages taken on this clock would as well be those of later
---     publications, the clock may have jumped by a period: nothing is known then.
+-- description: Which of the differences that messages agree with the clocks have, from stretch
+--     to stretch. Clocks of one machine begin together (even few messages may say so), and go on
+--     as they went: of the differences that a drift can lead to, the one of most messages. Where
+--     none is left the clock has jumped, if two more stretches agree, to the least difference
+--     that many agree with: a message is taken soon after it was published. Of messages taken on
+--     other clocks nothing says which of several differences is right. Where messages taken on
+--     this clock would as well be those of later publications, the clock may have jumped by a
+--     period: nothing is known then.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
 -- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns
 -- needs: derive.clock_limit

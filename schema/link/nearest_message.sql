@@ -1,13 +1,13 @@
 -- name: derive.nearest_message
 -- kind: macro
--- description: Messages matched with publications that carry no stamp. A message was stamped after
---     its publication was written, and before the publishing thread went on. Per publisher a
---     message has one publication and a publication one message, the first. Where a publisher
+-- description: Messages matched with publications that carry no stamp. A message was stamped
+--     after its publication was written, and before the publishing thread went on. Per publisher
+--     a message has one publication and a publication one message, the first. Where a publisher
 --     writes for much of the time, or what the thread did next is not known, the delays that are
---     usual for it bound the search. A
---     message with a publication of several publishers, or one of two messages that may both be of
---     one publication, has none: that would be a guess. Nor has one where the difference of the
---     clocks is not known, or explains less than half of the messages.
+--     usual for it bound the search. A message with a publication of several publishers, or one
+--     of two messages that may both be of one publication, has none: that would be a guess. Nor
+--     has one where the difference of the clocks is not known, or explains less than half of the
+--     messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock,

@@ -1,9 +1,9 @@
 -- name: derive.stamp_clock
 -- kind: macro
 -- description: How far the clock that stamps messages is from that of the traces, over time:
---     constant but for jumps and a slow drift. In each stretch of time the difference that most messages
---     allow is followed from the one before. The drift of what was followed makes the same vote
---     sharp: then it tells messages apart that were published within microseconds.
+--     constant but for jumps and a slow drift. In each stretch of time the difference that most
+--     messages allow is followed from the one before. The drift of what was followed makes the
+--     same vote sharp: then it tells messages apart that were published within microseconds.
 -- grain: one row per clock and stretch of time with messages, message_count 0 if it is not known
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.stamp_pair, derive.clock_drift, derive.agreed_difference,

@@ -1,11 +1,11 @@
 -- name: derive.stamp_pair
 -- kind: macro
--- description: Messages beside publications that may be theirs. A stamp is made after the message
---     was written and before the publishing thread went on, so each pair allows an interval of
---     differences between the clock of stamps and that of the trace; of publications that follow
---     each other before the thread goes on, each has the time until the next. Some messages per
---     stretch of time are enough, of every publisher in turn; first those of topics with one
---     publisher, as others may be of none of a publisher's publications.
+-- description: Messages beside publications that may be theirs. A stamp is made after the
+--     message was written and before the publishing thread went on, so each pair allows an
+--     interval of differences between the clock of stamps and that of the trace; of publications
+--     that follow each other before the thread goes on, each has the time until the next. Some
+--     messages per stretch of time are enough, of every publisher in turn; first those of topics
+--     with one publisher, as others may be of none of a publisher's publications.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, derive.clock_limit
