@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import ingest_one, require_reader
+from ingested import ingest_one
 from scoring import compare_simulated
 
 from msgflow.sim import Recording, simulate
@@ -21,7 +21,6 @@ RECORDINGS = {
 @pytest.mark.parametrize("system", ["bursts", "bursts_two_hosts"])
 def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording: str) -> None:
     """Publications of one publisher follow each other within 2 to 4 µs, and all are found."""
-    require_reader()
     simulation = simulate(
         system, tmp_path / "trace", factor=0.1, layout="humble", recording=RECORDINGS[recording]
     )
