@@ -1,0 +1,163 @@
+"""The rules of the clock of stamps, each number of them from both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import duckdb
+import pytest
+
+from msgflow.db import objects
+
+RULES = ("clock_limit", "agreed_difference", "clock_drift", "followed_difference")
+STRETCH_NS = 500_000_000
+# What a clock may drift in a stretch.
+WANDER_NS = 100_000
+
+
+@pytest.fixture
+def rules() -> Iterator[duckdb.DuckDBPyConnection]:
+    """The macros alone: none of them reads the store."""
+    with duckdb.connect() as con:
+        con.execute("CREATE SCHEMA derive")
+        for header in objects.views():
+            if header.name.removeprefix("derive.") in RULES:
+                con.execute(header.body)
+        yield con
+
+
+def agreed(
+    con: duckdb.DuckDBPyConnection, intervals: Sequence[tuple[int, int, int]]
+) -> list[tuple[int, int]]:
+    """(difference, votes) for intervals of (least, greatest, so many messages)."""
+    con.execute("CREATE OR REPLACE TABLE interval_ (clock_id BIGINT, stretch BIGINT, "
+                "least_ns BIGINT, greatest_ns BIGINT)")  # fmt: skip
+    for least, greatest, count in intervals:
+        con.execute(
+            "INSERT INTO interval_ SELECT 1, 0, ?, ? FROM range(?)", [least, greatest, count]
+        )
+    return con.execute(
+        "SELECT difference_ns, vote_count FROM derive.agreed_difference('interval_') ORDER BY 1"
+    ).fetchall()
+
+
+Region = tuple[int, int, int]
+
+
+def followed(
+    con: duckdb.DuckDBPyConnection, stretches: Sequence[Sequence[Region]], *, is_here: bool = True
+) -> list[tuple[int, int, int]]:
+    """(difference, votes, segment) per stretch, of regions (difference, half width, votes)."""
+    con.execute("CREATE OR REPLACE TABLE region (clock_id BIGINT, stretch BIGINT, least_ns BIGINT, "
+                "greatest_ns BIGINT, difference_ns BIGINT, vote_count BIGINT, most_count BIGINT, "
+                "is_taken_here BOOLEAN, stretch_ns BIGINT)")  # fmt: skip
+    for stretch, regions in enumerate(stretches):
+        most = max(votes for _, _, votes in regions)
+        for difference, half, votes in regions:
+            con.execute(
+                "INSERT INTO region VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [stretch, difference - half, difference + half, difference, votes, most, is_here,
+                 STRETCH_NS],
+            )  # fmt: skip
+    return con.execute(
+        "SELECT difference_ns, message_count, segment FROM derive.followed_difference('region') "
+        "ORDER BY stretch"
+    ).fetchall()
+
+
+def drift(con: duckdb.DuckDBPyConnection, offsets: Sequence[int]) -> list[float]:
+    """Drift of each stretch [ppb], of the differences in it."""
+    con.execute("CREATE OR REPLACE TABLE course (clock_id BIGINT, place BIGINT, stretch BIGINT, "
+                "at_ns BIGINT, offset_ns BIGINT)")  # fmt: skip
+    for stretch, offset in enumerate(offsets):
+        con.execute(
+            "INSERT INTO course VALUES (1, 1, ?, ?, ?)", [stretch, stretch * STRETCH_NS, offset]
+        )
+    rows = con.execute("SELECT drift_ppb FROM derive.clock_drift('course') ORDER BY stretch")
+    return [value for (value,) in rows.fetchall()]
+
+
+def test_the_middle_of_what_most_allow(rules: duckdb.DuckDBPyConnection) -> None:
+    assert agreed(rules, [(0, 1_000, 5), (400, 2_000, 5)]) == [(700, 10)]
+
+
+@pytest.mark.parametrize(("width", "below"), [(6_000, 3_000), (9_000, 4_000), (50_000, 4_000)])
+def test_the_greatest_is_near_where_threads_go_on_late(
+    rules: duckdb.DuckDBPyConnection, width: int, below: int
+) -> None:
+    assert agreed(rules, [(0, width, 10)]) == [(width - below, 10)]
+
+
+@pytest.mark.parametrize(("votes", "is_rival"), [(18, True), (17, False)])
+def test_nine_tenths_make_a_rival(
+    rules: duckdb.DuckDBPyConnection, votes: int, *, is_rival: bool
+) -> None:
+    found = agreed(rules, [(0, 1_000, 20), (10_000, 11_000, votes)])
+    assert found == [(500, 20), (10_500, votes)][: 1 + is_rival]
+
+
+@pytest.mark.parametrize(("ppm", "is_possible"), [(190, True), (210, False)])
+def test_no_clock_drifts_faster(
+    rules: duckdb.DuckDBPyConnection, ppm: int, *, is_possible: bool
+) -> None:
+    expected = ppm * 1_000 if is_possible else 0
+    assert drift(rules, [n * ppm * 500 for n in range(3)]) == [expected] * 3
+
+
+def test_a_drift_is_that_of_five_stretches_around(rules: duckdb.DuckDBPyConnection) -> None:
+    """It changes after twenty stretches: ten of the eleven around the sixteenth have the old one."""
+    offsets = [0] * 21 + [n * 25_000 for n in range(1, 20)]
+    found = drift(rules, offsets)
+    assert found[15] == 0
+    assert 0 < found[20] < 50_000
+    assert found[25] == 50_000
+
+
+def test_few_messages_keep_a_clock_that_is_that_of_the_trace(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    assert followed(rules, [[(0, 500, 3)]]) == [(0, 3, 0)]
+    assert followed(rules, [[(5_000, 500, 7)]]) == []
+
+
+@pytest.mark.parametrize(("votes", "is_known"), [(8, True), (7, False)])
+def test_a_jump_takes_a_quorum(
+    rules: duckdb.DuckDBPyConnection, votes: int, *, is_known: bool
+) -> None:
+    jump = [(3_000_000, 500, votes)]
+    expected = [(3_000_000, votes, 1)] if is_known else []
+    assert followed(rules, [jump] * 3) == expected * 3
+
+
+def test_a_jump_takes_three_stretches(rules: duckdb.DuckDBPyConnection) -> None:
+    old, new, odd = [(0, 500, 20)], [(3_000_000, 500, 20)], [(9_000_000, 500, 20)]
+    assert followed(rules, [old, new, odd, old])[1][1:] == (0, 0)
+    assert followed(rules, [old, new, new, odd])[1][1:] == (0, 0)
+    assert followed(rules, [old, new, new, new])[1] == (3_000_000, 20, 1)
+
+
+@pytest.mark.parametrize(("step", "segment"), [(190_000, 0), (210_000, 1)])
+def test_what_a_drift_can_lead_to_is_no_jump(
+    rules: duckdb.DuckDBPyConnection, step: int, segment: int
+) -> None:
+    """In this stretch and since the one before."""
+    found = followed(rules, [[(0, 0, 20)], *([(step, 0, 20)] for _ in range(3))])
+    assert found[1] == (step, 20, segment)
+
+
+@pytest.mark.parametrize(("apart", "is_known"), [(450_000, True), (550_000, False)])
+def test_remote_differences_a_period_apart_tell_nothing(
+    rules: duckdb.DuckDBPyConnection, apart: int, *, is_known: bool
+) -> None:
+    """Within a burst the one of most messages is right."""
+    stretch = [(3_000_000, 500, 20), (3_000_000 + apart, 500, 19)]
+    found = followed(rules, [stretch] * 3, is_here=False)
+    assert found == [(3_000_000, 20, 1) if is_known else (0, 0, 0)] * 3
+
+
+@pytest.mark.parametrize(("apart", "is_known"), [(450_000, True), (550_000, False)])
+def test_a_later_publication_that_fits_as_well_tells_nothing(
+    rules: duckdb.DuckDBPyConnection, apart: int, *, is_known: bool
+) -> None:
+    found = followed(rules, [[(0, 500, 20), (-apart, 500, 19)]])
+    assert found == [(0, 20 if is_known else 0, 0)]
