@@ -105,7 +105,7 @@ def test_no_clock_drifts_faster(
 
 
 def test_a_drift_is_that_of_five_stretches_around(rules: duckdb.DuckDBPyConnection) -> None:
-    """It changes after twenty stretches: ten of the eleven around the sixteenth have the old one."""
+    """It changes after the twentieth stretch; the fifteenth has the old one all around."""
     offsets = [0] * 21 + [n * 25_000 for n in range(1, 20)]
     found = drift(rules, offsets)
     assert found[15] == 0
