@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import duckdb
 import pytest
 
-from msgflow.db import objects
-
-RULES = ("clock_limit", "agreed_difference", "clock_drift", "followed_difference")
 STRETCH_NS = 500_000_000
 # What a clock may drift in a stretch.
 WANDER_NS = 100_000
-
-
-@pytest.fixture
-def rules() -> Iterator[duckdb.DuckDBPyConnection]:
-    """The macros alone: none of them reads the store."""
-    with duckdb.connect() as con:
-        con.execute("CREATE SCHEMA derive")
-        for header in objects.views():
-            if header.name.removeprefix("derive.") in RULES:
-                con.execute(header.body)
-        yield con
 
 
 def agreed(
@@ -109,6 +95,7 @@ def test_a_drift_is_that_of_five_stretches_around(rules: duckdb.DuckDBPyConnecti
     offsets = [0] * 21 + [n * 25_000 for n in range(1, 20)]
     found = drift(rules, offsets)
     assert found[15] == 0
+    assert found[19] > 0
     assert 0 < found[20] < 50_000
     assert found[25] == 50_000
 
@@ -161,3 +148,45 @@ def test_a_later_publication_that_fits_as_well_tells_nothing(
 ) -> None:
     found = followed(rules, [[(0, 500, 20), (-apart, 500, 19)]])
     assert found == [(0, 20 if is_known else 0, 0)]
+
+
+@pytest.mark.parametrize(("until_next", "until_later", "is_jump"), [
+    (190_000, 200_000, True),
+    (210_000, 200_000, False),
+    (150_000, 290_000, True),
+    (150_000, 310_000, False),
+])  # fmt: skip
+def test_what_agrees_with_a_jump_may_drift(
+    rules: duckdb.DuckDBPyConnection, until_next: int, until_later: int, *, is_jump: bool
+) -> None:
+    """A wander for each stretch, and one more."""
+    jump = 3_000_000
+    found = followed(
+        rules,
+        [[(0, 0, 20)], [(jump, 0, 20)], [(jump + until_next, 0, 20)],
+         [(jump + until_later, 0, 20)], [(9_000_000, 0, 20)], [(1_000_000, 0, 20)]],
+    )  # fmt: skip
+    assert found[1] == ((jump, 20, 1) if is_jump else (0, 0, 0))
+
+
+@pytest.mark.parametrize(("apart", "chosen"), [(450_000, 1), (550_000, 0)])
+def test_a_jump_is_to_the_least_difference_but_for_bursts(
+    rules: duckdb.DuckDBPyConnection, apart: int, chosen: int
+) -> None:
+    """Within a burst the one of most messages is right."""
+    regions = [(3_000_000, 500, 19), (3_000_000 + apart, 500, 20)]
+    found = followed(rules, [[(0, 500, 20)], *[regions] * 3])
+    assert found[1][0] == regions[chosen][0]
+
+
+def test_of_differences_that_a_drift_can_lead_to_the_one_of_most_messages(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    assert followed(rules, [[(0, 500, 19), (50_000, 500, 20)]])[0][:2] == (50_000, 20)
+    assert followed(rules, [[(0, 500, 20), (50_000, 500, 20)]])[0][:2] == (0, 20)
+
+
+def test_slopes_over_more_than_five_stretches_count(rules: duckdb.DuckDBPyConnection) -> None:
+    """Differences that alternate show their drift only over a longer time."""
+    found = drift(rules, [n * 5_000 + (40_000 if n % 2 else 0) for n in range(11)])
+    assert abs(found[5] - 10_000) < 1_000

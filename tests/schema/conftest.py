@@ -1,0 +1,46 @@
+"""The macros that match messages by time, over tables of publications and messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import duckdb
+import pytest
+
+from msgflow.db import objects
+
+RULES = (
+    "clock_limit",
+    "agreed_difference",
+    "clock_drift",
+    "followed_difference",
+    "stamp_pair",
+    "stamp_clock",
+    "nearest_message",
+)
+# What the rules look at, without the store that it is told from.
+STAGE = """
+CREATE SCHEMA derive;
+CREATE SCHEMA store;
+CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
+    topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, publication_id BIGINT,
+    written_ns BIGINT, next_event_ns BIGINT);
+CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
+    source_timestamp_ns BIGINT, clock_id BIGINT DEFAULT 1, taken_ns BIGINT);
+CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
+    start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
+    message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0);
+CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHERE run_id = only_run;
+CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
+"""
+
+
+@pytest.fixture
+def rules() -> Iterator[duckdb.DuckDBPyConnection]:
+    """The macros alone, with nothing published or taken."""
+    with duckdb.connect() as con:
+        con.execute(STAGE)
+        for header in objects.views():
+            if header.name.removeprefix("derive.") in RULES:
+                con.execute(header.body)
+        yield con

@@ -1,0 +1,234 @@
+"""Which publication a message is of, where the clocks are known: each rule from both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import duckdb
+import pytest
+
+MICROSECOND = 1_000
+MILLISECOND = 1_000_000
+SECOND = 1_000_000_000
+PERIOD = 100 * MILLISECOND
+
+Row = tuple[int, int | None, int]
+
+
+def clock(con: duckdb.DuckDBPyConnection, *differences: tuple[int, int, int]) -> None:
+    """(difference, messages that agree, segment) of stretches of a second."""
+    con.executemany(
+        "INSERT INTO store.stamp_clock (at_ns, start_ns, end_ns, difference_ns, message_count, "
+        "segment) VALUES (?, ?, ?, ?, ?, ?)",
+        [
+            (n * SECOND + SECOND // 2, n * SECOND, (n + 1) * SECOND, *difference)
+            for n, difference in enumerate(differences)
+        ],
+    )
+
+
+def publish(
+    con: duckdb.DuckDBPyConnection,
+    identity: int,
+    written: int,
+    closes: int | None,
+    topic: str = "/a",
+) -> None:
+    """A publication and when its thread went on."""
+    con.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns, topic_name, "
+        "publisher_id) VALUES (?, ?, ?, ?, ?)",
+        [identity, written, closes, topic, ord(topic[1])],
+    )
+
+
+def take(
+    con: duckdb.DuckDBPyConnection, *stamps: int, topic: str = "/a", taken: int = 100 * SECOND
+) -> None:
+    con.executemany(
+        "INSERT INTO message (source_timestamp_ns, topic_name, taken_ns) VALUES (?, ?, ?)",
+        [(stamp, topic, taken) for stamp in stamps],
+    )
+
+
+def periodic(con: duckdb.DuckDBPyConnection, delays: Iterable[int], width: int) -> int:
+    """Publications one period apart, each with a message; returns the time of the next one."""
+    time = 0
+    for identity, delay in enumerate(delays):
+        publish(con, identity, time, time + width)
+        take(con, time + delay)
+        time += PERIOD
+    return time
+
+
+def nearest(con: duckdb.DuckDBPyConnection) -> dict[int, tuple[int | None, int]]:
+    """Publication and number of candidates by stamp."""
+    rows = con.execute(
+        "SELECT source_timestamp_ns, publication_id, candidate_count FROM derive.nearest_message(1)"
+    ).fetchall()
+    found = {stamp: (publication, count) for stamp, publication, count in rows}
+    assert len(found) == len(rows)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("stamp", "taken", "is_found"),
+    [
+        (99_999, SECOND, False),
+        (100_000, SECOND, True),
+        (149_999, SECOND, True),
+        (150_000, SECOND, False),
+        (149_999, 100_001, True),
+        (149_999, 100_000, False),
+    ],
+)
+def test_a_message_is_stamped_within_its_write_and_taken_behind(
+    rules: duckdb.DuckDBPyConnection, stamp: int, taken: int, *, is_found: bool
+) -> None:
+    clock(rules, (0, 100, 0))
+    publish(rules, 1, 100_000, 150_000)
+    publish(rules, 2, 200_000, 250_000)
+    publish(rules, 3, 300_000, 350_000)
+    take(rules, stamp, taken=taken)
+    take(rules, 210_000, 310_000)
+    expected = {210_000: (2, 1), 310_000: (3, 1)}
+    assert nearest(rules) == expected | ({stamp: (1, 1)} if is_found else {})
+
+
+@pytest.mark.parametrize(("delay", "is_found"), [(5_000_000, True), (5_000_001, False)])
+def test_a_thread_that_is_not_seen_to_go_on_writes_for_five_milliseconds(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
+) -> None:
+    clock(rules, (0, 100, 0))
+    publish(rules, 1, 0, None)
+    take(rules, delay)
+    assert nearest(rules)[delay] == ((1, 1) if is_found else (None, 0))
+
+
+@pytest.mark.parametrize(("delay", "is_found"), [(396_000, True), (396_001, False)])
+def test_or_for_twice_what_is_usual_for_it(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
+) -> None:
+    """99 of 100 delays are at most 198 µs."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, (n * MICROSECOND for n in range(1, 201)), MILLISECOND)
+    publish(rules, 999, time, None)
+    take(rules, time + delay)
+    assert nearest(rules).get(time + delay) == ((999, 1) if is_found else None)
+
+
+@pytest.mark.parametrize(
+    ("median", "width", "delay", "is_found"),
+    [
+        pytest.param(1, 17, 16.0, True, id="writes_for_less_than_a_fifth"),
+        pytest.param(1, 19, 16.0, False, id="writes_for_more"),
+        pytest.param(1, 19, 5.0, True, id="five_milliseconds"),
+        pytest.param(1, 19, 5.1, False, id="longer"),
+        pytest.param(3, 19, 12.0, True, id="four_medians"),
+        pytest.param(3, 19, 12.1, False, id="more"),
+    ],
+)
+def test_who_writes_for_much_of_the_time_has_messages_of_others_within(
+    rules: duckdb.DuckDBPyConnection, median: int, width: int, delay: float, *, is_found: bool
+) -> None:
+    """Times in milliseconds of a period of 100."""
+    clock(rules, (0, 100, 0))
+    late = round(delay * MILLISECOND)
+    periodic(rules, [median * MILLISECOND] * 9 + [late], width * MILLISECOND)
+    assert nearest(rules).get(9 * PERIOD + late) == ((9, 1) if is_found else None)
+
+
+@pytest.mark.parametrize(("delay", "is_rival"), [(500_000, True), (500_001, False)])
+def test_two_messages_of_one_publication(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_rival: bool
+) -> None:
+    """The first is its own, unless the second could be as well; a third is never."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [500_000] * 10, MILLISECOND)
+    publish(rules, 999, time, time + MILLISECOND)
+    take(rules, time + 400_000, time + delay, time + delay + 1)
+    found = nearest(rules)
+    assert found[time + 400_000] == (None if is_rival else 999, 1)
+    assert found.get(time + delay) == ((None, 1) if is_rival else None)
+    assert time + delay + 1 not in found
+
+
+@pytest.mark.parametrize(("matched", "is_known"), [(5, True), (4, False)])
+def test_a_difference_of_the_clocks_explains_half_of_a_topic(
+    rules: duckdb.DuckDBPyConnection, matched: int, *, is_known: bool
+) -> None:
+    """The others are said to have none."""
+    clock(rules, (0, 100, 0))
+    periodic(rules, [MICROSECOND] * matched + [50 * MILLISECOND] * (10 - matched), MILLISECOND)
+    found = nearest(rules)
+    assert found[MICROSECOND] == (0 if is_known else None, 1)
+    assert (9 * PERIOD + 50 * MILLISECOND in found) is not is_known
+
+
+@pytest.mark.parametrize(("count", "is_known"), [(8, True), (7, False)])
+def test_of_topics_with_a_quorum_of_messages(
+    rules: duckdb.DuckDBPyConnection, count: int, *, is_known: bool
+) -> None:
+    clock(rules, (0, 100, 0))
+    periodic(rules, [MICROSECOND] * count, MILLISECOND)
+    publish(rules, 999, 0, MILLISECOND, "/b")
+    take(rules, *range(2 * MILLISECOND, 2 * MILLISECOND + 20), topic="/b")
+    assert nearest(rules)[MICROSECOND] == (0 if is_known else None, 1)
+
+
+@pytest.mark.parametrize(("matched", "is_known"), [(3, True), (2, False)])
+def test_or_half_of_all_messages(
+    rules: duckdb.DuckDBPyConnection, matched: int, *, is_known: bool
+) -> None:
+    clock(rules, (0, 100, 0))
+    periodic(rules, [MICROSECOND] * matched + [50 * MILLISECOND] * (6 - matched), MILLISECOND)
+    assert nearest(rules)[MICROSECOND] == (0 if is_known else None, 1)
+
+
+def test_where_the_clocks_are_not_known_nothing_is_told(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 100, 0), (0, 0, 0))
+    publish(rules, 1, 0, MILLISECOND)
+    publish(rules, 2, SECOND, SECOND + MILLISECOND)
+    publish(rules, 3, -SECOND, MILLISECOND - SECOND)
+    take(rules, MICROSECOND - SECOND, MICROSECOND, SECOND + MICROSECOND)
+    assert nearest(rules) == {
+        MICROSECOND - SECOND: (3, 1),
+        MICROSECOND: (1, 1),
+        SECOND + MICROSECOND: (None, 0),
+    }
+
+
+@pytest.mark.parametrize("written", [SECOND - 50 * MILLISECOND, SECOND + 50 * MILLISECOND])
+@pytest.mark.parametrize("difference", [0, 10 * MILLISECOND])
+def test_a_publication_beside_a_jump_is_on_either_side(
+    rules: duckdb.DuckDBPyConnection, written: int, difference: int
+) -> None:
+    clock(rules, (0, 100, 0), (10 * MILLISECOND, 100, 1))
+    publish(rules, 1, written, written + MILLISECOND)
+    stamp = written + difference + MICROSECOND
+    take(rules, stamp)
+    assert nearest(rules) == {stamp: (1, 1)}
+
+
+def test_an_unknown_side_of_a_jump_tells_nothing(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 0, 0), (10 * MILLISECOND, 100, 1), (20 * MILLISECOND, 0, 2))
+    publish(rules, 1, SECOND + MILLISECOND, SECOND + 2 * MILLISECOND)
+    take(rules, SECOND + MILLISECOND + 1, SECOND + 21 * MILLISECOND + 1)
+    assert all(publication is None for publication, _ in nearest(rules).values())
+
+
+@pytest.mark.parametrize("seconds", [10, -10])
+def test_the_difference_drifts_within_a_stretch(
+    rules: duckdb.DuckDBPyConnection, seconds: int
+) -> None:
+    """200 ppm in 10 s are 2 ms."""
+    rules.execute(
+        "INSERT INTO store.stamp_clock (at_ns, start_ns, end_ns, drift_ppb) "
+        "VALUES (?, ?, ?, 200000)",
+        [20 * SECOND, 0, 40 * SECOND],
+    )
+    written = (20 + seconds) * SECOND
+    publish(rules, 1, written, written + MICROSECOND)
+    stamp = written + seconds // 5 * MILLISECOND
+    take(rules, stamp)
+    assert nearest(rules) == {stamp: (1, 1)}

@@ -1,0 +1,109 @@
+"""Which messages are laid beside which publications, each number of the rules from both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import duckdb
+import pytest
+
+MILLISECOND = 1_000_000
+SECOND = 1_000_000_000
+
+
+def publish(con: duckdb.DuckDBPyConnection, *rows: tuple[int, int, int | None]) -> None:
+    """Publications as (identity, time written, next event of the thread)."""
+    con.executemany(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) VALUES (?, ?, ?)", rows
+    )
+
+
+def pairs(con: duckdb.DuckDBPyConnection, columns: str) -> Sequence[tuple[Any, ...]]:
+    return con.execute(f"SELECT {columns} FROM derive.stamp_pair(1) ORDER BY ALL").fetchall()
+
+
+@pytest.mark.parametrize(
+    ("duration_ns", "messages", "count"),
+    [
+        pytest.param(10 * SECOND, 1_200, 20, id="half_a_second_each"),
+        pytest.param(2 * SECOND, 1_200, 8, id="at_least_eight"),
+        pytest.param(600 * SECOND, 12_000, 600, id="at_most_six_hundred"),
+        pytest.param(10 * SECOND, 60, 5, id="a_dozen_messages_each"),
+        pytest.param(10 * SECOND, 11, 1, id="one_of_few_messages"),
+    ],
+)
+def test_stretches_of_time(
+    rules: duckdb.DuckDBPyConnection, duration_ns: int, messages: int, count: int
+) -> None:
+    publish(rules, (1, 0, 1_000), (2, duration_ns, duration_ns + 1_000))
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns) "
+        "SELECT n, n + 10 FROM range(?) AS r(n)",
+        [messages],
+    )
+    assert pairs(rules, "DISTINCT stretch_ns") == [(1 + duration_ns // count,)]
+
+
+def test_enough_messages_of_a_stretch_of_every_publisher(rules: duckdb.DuckDBPyConnection) -> None:
+    for publisher, topic in ((1, "/a"), (2, "/b")):
+        rules.execute(
+            "INSERT INTO published "
+            "SELECT 1, 1, ?, ?, n, n * 2000000000, NULL FROM range(2) AS r(n)",
+            [topic, publisher],
+        )
+        rules.execute(
+            "INSERT INTO message SELECT 1, ?, ? + n * 10, 1, 2000 FROM range(100) AS r(n)",
+            [topic, publisher],
+        )
+    publishers = [publisher for (publisher, _) in pairs(rules, "publisher_id, greatest_ns")]
+    assert publishers == [1] * 24 + [2] * 24
+
+
+@pytest.mark.parametrize(("clock_id", "behind"), [(1, 0), (2, 24)])
+def test_two_dozen_publications_of_a_message(
+    rules: duckdb.DuckDBPyConnection, clock_id: int, behind: int
+) -> None:
+    """Before it was taken; of messages taken elsewhere, on either side of the stamp."""
+    publish(rules, *((n, n * MILLISECOND, n * MILLISECOND + 1_000) for n in range(100)))
+    taken_ns = 50 * MILLISECOND + 100
+    rules.execute("INSERT INTO message VALUES (1, '/a', ?, ?, ?)", [taken_ns, clock_id, taken_ns])
+    found = pairs(rules, "written_ns // 1000000, is_latest, is_taken_here")
+    assert [number for number, _, _ in found] == [*range(50 - 24, 50 + behind + 1)]
+    assert {number for number, is_latest, _ in found if is_latest} == {50}
+    assert {is_taken_here for _, _, is_taken_here in found} == {clock_id == 1}
+
+
+def test_the_time_that_a_publication_has(rules: duckdb.DuckDBPyConnection) -> None:
+    """Until its thread goes on, or the next one is written; 5 ms where neither is known."""
+    publish(
+        rules,
+        (1, 0, 1_000),
+        (2, 5_000, 9_000),
+        (3, 7_000, 9_000),
+        (4, 20 * MILLISECOND, None),
+    )
+    stamp = 30 * MILLISECOND
+    rules.execute("INSERT INTO message VALUES (1, '/a', ?, 1, ?)", [stamp, stamp])
+    assert pairs(rules, "written_ns, greatest_ns, least_ns") == [
+        (0, stamp, stamp - 1_000),
+        (5_000, stamp - 5_000, stamp - 7_000),
+        (7_000, stamp - 7_000, stamp - 9_000),
+        (20 * MILLISECOND, stamp - 20 * MILLISECOND, stamp - 25 * MILLISECOND),
+    ]
+
+
+def test_publications_of_one_moment_are_one(rules: duckdb.DuckDBPyConnection) -> None:
+    """Which of them a message is of the difference of the clocks does not depend on."""
+    publish(rules, (1, 0, 1_000), (2, 0, 1_000), (3, 2_000, 3_000))
+    rules.execute("INSERT INTO message VALUES (1, '/a', 500, 1, 4_000)")
+    assert pairs(rules, "written_ns, greatest_ns, least_ns") == [
+        (0, 500, -500),
+        (2_000, -1_500, -2_500),
+    ]
+
+
+def test_the_middle_of_a_stretch(rules: duckdb.DuckDBPyConnection) -> None:
+    publish(rules, (1, 0, 1_000), (2, 999, 1_500))
+    rules.execute("INSERT INTO message VALUES (1, '/a', 400, 1, 500)")
+    assert pairs(rules, "stretch, stretch_ns, beyond_middle_ns") == [(0, 1_000, -500)]

@@ -1,0 +1,50 @@
+"""The clock of stamps of a publisher of known delays, from its publications and messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import duckdb
+import pytest
+
+SECOND = 1_000_000_000
+PERIOD_NS = 10_000_000
+COUNT = 400
+STRETCH_NS = 498_750_001
+
+
+def record(
+    con: duckdb.DuckDBPyConnection, *, width_ns: int, delay_ns: int, ppm: int, per_burst: int = 1
+) -> list[tuple[Any, ...]]:
+    """Clock of stamps where each write takes `width_ns` and is stamped up to `delay_ns` later."""
+    con.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) SELECT n, written_ns, "
+        "written_ns + $width FROM (SELECT n, n // $burst * $period + n % $burst * $width "
+        "+ CASE WHEN n // $burst IN (0, $count - 1) THEN 0 ELSE hash(n // $burst) % 80000 END "
+        "AS written_ns FROM range($count * $burst) AS r(n))",
+        {"width": width_ns, "burst": per_burst, "period": PERIOD_NS, "count": COUNT},
+    )
+    con.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns) "
+        "SELECT stamp + stamp * $ppm // 1000000, stamp + 200000 FROM (SELECT written_ns + 500 "
+        "+ (hash(publication_id, 7) % $delay)::BIGINT AS stamp FROM published)",
+        {"ppm": ppm, "delay": delay_ns},
+    )
+    return con.execute(
+        "SELECT start_ns, at_ns, end_ns, difference_ns, drift_ppb, message_count, segment "
+        "FROM derive.stamp_clock(1) ORDER BY start_ns"
+    ).fetchall()
+
+
+@pytest.mark.parametrize("ppm", [0, 150, -150])
+def test_difference_and_drift_of_each_stretch(rules: duckdb.DuckDBPyConnection, ppm: int) -> None:
+    """The messages of a stretch agree only once its drift is known."""
+    rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=ppm)
+    assert len(rows) == 8
+    for n, (start, at, end, difference, drift, count, segment) in enumerate(rows):
+        assert (start, end) == (n * STRETCH_NS, (n + 1) * STRETCH_NS)
+        assert at == start + STRETCH_NS // 2
+        assert abs(difference - at * ppm // 1_000_000) < 1_500
+        assert abs(drift - ppm * 1_000) < 5_000
+        assert count >= 24
+        assert segment == 0
