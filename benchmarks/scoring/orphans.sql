@@ -18,12 +18,11 @@ WITH accepted AS (
         ('taken, loss', 'receiver_gap'),
         ('taken, packets', 'receiver_gap'),
         ('taken, truncation', 'receiver_gap'),
-        -- The message was kept for subscriptions that come late, or nothing of it is traced.
         -- Taken from a ring buffer, with a gap in between.
         ('recorded', 'publisher_gap'),
+        -- The message was kept for subscriptions that come late, or nothing of it is traced.
         ('kept', 'no_stamp'),
-        ('no event', 'no_stamp'),
-        ('twin', 'ambiguous')
+        ('no event', 'no_stamp')
     ) AS a(truth, reason)
 ),
 orphan AS (

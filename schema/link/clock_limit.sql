@@ -15,7 +15,7 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- More messages of one stretch do not make its difference of the clocks any sharper.
     'sampled_messages': 48,
     -- A message is of one of so many publications before it was taken, or on either side of its
-    -- stamp where its host's clock did not see it taken: several periods, and bursts of a callback.
+    -- stamp: several periods, and bursts of a callback.
     'reach': 24,
     -- A thread that is never seen to go on has written its message by then. What takes longer is
     -- expected only of publishers that usually do.

@@ -3,8 +3,9 @@
 -- description: Which of the differences that messages agree with the clocks have, from stretch
 --     to stretch. Clocks of one machine begin together (even few messages may say so), and go on
 --     as they went: of the differences that a drift can lead to, the one of most messages. Where
---     none is left the clock has jumped, if two more stretches agree, to the least difference
---     that many agree with: a message is taken soon after it was published. Of messages taken on
+--     none is left the clock has jumped, if two more stretches agree (in the last two nothing is
+--     known then), to the least difference that many agree with: a message is taken soon after it
+--     was published. Of messages taken on
 --     other clocks nothing says which of several differences is right. Where messages taken on
 --     this clock would as well be those of later publications, the clock may have jumped by a
 --     period: nothing is known then.
@@ -63,7 +64,9 @@ ballot AS MATERIALIZED (
                     )
                     THEN t.difference_ns
             END
-        ) AS jump_ns
+        ) AS jump_ns,
+        -- The last two stretches have no two more that could agree.
+        coalesce(bool_or(t.later_ns IS NOT NULL), false) AS has_later
     FROM query_table(regions) AS r
     LEFT JOIN told AS t ON r.clock_id = t.clock_id AND r.stretch = t.stretch
     GROUP BY r.clock_id, r.stretch
@@ -92,7 +95,8 @@ followed (
         is_begun OR near IS NOT NULL OR jump_ns IS NOT NULL
     FROM (
         SELECT
-            b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count, b.jump_ns,
+            b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count,
+            CASE WHEN b.has_later OR NOT f.is_begun THEN b.jump_ns END AS jump_ns,
             f.difference_ns AS previous_ns, f.segment, f.since_stretch, f.is_begun,
             list_max(
                 list_transform(

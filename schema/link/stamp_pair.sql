@@ -13,9 +13,10 @@ CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
 WITH published AS MATERIALIZED (
     SELECT
         run_id, clock_id, topic_name, publisher_id, written_ns, next_event_ns,
-        row_number() OVER (PARTITION BY publisher_id ORDER BY written_ns, publication_id)
-            AS position
+        row_number() OVER in_order AS position,
+        lead(written_ns) OVER in_order AS next_written_ns
     FROM derive.unstamped_publication(only_run)
+    WINDOW in_order AS (PARTITION BY publisher_id ORDER BY written_ns, publication_id)
 ),
 message AS MATERIALIZED (
     SELECT run_id, topic_name, source_timestamp_ns, clock_id, taken_ns
@@ -81,18 +82,40 @@ sampled AS (
         ORDER BY publisher_count, turn, source_timestamp_ns, publisher_id
     ) <= derive.clock_limit().sampled_messages
 ),
+-- A message may have been in a queue for longer than `reach` others took to be published. Clocks of
+-- one machine are close, so its publication is then among those around its stamp.
 wanted AS (
     SELECT
-        s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here, s.start_ns,
-        s.stretch_ns, p.position AS latest_position,
-        p.position + unnest(
-            range(
-                -derive.clock_limit().reach,
-                CASE WHEN s.is_taken_here THEN 1 ELSE derive.clock_limit().reach + 1 END
-            )
+        l.run_id, l.clock_id, l.publisher_id, l.source_timestamp_ns, l.is_taken_here, l.start_ns,
+        l.stretch_ns, coalesce(p.position, l.latest_position) AS latest_position,
+        unnest(
+            CASE
+                WHEN l.is_taken_here THEN
+                    range(
+                        p.position - derive.clock_limit().reach,
+                        least(
+                            p.position + derive.clock_limit().reach + 1,
+                            l.latest_position - derive.clock_limit().reach
+                        )
+                    )
+                    || range(
+                        l.latest_position - derive.clock_limit().reach, l.latest_position + 1
+                    )
+                ELSE range(
+                    l.latest_position - derive.clock_limit().reach,
+                    l.latest_position + derive.clock_limit().reach + 1
+                )
+            END
         ) AS position
-    FROM sampled AS s
-    ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
+    FROM (
+        SELECT
+            s.run_id, s.clock_id, s.publisher_id, s.source_timestamp_ns, s.is_taken_here,
+            s.start_ns, s.stretch_ns, p.position AS latest_position
+        FROM sampled AS s
+        ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
+    ) AS l
+    ASOF LEFT JOIN published AS p
+        ON l.publisher_id = p.publisher_id AND l.source_timestamp_ns >= p.written_ns
 ),
 paired AS (
     SELECT
@@ -103,9 +126,7 @@ paired AS (
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
         w.source_timestamp_ns
         - coalesce(p.next_event_ns, p.written_ns + derive.clock_limit().write_ns) AS least_ns,
-        lead(w.source_timestamp_ns - p.written_ns) OVER (
-            PARTITION BY w.publisher_id, w.source_timestamp_ns ORDER BY w.position
-        ) AS later_ns
+        w.source_timestamp_ns - p.next_written_ns AS later_ns
     FROM wanted AS w
     JOIN published AS p ON w.publisher_id = p.publisher_id AND w.position = p.position
 )

@@ -123,6 +123,12 @@ def test_a_jump_takes_three_stretches(rules: duckdb.DuckDBPyConnection) -> None:
     assert followed(rules, [old, new, new, new])[1] == (3_000_000, 20, 1)
 
 
+def test_a_jump_at_the_end_is_not_confirmed(rules: duckdb.DuckDBPyConnection) -> None:
+    old, new = [(0, 500, 20)], [(3_000_000, 500, 20)]
+    assert followed(rules, [old, new]) == [(0, 20, 0), (0, 0, 0)]
+    assert followed(rules, [old, new, new]) == [(0, 20, 0), (0, 0, 0), (0, 0, 0)]
+
+
 @pytest.mark.parametrize(("step", "segment"), [(190_000, 0), (210_000, 1)])
 def test_what_a_drift_can_lead_to_is_no_jump(
     rules: duckdb.DuckDBPyConnection, step: int, segment: int
