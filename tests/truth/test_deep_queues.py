@@ -23,7 +23,9 @@ def test_a_full_deep_queue_costs_no_link(
     tmp_path: Path, depth: int, period: int, work: Work, duration: int
 ) -> None:
     """The reader is too slow, so that each message waits for as many as the queue holds."""
-    source = Node("source", publishers=(Publisher("/points", depth),), timers=(Timer(period, ("/points",)),))
+    source = Node(
+        "source", publishers=(Publisher("/points", depth),), timers=(Timer(period, ("/points",)),)
+    )
     slow = Node("slow", subscriptions=(Subscription("/points", (), work, depth),))
     scenario = Scenario(
         name="deep",
