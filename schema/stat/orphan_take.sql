@@ -27,8 +27,8 @@ presence AS MATERIALIZED (
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap
-    WHERE run_id = of_run AND EXISTS (SELECT 1 FROM orphan)
+    FROM derive.process_gap(of_run)
+    WHERE EXISTS (SELECT 1 FROM orphan)
 ),
 run_begin AS (
     SELECT min(start_ns) AS begin_ns

@@ -1,4 +1,5 @@
 -- name: derive.process_gap
+-- kind: macro
 -- description: When each process may have done something that is not in its traces, for ASOF joins
 --     as with derive.recording_gap: gaps of its recordings; the time before its first event, if it
 --     existed before; and between two recordings. The tracer tells one process after the other to
@@ -7,15 +8,18 @@
 -- grain: one row per process and gap
 -- needs: derive.process_presence, store.loss_interval, store.trace, store.publication, store.take,
 --     store.callback_instance, store.executor_state, store.thread
+CREATE OR REPLACE MACRO derive.process_gap(of_run) AS TABLE
 WITH recording AS (
     SELECT
         run_id, trace_id,
         min(trace_id) OVER (PARTITION BY run_id, coalesce(uuid, path)) AS recording_id
     FROM store.trace
+    WHERE run_id = of_run
 ),
 presence AS MATERIALIZED (
     SELECT run_id, process_id, recording_id, begin_ns, end_ns, first_ns, last_ns, is_born
     FROM derive.process_presence
+    WHERE run_id = of_run
 ),
 interval_of_process AS MATERIALIZED (
     SELECT p.run_id, p.process_id, l.kind, l.start_ns, l.end_ns
@@ -28,19 +32,20 @@ pause AS MATERIALIZED (
 ),
 -- What the paused processes did, where there are any.
 moment AS (
-    SELECT process_id, start_ns AS at_ns FROM store.publication
+    SELECT process_id, start_ns AS at_ns FROM store.publication WHERE run_id = of_run
     UNION ALL
-    SELECT process_id, end_ns FROM store.publication
+    SELECT process_id, end_ns FROM store.publication WHERE run_id = of_run
     UNION ALL
-    SELECT process_id, taken_ns FROM store.take
+    SELECT process_id, taken_ns FROM store.take WHERE run_id = of_run
     UNION ALL
-    SELECT process_id, start_ns FROM store.callback_instance
+    SELECT process_id, start_ns FROM store.callback_instance WHERE run_id = of_run
     UNION ALL
-    SELECT process_id, end_ns FROM store.callback_instance
+    SELECT process_id, end_ns FROM store.callback_instance WHERE run_id = of_run
     UNION ALL
     SELECT t.process_id, s.start_ns
     FROM store.executor_state AS s
     JOIN store.thread AS t ON s.thread_id = t.thread_id
+    WHERE s.run_id = of_run
 ),
 active AS MATERIALIZED (
     SELECT process_id, at_ns

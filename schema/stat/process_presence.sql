@@ -52,17 +52,6 @@ creation AS (
     SELECT run_id, process_id, created_ns FROM store.publisher
     UNION ALL
     SELECT run_id, process_id, created_ns FROM store.subscription
-),
--- Its first object was seen to be created before it did anything.
-born AS (
-    SELECT s.process_id, s.recording_id
-    FROM stay AS s
-    JOIN creation AS c
-        ON s.run_id = c.run_id
-        AND s.process_id = c.process_id
-        AND c.created_ns >= s.begin_ns
-        AND c.created_ns <= s.first_ns
-    GROUP BY s.process_id, s.recording_id
 )
 SELECT
     s.run_id,
@@ -72,14 +61,16 @@ SELECT
     s.end_ns,
     CASE WHEN p.first_seen_ns >= s.begin_ns THEN p.first_seen_ns ELSE s.first_ns END AS first_ns,
     s.last_ns,
-    b.process_id IS NOT NULL AS is_born,
+    -- Its first object was seen to be created before it did anything.
+    coalesce(c.created_ns <= s.first_ns, false) AS is_born,
     CASE
-        WHEN b.process_id IS NOT NULL THEN s.begin_ns
+        WHEN c.created_ns <= s.first_ns THEN s.begin_ns
         WHEN l.start_ns <= s.first_ns THEN s.begin_ns
         WHEN p.first_seen_ns >= s.begin_ns THEN p.first_seen_ns
         ELSE s.first_ns
     END AS recorded_from_ns
 FROM stay AS s
 JOIN store.process AS p ON s.process_id = p.process_id
-LEFT JOIN born AS b ON s.process_id = b.process_id AND s.recording_id = b.recording_id
+ASOF LEFT JOIN creation AS c
+    ON s.run_id = c.run_id AND s.process_id = c.process_id AND s.begin_ns <= c.created_ns
 LEFT JOIN lossy AS l ON s.recording_id = l.recording_id

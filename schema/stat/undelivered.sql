@@ -45,8 +45,8 @@ missing AS MATERIALIZED (
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap
-    WHERE run_id = of_run AND EXISTS (SELECT 1 FROM missing)
+    FROM derive.process_gap(of_run)
+    WHERE EXISTS (SELECT 1 FROM missing)
 ),
 -- The order of messages, where any is missing.
 ordered AS MATERIALIZED (
