@@ -25,6 +25,8 @@
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time: what is said of them
 --     may be wrong
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are from
+-- column: looped BIGINT            Later messages at the end of the path that descend from such an
+--     arrival, but only round a loop: no pairs, as a path visits no subscription twice
 -- column: min_ns BIGINT [ns]       Shortest latency
 -- column: median_ns BIGINT [ns]    Median latency
 -- column: mean_ns BIGINT [ns]      Mean latency
@@ -37,10 +39,10 @@
 -- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
 -- column: path VARCHAR             Nodes and topics
 -- note: clocks
--- needs: main.flow_path, main.end_to_end
+-- needs: main.flow_path, main.end_to_end, derive.looped_arrival
 WITH flow AS (
     SELECT
-        run_id, path_id, root_kind, root_id, sink_event, latency_ns, status, reason,
+        run_id, path_id, root_kind, root_id, take_id, sink_event, latency_ns, status, reason,
         is_loss_affected,
         CASE $case
             WHEN 'first' THEN is_first
@@ -98,6 +100,11 @@ latency AS (
     FROM flow
     WHERE status = 'reached' AND is_counted
     GROUP BY run_id, path_id
+),
+looped AS (
+    SELECT path_id, count(*) AS number
+    FROM derive.looped_arrival($runs, 'flow')
+    GROUP BY path_id
 )
 SELECT
     p.run_id,
@@ -108,6 +115,7 @@ SELECT
     coalesce(c.edge, 0) AS edge,
     coalesce(c.loss_affected, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
+    coalesce(o.number, 0) AS looped,
     l.min_ns,
     l.quantiles[1] AS median_ns,
     l.mean_ns,
@@ -124,5 +132,6 @@ FROM main.flow_path(
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
 LEFT JOIN reason AS r ON p.path_id = r.path_id
+LEFT JOIN looped AS o ON p.path_id = o.path_id
 WHERE p.is_path
 ORDER BY p.run_id, p.path, p.path_id

@@ -1,0 +1,87 @@
+-- name: derive.looped_arrival
+-- kind: macro
+-- description: Later takes at the end of a path, which visits no subscription twice: those that
+--     descend from an arrival there round a loop, and that are none. Every loop
+--     through a subscription lies among those that it leads to and that lead to it.
+-- grain: one row per path and take
+-- param: runs BIGINT[]  Runs to look at
+-- param: arrivals VARCHAR  Name of rows of path_id, take_id; each may come often
+-- needs: derive.flow_transport, derive.flow_continuation, derive.flow_hop, store.take
+CREATE OR REPLACE MACRO derive.looped_arrival(runs, arrivals) AS TABLE
+WITH RECURSIVE arrival AS MATERIALIZED (
+    SELECT DISTINCT path_id, take_id FROM query_table(arrivals) WHERE take_id IS NOT NULL
+),
+sink AS MATERIALIZED (
+    SELECT DISTINCT a.path_id, t.subscription_id
+    FROM arrival AS a
+    JOIN store.take AS t ON a.take_id = t.take_id
+),
+continued AS MATERIALIZED (
+    SELECT DISTINCT subscription_id
+    FROM sink
+    WHERE subscription_id IN (
+        SELECT subscription_id FROM derive.flow_continuation WHERE list_contains(runs, run_id)
+    )
+),
+-- The steps of the graph are looked for only where the end of a path goes on.
+hop AS MATERIALIZED (
+    SELECT DISTINCT from_subscription_id, subscription_id
+    FROM derive.flow_hop
+    WHERE list_contains(runs, run_id)
+        AND from_subscription_id IS NOT NULL
+        AND EXISTS (SELECT 1 FROM continued)
+),
+ahead (sink_id, subscription_id) AS (
+    SELECT s.subscription_id, h.subscription_id
+    FROM continued AS s
+    JOIN hop AS h ON s.subscription_id = h.from_subscription_id
+    UNION
+    SELECT a.sink_id, h.subscription_id
+    FROM ahead AS a
+    JOIN hop AS h ON a.subscription_id = h.from_subscription_id
+),
+behind (sink_id, subscription_id) AS (
+    SELECT sink_id, sink_id FROM ahead WHERE sink_id = subscription_id
+    UNION
+    SELECT b.sink_id, h.from_subscription_id
+    FROM behind AS b
+    JOIN hop AS h ON b.subscription_id = h.subscription_id
+),
+member AS MATERIALIZED (
+    SELECT sink_id, subscription_id FROM ahead
+    INTERSECT
+    SELECT sink_id, subscription_id FROM behind
+),
+round AS MATERIALIZED (
+    SELECT DISTINCT a.subscription_id AS from_subscription_id, b.subscription_id
+    FROM member AS a
+    JOIN member AS b ON a.sink_id = b.sink_id
+),
+edge AS MATERIALIZED (
+    SELECT DISTINCT c.take_id AS from_take_id, t.take_id
+    FROM derive.flow_continuation AS c
+    JOIN derive.flow_transport AS t ON c.publication_id = t.publication_id
+    JOIN round AS r
+        ON c.subscription_id = r.from_subscription_id AND t.subscription_id = r.subscription_id
+    WHERE list_contains(runs, c.run_id) AND list_contains(runs, t.run_id)
+),
+-- What is used twice is computed once, not at every step (see derive.graph_reachable).
+known AS (
+    SELECT count(*) AS edge_count FROM edge
+),
+descendant (path_id, take_id) AS (
+    SELECT a.path_id, a.take_id
+    FROM arrival AS a
+    JOIN known AS k ON k.edge_count > 0
+    JOIN sink AS s ON a.path_id = s.path_id
+    WHERE s.subscription_id IN (SELECT sink_id FROM member)
+    UNION
+    SELECT d.path_id, e.take_id
+    FROM descendant AS d
+    JOIN edge AS e ON d.take_id = e.from_take_id
+)
+SELECT d.path_id, d.take_id
+FROM descendant AS d
+JOIN store.take AS t ON d.take_id = t.take_id
+JOIN sink AS s ON d.path_id = s.path_id AND t.subscription_id = s.subscription_id
+ANTI JOIN arrival AS a ON d.path_id = a.path_id AND d.take_id = a.take_id
