@@ -1,8 +1,8 @@
 -- name: derive.looped_arrival
 -- kind: macro
 -- description: Later takes at the end of a path, which visits no subscription twice: those that
---     descend from an arrival there round a loop, and that are none. Every loop
---     through a subscription lies among those that it leads to and that lead to it.
+--     descend from an arrival there, and are none. Every loop through a subscription lies among
+--     those that it leads to and that lead to it.
 -- grain: one row per path and take
 -- param: runs BIGINT[]  Runs to look at
 -- param: arrivals VARCHAR  Name of rows of path_id, take_id; each may come often
