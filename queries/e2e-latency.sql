@@ -39,7 +39,7 @@
 -- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
 -- column: path VARCHAR             Nodes and topics
 -- note: clocks
--- needs: main.flow_path, main.end_to_end, derive.looped_arrival
+-- needs: main.flow_path, main.end_to_end, main.looped_arrival
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, sink_event, latency_ns, status, reason,
@@ -103,7 +103,13 @@ latency AS (
 ),
 looped AS (
     SELECT path_id, count(*) AS number
-    FROM derive.looped_arrival($runs, 'flow')
+    FROM main.looped_arrival(
+        $runs,
+        (
+            SELECT list([path_id, take_id])
+            FROM (SELECT DISTINCT path_id, take_id FROM flow WHERE take_id IS NOT NULL)
+        )
+    )
     GROUP BY path_id
 )
 SELECT

@@ -1,15 +1,18 @@
--- name: derive.looped_arrival
+-- name: main.looped_arrival
 -- kind: macro
 -- description: Later takes at the end of a path, which visits no subscription twice: those that
 --     descend from an arrival there, and are none. Every loop through a subscription lies among
 --     those that it leads to and that lead to it.
 -- grain: one row per path and take
 -- param: runs BIGINT[]  Runs to look at
--- param: arrivals VARCHAR  Name of rows of path_id, take_id; each may come often
+-- param: arrivals BIGINT[][]  Arrivals of main.end_to_end: each path_id and take_id, once
+-- column: path_id BIGINT  Path, as main.end_to_end numbers it
+-- column: take_id BIGINT  Take at the end of the path
 -- needs: derive.flow_transport, derive.flow_continuation, derive.flow_hop, store.take
-CREATE OR REPLACE MACRO derive.looped_arrival(runs, arrivals) AS TABLE
+CREATE OR REPLACE MACRO main.looped_arrival(runs, arrivals) AS TABLE
 WITH RECURSIVE arrival AS MATERIALIZED (
-    SELECT DISTINCT path_id, take_id FROM query_table(arrivals) WHERE take_id IS NOT NULL
+    SELECT arrival[1] AS path_id, arrival[2] AS take_id
+    FROM (SELECT unnest(arrivals::BIGINT[][]) AS arrival)
 ),
 sink AS MATERIALIZED (
     SELECT DISTINCT a.path_id, t.subscription_id
