@@ -13,19 +13,37 @@
 -- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock,
 --     derive.clock_limit
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
-WITH course AS (
+-- No clock jumps there and back within a stretch: where only one tells nothing it went on.
+WITH observed AS (
+    SELECT
+        clock_id, at_ns, start_ns, difference_ns, drift_ppb, message_count, segment,
+        (lag(difference_ns) OVER on_clock + lead(difference_ns) OVER on_clock) // 2 AS between_ns,
+        (lag(drift_ppb) OVER on_clock + lead(drift_ppb) OVER on_clock) // 2 AS between_ppb,
+        message_count = 0 AND coalesce(
+            lag(message_count) OVER on_clock > 0
+            AND lead(message_count) OVER on_clock > 0
+            AND lag(segment) OVER on_clock = lead(segment) OVER on_clock,
+            false
+        ) AS is_between
+    FROM store.stamp_clock
+    WHERE run_id = only_run
+    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
+),
+course AS (
     SELECT
         clock_id, at_ns, start_ns, drift_ppb, state, row_number() OVER on_clock = 1 AS is_first,
         lag(state) OVER on_clock AS before,
         lead(state) OVER on_clock AS after
     FROM (
         SELECT
-            clock_id, at_ns, start_ns, drift_ppb,
+            clock_id, at_ns, start_ns,
+            CASE WHEN is_between THEN between_ppb ELSE drift_ppb END AS drift_ppb,
             struct_pack(
-                difference_ns := difference_ns, segment := segment, is_known := message_count > 0
+                difference_ns := CASE WHEN is_between THEN between_ns ELSE difference_ns END,
+                segment := segment,
+                is_known := message_count > 0 OR is_between
             ) AS state
-        FROM store.stamp_clock
-        WHERE run_id = only_run
+        FROM observed
     )
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 ),

@@ -198,6 +198,38 @@ def test_where_the_clocks_are_not_known_nothing_is_told(rules: duckdb.DuckDBPyCo
     }
 
 
+@pytest.mark.parametrize(
+    ("unknown", "segment", "messages", "is_found"),
+    [(1, 0, 100, True), (2, 0, 100, False), (1, 1, 100, False), (1, 0, 0, False)],
+)
+def test_a_clock_goes_on_where_one_stretch_alone_tells_nothing(
+    rules: duckdb.DuckDBPyConnection, unknown: int, segment: int, messages: int, *, is_found: bool
+) -> None:
+    """Half way between the differences on both sides, if it did not jump meanwhile."""
+    clock(rules, (0, 100, 0), *[(7 * SECOND, 0, 0)] * unknown, (200_000, messages, segment))
+    written = SECOND + SECOND // 2
+    publish(rules, 1, written, written + 50_000)
+    stamp = written + 110_000
+    take(rules, stamp)
+    assert (nearest(rules)[stamp] == (1, 1)) is is_found
+
+
+def test_and_drifts_as_on_both_sides(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 100, 0), (0, 0, 0), (200_000, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET drift_ppb = 100000 WHERE message_count > 0")
+    written = SECOND + SECOND // 10 * 9
+    publish(rules, 1, written, written + 5_000)
+    take(rules, written + 140_000)
+    assert nearest(rules) == {written + 140_000: (1, 1)}
+
+
+def test_nor_where_it_tells_nothing_before(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 0, 0), (0, 0, 0), (0, 100, 0))
+    publish(rules, 1, SECOND + SECOND // 2, 2 * SECOND)
+    take(rules, SECOND + SECOND // 2 + 1)
+    assert [publication for publication, _ in nearest(rules).values()] == [None]
+
+
 @pytest.mark.parametrize("written", [SECOND - 50 * MILLISECOND, SECOND + 50 * MILLISECOND])
 @pytest.mark.parametrize("difference", [0, 10 * MILLISECOND])
 def test_a_publication_beside_a_jump_is_on_either_side(
