@@ -1,5 +1,16 @@
-"""`python -m msgflow`."""
+"""`msgflow` and `python -m msgflow`."""
 
-from msgflow.cli.app import main
+from msgflow.cli.stop import STOP
 
-main()
+
+def main() -> None:
+    """Run the program; its exit codes are those of `msgflow.errors.ExitCode`."""
+    # Before the imports, which take longest.
+    STOP.install()
+    from msgflow.cli.app import app
+
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import signal
 from typing import Annotated
 
 import typer
 
+# Scripts of an editable installation look for it here.
+from msgflow.__main__ import main
 from msgflow.cli import (
     check,
     clocks,
@@ -25,8 +26,9 @@ from msgflow.cli import (
     ui,
 )
 from msgflow.cli.root import RootGroup
-from msgflow.query.interrupt import terminate
 from msgflow.version import __version__
+
+__all__ = ["app", "main"]
 
 app = typer.Typer(
     name="msgflow",
@@ -71,11 +73,3 @@ def root(
     """Print the help where no command is given."""
     if context.invoked_subcommand is None:
         context.get_help()
-
-
-def main() -> None:
-    """Run the program; its exit codes are those of `msgflow.errors.ExitCode`."""
-    # Where whoever started it wants SIGTERM ignored, it is.
-    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, terminate)
-    app()

@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from msgflow.cli.output import discard_stdout, print_error
+from msgflow.cli.stop import STOP
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.query.interrupt import Terminated
 from msgflow.version import __version__
@@ -39,26 +40,35 @@ class RootGroup(TyperGroup):
 
     def main(self, *args: Any, **options: Any) -> None:
         """Run a command line and exit with its code."""
-        options["standalone_mode"] = False
         try:
-            code = super().main(*args, **options)
-        except MsgflowError as error:
-            print_error(error.message, error.hint)
-            code = error.exit_code
-        except typer.TyperException as error:
-            print_error(*_usage(error))
-            code = error.exit_code
-        except (typer.Abort, KeyboardInterrupt):
-            code = ExitCode.INTERRUPTED
-        except OSError as error:
-            code = _unwritable(error) if _is_of_stdout(error) else _unexpected(error)
-        except Exception as error:
-            code = ExitCode.INTERRUPTED if _is_interrupt(error) else _unexpected(error)
+            STOP.begin()
+            code = self._run(*args, **options)
+            STOP.cease()
+        except KeyboardInterrupt as error:
+            # While `_run` dealt with another exception. `STOP` raises no second time.
+            STOP.cease()
+            code = _code_of(error)
+        code = STOP.came or code
         if code == ExitCode.INTERRUPTED:
             print_error("interrupted")
         if code == ExitCode.TERMINATED:
             print_error("terminated")
-        sys.exit(int(code or 0))
+        STOP.end_with(code)
+        sys.exit(int(code))
+
+    def _run(self, *args: Any, **options: Any) -> ExitCode:
+        options["standalone_mode"] = False
+        try:
+            return ExitCode(super().main(*args, **options) or 0)
+        except KeyboardInterrupt as error:
+            return _code_of(error)
+        except typer.Abort:
+            return ExitCode.INTERRUPTED
+        except Exception as error:
+            # What a signal made fail in the libraries below is no error of its own.
+            if STOP.came or _is_interrupt(error):
+                return STOP.came or ExitCode.INTERRUPTED
+            return _code_with_words(error)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; a reader that went away (`… | head`) ends it quietly."""
@@ -74,6 +84,22 @@ class RootGroup(TyperGroup):
             # The libraries below give all that is like Ctrl-C its exit code.
             raise typer.Exit(ExitCode.TERMINATED) from None
         return value
+
+
+def _code_with_words(error: Exception) -> ExitCode:
+    if isinstance(error, MsgflowError):
+        print_error(error.message, error.hint)
+        return error.exit_code
+    if isinstance(error, typer.TyperException):
+        print_error(*_usage(error))
+        return ExitCode(error.exit_code)
+    if isinstance(error, OSError) and _is_of_stdout(error):
+        return _unwritable(error)
+    return _unexpected(error)
+
+
+def _code_of(error: KeyboardInterrupt) -> ExitCode:
+    return ExitCode.TERMINATED if isinstance(error, Terminated) else ExitCode.INTERRUPTED
 
 
 def _is_interrupt(error: Exception) -> bool:

@@ -26,11 +26,6 @@ class Terminated(KeyboardInterrupt):
     """SIGTERM, where the command line treats it as Ctrl-C."""
 
 
-def terminate(number: int, frame: FrameType | None) -> None:
-    """End what runs as Ctrl-C does: the handler of SIGTERM of the command line."""
-    raise Terminated
-
-
 class Interrupts:
     """What is known of Ctrl-C: whether it came, and whether it still counts."""
 
@@ -73,8 +68,12 @@ class Interrupts:
                 connection.interrupt()
 
 
-# Handlers that may be replaced for a while: Python's own, and that of the command line.
-_HANDLERS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: terminate}
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def _may_be_replaced(handler: object) -> bool:
+    # Python's own, and that of the command line (msgflow.cli.stop).
+    return handler is signal.default_int_handler or getattr(handler, "raises_interrupts", False)
 
 
 @contextmanager
@@ -87,18 +86,22 @@ def noted_interrupts() -> Iterator[Interrupts]:
     if threading.current_thread() is not threading.main_thread():
         yield Interrupts()
         return
-    before = {number: signal.getsignal(number) for number in _HANDLERS}
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
     for handler in before.values():
         outer = getattr(handler, "__self__", None)
         if isinstance(outer, Interrupts):
             yield outer
             return
     interrupts = Interrupts()
-    ours = [number for number, handler in before.items() if handler is _HANDLERS[number]]
+    ours = [number for number, handler in before.items() if _may_be_replaced(handler)]
     try:
         for number in ours:
             signal.signal(number, interrupts.on_signal)
         yield interrupts
+    except Exception:
+        # What Ctrl-C made fail is no error of its own.
+        interrupts.check()
+        raise
     finally:
         for number in ours:
             signal.signal(number, before[number])
