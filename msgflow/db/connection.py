@@ -90,11 +90,13 @@ def open_file(
         config["storage_compatibility_version"] = STORAGE_VERSION
     with _opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
-        _prepare(con)
-        con.execute("SET temp_directory = ?", [str(spill_directory(path))])
-        con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
-        shut_in(con)
-        con.execute("SET lock_configuration = true")
+        # A file that this process has open already is the same database, with its settings.
+        if not _is_shut_in(con):
+            _prepare(con)
+            con.execute("SET temp_directory = ?", [str(spill_directory(path))])
+            con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
+            shut_in(con)
+            con.execute("SET lock_configuration = true")
     remove_abandoned(path, is_ours_alone=not read_only)
     remove_abandoned_workspaces(path.absolute().parent)
     return con
@@ -119,6 +121,14 @@ def shut_in(con: duckdb.DuckDBPyConnection, *, beside: Sequence[Path] = ()) -> N
     con.execute("SET enable_external_access = false")
 
 
+def _is_shut_in(con: duckdb.DuckDBPyConnection) -> bool:
+    row = con.execute(
+        "SELECT current_setting('lock_configuration') "
+        "AND NOT current_setting('enable_external_access')"
+    ).fetchone()
+    return row is not None and bool(row[0])
+
+
 def _require_file(path: Path) -> None:
     # DuckDB would wait for a pipe, and read a device to its end.
     if path.exists() and not path.is_file():
@@ -131,6 +141,7 @@ def _prepare(con: duckdb.DuckDBPyConnection) -> None:
     con.execute("SET autoload_known_extensions = false")
     # A name that is no table is no variable of Python either.
     con.execute("SET python_enable_replacements = false")
+    con.execute("SET GLOBAL python_enable_replacements = false")
     # stdout is for data: DuckDB would draw its bar there when a statement takes long.
     con.execute("SET enable_progress_bar = false")
     # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 # Of these the pages show every path's pictures; of more those with the slowest flows.
 MOST_PATHS = 200
-# What a bar with its links takes in a file, found by measuring; what the file has proves it.
+# Estimate of what a bar with its links takes in a file, once compressed.
 _BYTES_PER_BAR = 16
 _LEVEL_SHARE = 0.25
 _STRETCHES = 12

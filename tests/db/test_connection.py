@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import duckdb
+import pytest
+
 from msgflow.db.connection import open_file
 
 
@@ -17,3 +20,28 @@ def test_asof_joins_compare_in_order_however_few_rows_are_expected(tmp_path: Pat
     assert "ASOF JOIN" in plan
     assert con.execute(f"SELECT m.at {join} ORDER BY ALL").fetchall() == [(0,), (1,), (2,)]
     con.close()
+
+
+def test_a_file_may_be_open_twice_in_a_process(tmp_path: Path) -> None:
+    """The second connection is to the same database, and as closed in as the first."""
+    path = tmp_path / "some.duckdb"
+    elsewhere = tmp_path / "other.csv"
+    elsewhere.write_text("a\n1\n")
+    first = open_file(path, read_only=False)
+    second = open_file(path, read_only=False)
+    settings = (
+        "autoinstall_known_extensions",
+        "autoload_known_extensions",
+        "python_enable_replacements",
+        "enable_progress_bar",
+        "asof_loop_join_threshold",
+        "enable_external_access",
+        "lock_configuration",
+    )
+    shown = "SELECT " + ", ".join(f"current_setting('{name}')" for name in settings)
+    for con in (first, second, first.cursor()):
+        assert con.execute(shown).fetchone() == (False, False, False, False, 0, False, True)
+        with pytest.raises(duckdb.PermissionException):
+            con.execute(f"FROM '{elsewhere}'")
+    first.close()
+    second.close()

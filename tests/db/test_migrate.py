@@ -114,7 +114,7 @@ def test_create_refuses_a_file_that_is_there(database: Path) -> None:
 
 
 def test_create_needs_a_directory(tmp_path: Path) -> None:
-    with pytest.raises(DatabaseError, match="cannot create"):
+    with pytest.raises(DatabaseError, match="cannot write"):
         migrate.create(tmp_path / "missing" / "new.duckdb")
 
 

@@ -548,7 +548,7 @@ def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse:
     pair.wait(5 * MS)
     pair.hear(stamp)
     begin = pair._now
-    pair.wait(10 * MS)
+    pair.wait(30 * MS)
     end = pair._now
     pair.ready(LISTENER)
     pair.wait(5 * MS)

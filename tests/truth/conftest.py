@@ -30,6 +30,8 @@ _WITH_GAPS = (
     "intra_process",
     "mixed_intra_process",
     "overwritten_copies",
+    "container",
+    "container_multi_threaded",
     "python",
     "layers",
     "services",

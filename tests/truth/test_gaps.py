@@ -6,7 +6,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import ingest_one, require_reader
+from ingested import ingest_one
 from scoring import compare_simulated
 
 from msgflow.sim import Recording, simulate
@@ -38,7 +38,6 @@ RECORDINGS: dict[str, tuple[Recording, set[str], bool]] = {
 
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
-    require_reader()
     recording, gaps, is_complete = RECORDINGS[name]
     simulation = simulate(
         "container_multi_threaded", tmp_path / "trace", factor=0.07, recording=recording
