@@ -139,12 +139,12 @@ def _require_file(path: Path) -> None:
 def _prepare(con: duckdb.DuckDBPyConnection) -> None:
     con.execute("SET autoinstall_known_extensions = false")
     con.execute("SET autoload_known_extensions = false")
+    # stdout is for data: DuckDB would draw its bar there when a statement takes long.
+    con.execute("SET enable_progress_bar = false")
     # What is set for a connection is set for those made of it, too, only where it is global.
     for scope in ("", "GLOBAL"):
         # A name that is no table is no variable of Python either.
         con.execute(f"SET {scope} python_enable_replacements = false")
-        # stdout is for data: DuckDB would draw its bar there when a statement takes long.
-        con.execute(f"SET {scope} enable_progress_bar = false")
         # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with
         # all on the right. Behind filters it expects few where there are thousands.
         con.execute(f"SET {scope} asof_loop_join_threshold = 0")

@@ -33,14 +33,13 @@ def test_a_file_may_be_open_twice_in_a_process(tmp_path: Path) -> None:
         "autoinstall_known_extensions",
         "autoload_known_extensions",
         "python_enable_replacements",
-        "enable_progress_bar",
         "asof_loop_join_threshold",
         "enable_external_access",
         "lock_configuration",
     )
     shown = "SELECT " + ", ".join(f"current_setting('{name}')" for name in settings)
     for con in (first, second, first.cursor()):
-        assert con.execute(shown).fetchone() == (False, False, False, False, 0, False, True)
+        assert con.execute(shown).fetchone() == (False, False, False, 0, False, True)
         with pytest.raises(duckdb.PermissionException):
             con.execute(f"FROM '{elsewhere}'")
     first.close()
