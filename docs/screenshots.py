@@ -1,4 +1,4 @@
-"""Makes the pictures of the README and of docs/pictures.md: reports of simulated systems.
+"""Takes pictures of reports of simulated systems, for the README and docs/pictures.md.
 
     python docs/screenshots.py [DIRECTORY]
 

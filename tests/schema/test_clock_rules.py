@@ -190,9 +190,3 @@ def test_of_differences_that_a_drift_can_lead_to_the_one_of_most_messages(
 ) -> None:
     assert followed(rules, [[(0, 500, 19), (50_000, 500, 20)]])[0][:2] == (50_000, 20)
     assert followed(rules, [[(0, 500, 20), (50_000, 500, 20)]])[0][:2] == (0, 20)
-
-
-def test_slopes_over_more_than_five_stretches_count(rules: duckdb.DuckDBPyConnection) -> None:
-    """Differences that alternate show their drift only over a longer time."""
-    found = drift(rules, [n * 5_000 + (40_000 if n % 2 else 0) for n in range(11)])
-    assert abs(found[5] - 10_000) < 1_000
