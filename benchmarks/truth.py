@@ -163,13 +163,8 @@ class Judged:
         """Whether every figure that must be 1.000 is."""
         lowest = LOWEST_RECALL.get(self.system, 1)
         is_complete = self.score.recall >= lowest
-        return self.score.wrong == 0 and not self._is_repeated and is_complete
-
-    @property
-    def _is_repeated(self) -> bool:
-        # Losses may tear an instance in two, but nothing may be linked twice.
-        is_link = self.score.kind not in {"publication", "take", "callback_instance"}
-        return self.score.repeated > 0 and (is_link or self.recording == PERFECT)
+        faults = (self.score.wrong, self.score.repeated, self.score.doubted)
+        return is_complete and not any(faults)
 
 
 def cases(arguments: argparse.Namespace) -> Iterator[Case]:
@@ -238,6 +233,8 @@ def show(judged: list[Judged]) -> list[Judged]:
         mark = " " if one.is_good else "✗"
         notes = f"  ({score.not_built} not built)" if score.not_built else ""
         notes += f"  ({score.misguessed} misguessed)" if score.misguessed else ""
+        notes += f"  ({score.repeated} repeated)" if score.repeated else ""
+        notes += f"  ({score.doubted} doubted)" if score.doubted else ""
         print(
             f"{mark} {one.system:24} {one.layout:27} {one.recording:12} {score.kind:18} "
             f"{score.happened:7} {score.decided:7} {score.found:7} {score.wrong:5} "

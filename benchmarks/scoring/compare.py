@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _SQL = Path(__file__).parent
+# What `drops.sql` and `orphans.sql` say of a reason that a hole excuses.
+_EXCUSE = "events are missing"
 _RECORDED_COLUMNS = """{
     t: 'VARCHAR', id: 'VARCHAR', name: 'VARCHAR', kind: 'VARCHAR', host: 'VARCHAR',
     vpid: 'INTEGER', vtid: 'INTEGER',
@@ -26,7 +28,8 @@ class Score:
     """How good one kind of rows is.
 
     Attributes:
-        kind: of link (`transport`, `direct`, …), or of row (`publication`, `take`, …).
+        kind: of link (`transport`, `direct`, …), or of row (`publication`, `take`, …); `excused`:
+            of the pairs of a message and a subscription, reasons excused for want of events.
         happened: true ones.
         decided: those of them that the trace decides, which must be found.
         not_built: likewise, but this version of msgflow has no rule for them.
@@ -35,6 +38,7 @@ class Score:
         misguessed: likewise, of rows that say to be one of several possible ones.
         repeated: rows beyond the first for one true link.
         missing: decided, but not found.
+        doubted: decided and found, but said to be one of several possible ones.
         precision: share of the rows that are true.
         recall: share of the decided ones that were found.
         labels: right and found rows by method or kind.
@@ -49,6 +53,7 @@ class Score:
     misguessed: int
     repeated: int
     missing: int
+    doubted: int
     precision: float
     recall: float
     labels: str
@@ -89,9 +94,12 @@ def compare_simulated(
         if {("publication_id",), ("subscription_id",), ("status",), ("reason",)} - set(columns):
             return scores, None
         rows = []
+        connection.execute((_SQL / "reasons.sql").read_text())
         for name in ("drops", "orphans"):
             rows += connection.execute((_SQL / f"{name}.sql").read_text()).fetchall()
-        return scores, [Drop(*row) for row in rows]
+        drops = [Drop(*row) for row in rows]
+        excused = sum(drop.messages for drop in drops if drop.undecided == _EXCUSE)
+        return [*scores, _excused(connection, excused)], drops
 
 
 def compare_recorded(database: Path, truth: Path) -> list[Score]:
@@ -110,6 +118,18 @@ def _open(database: Path) -> duckdb.DuckDBPyConnection:
     return connection
 
 
+def _excused(connection: duckdb.DuckDBPyConnection, excused: int) -> Score:
+    """Reasons that were excused; those beyond what the holes in the trace allow are wrong."""
+    connection.execute((_SQL / "excused.sql").read_text())
+    ((pairs, allowed),) = connection.execute("SELECT pairs, allowed FROM excused").fetchall()
+    wrong = max(excused - allowed, 0)
+    precision = 1 - wrong / excused if excused else 1.0
+    return Score(
+        "excused", pairs or 0, 0, 0, excused, wrong, 0, 0, 0, 0, precision, 1.0,
+        f"at most {allowed}",
+    )  # fmt: skip
+
+
 def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
     connection.execute(
         "CREATE TEMP TABLE built AS SELECT schema_name || '.' || view_name AS name "
@@ -117,6 +137,7 @@ def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
         "UNION SELECT schema_name || '.' || function_name FROM duckdb_functions() "
         "WHERE database_name = 'analysed' AND schema_name = 'derive'"
     )
-    for name in (source, "found", "score"):
+    steps = ("holes", source) if source == "simulated" else (source,)
+    for name in (*steps, "found", "score"):
         connection.execute((_SQL / f"{name}.sql").read_text())
     return [Score(*row) for row in connection.execute("FROM score").fetchall()]

@@ -30,10 +30,7 @@ WITH accepted AS (
         -- Who leaves before others when recording stops is not told from who ends.
         ('delivered, stop', 'subscription_ended'),
         ('delivered, stop', 'pending_at_end'),
-        ('delivered, stop', 'receiver_gap'),
-        ('delivered, recorded', 'unknown'),
-        -- Where a gap may hide the better partner, a message in a ring buffer has no link.
-        ('delivered, recorded', 'receiver_gap')
+        ('delivered, stop', 'receiver_gap')
     ) AS a(truth, reason)
 ),
 place AS (
@@ -56,13 +53,11 @@ said AS (
         d.reason AS truth,
         v.reason,
         coalesce(v.reason, v.status, 'no row') AS said,
-        coalesce(
-            d.undecided,
-            CASE
-                WHEN d.is_spoilt AND coalesce(v.reason, 'unknown') IN ('receiver_gap', 'unknown')
-                    THEN 'events are missing'
-            END
-        ) AS undecided
+        CASE
+            WHEN v.reason = 'receiver_gap' THEN CASE WHEN d.is_in_hole THEN 'events are missing' END
+            WHEN v.reason = 'unknown' AND d.is_unclear THEN 'events are missing'
+            ELSE d.undecided
+        END AS undecided
     FROM truth_drop AS d
     JOIN publication AS b ON d.publication_id = b.true_id
     JOIN place AS s
@@ -76,7 +71,12 @@ said AS (
         v.reason,
         v.reason,
         CASE
-            WHEN v.reason = 'unknown' THEN 'events are missing'
+            -- The take is there; what would tell its message is not.
+            WHEN v.reason = 'unknown' AND t.is_unclear AND NOT t.is_decided
+                THEN 'the link is not decided'
+            -- Where a gap may hide the better partner, a message in a ring buffer has no link.
+            WHEN v.reason = 'receiver_gap' AND t.is_in_hole AND NOT t.is_decided
+                THEN 'events are missing'
             -- Objects whose handles were used again may be mixed up where one was not seen.
             WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN
                 'initialisation is missing'

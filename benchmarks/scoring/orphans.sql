@@ -18,8 +18,8 @@ WITH accepted AS (
         ('taken, loss', 'receiver_gap'),
         ('taken, packets', 'receiver_gap'),
         ('taken, truncation', 'receiver_gap'),
-        -- Taken from a ring buffer, with a gap in between.
-        ('recorded', 'publisher_gap'),
+        ('taken or sent, truncation', 'receiver_gap'),
+        ('taken or sent, truncation', 'publisher_gap'),
         -- The message was kept for subscriptions that come late, or nothing of it is traced.
         ('kept', 'no_stamp'),
         ('no event', 'no_stamp')
@@ -34,7 +34,9 @@ orphan AS (
     JOIN analysed.store.host AS h ON p.host_id = h.host_id
 ),
 matched AS (
-    SELECT o.take_id, o.reason, any_value(m.truth) AS truth, any_value(m.undecided) AS undecided
+    SELECT
+        o.take_id, o.reason, any_value(m.truth) AS truth, bool_or(m.is_undecided) AS is_undecided,
+        bool_or(m.is_in_hole) AS is_in_hole, bool_or(m.has_absent) AS has_absent
     FROM orphan AS o
     JOIN truth_time AS t
         ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
@@ -45,11 +47,14 @@ matched AS (
 SELECT
     m.truth,
     m.reason,
-    coalesce(
-        m.undecided,
+    CASE
+        -- Taken from a ring buffer, with a hole in between.
+        WHEN m.truth = 'recorded' AND m.reason = 'publisher_gap' AND m.is_in_hole
+            THEN 'events are missing'
+        WHEN m.is_undecided AND m.reason IN ('ambiguous', 'unknown') THEN 'the link is not decided'
         -- One of them was recorded, and another one that was not may have sent it.
-        CASE WHEN m.reason = 'unknown' THEN 'several publishers' END
-    ) AS undecided,
+        WHEN m.reason = 'unknown' AND m.has_absent THEN 'several publishers'
+    END AS undecided,
     count(*) AS messages,
     coalesce(bool_or(a.reason IS NOT NULL), false) AS is_right
 FROM matched AS m

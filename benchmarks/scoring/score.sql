@@ -18,12 +18,37 @@ LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM truth_link) AS l
 QUALIFY row_number() OVER (PARTITION BY f.number ORDER BY l.from_id NULLS LAST, l.to_id) = 1;
 
 CREATE OR REPLACE TEMP TABLE score AS
-WITH twice AS (
-    -- Two annotations of a node may both link one message to one publication.
-    SELECT kind, count(*) - count(DISTINCT (from_id, to_id)) AS several
+WITH hit AS (
+    SELECT
+        kind, from_id, to_id, count(*) AS rows, bool_and(is_guess) AS is_guess,
+        count(DISTINCT (found_from_id, found_to_id)) AS pairs
+    FROM verdict
+    WHERE from_id IS NOT NULL
+    GROUP BY kind, from_id, to_id
+),
+-- Two annotations of a node may both link one message to one publication; and what a loss tore in
+-- two may have a link on either side.
+truth AS (
+    SELECT
+        kind, from_id, to_id, count(*) AS happened,
+        bool_or(
+            (from_kind, from_id) IN (SELECT (kind, id) FROM truth_torn)
+            OR (to_kind, to_id) IN (SELECT (kind, id) FROM truth_torn)
+        ) AS is_torn
     FROM truth_link
-    WHERE kind IN ('periodic_async', 'partial_sync') AND is_decided
-    GROUP BY kind
+    GROUP BY kind, from_id, to_id
+),
+repeated AS (
+    SELECT
+        h.kind,
+        sum(
+            h.rows - least(
+                h.rows, greatest(t.happened, CASE WHEN t.is_torn THEN h.pairs ELSE 1 END)
+            )
+        )::BIGINT AS repeated
+    FROM hit AS h
+    JOIN truth AS t ON h.kind = t.kind AND h.from_id = t.from_id AND h.to_id = t.to_id
+    GROUP BY h.kind
 ),
 found AS (
     SELECT
@@ -31,13 +56,8 @@ found AS (
         count(*) AS found,
         count(from_id) AS right_count,
         count(*) FILTER (from_id IS NULL AND NOT is_guess) AS wrong,
-        count(*) FILTER (from_id IS NULL AND is_guess) AS misguessed,
-        -- What a loss tore in two may have a link on either side.
-        count(from_id) - count(DISTINCT (from_id, to_id, found_from_id, found_to_id))
-            FILTER (from_id IS NOT NULL)
-        - coalesce(any_value(t.several), 0) AS repeated
+        count(*) FILTER (from_id IS NULL AND is_guess) AS misguessed
     FROM verdict
-    LEFT JOIN twice AS t USING (kind)
     GROUP BY kind
 ),
 labelled AS (
@@ -55,10 +75,12 @@ expected AS (
         count(*) AS happened,
         count(*) FILTER (l.is_decided AND b.name IS NOT NULL) AS decided,
         count(*) FILTER (l.is_decided AND b.name IS NULL) AS not_built,
-        count(*) FILTER (l.is_decided AND b.name IS NOT NULL AND v.from_id IS NULL) AS missing
+        count(*) FILTER (l.is_decided AND b.name IS NOT NULL AND v.from_id IS NULL) AS missing,
+        -- Runs are marked where anything of the host is missing meanwhile.
+        count(*) FILTER (l.is_decided AND v.is_guess AND l.kind <> 'callback_run') AS doubted
     FROM truth_link AS l
     LEFT JOIN built AS b ON l.needs = b.name
-    LEFT JOIN (SELECT DISTINCT kind, from_id, to_id FROM verdict) AS v
+    LEFT JOIN hit AS v
         ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
     GROUP BY l.kind
 )
@@ -70,13 +92,15 @@ SELECT
     coalesce(f.found, 0) AS found,
     coalesce(f.wrong, 0) AS wrong,
     coalesce(f.misguessed, 0) AS misguessed,
-    coalesce(f.repeated, 0) AS repeated,
+    coalesce(r.repeated, 0) AS repeated,
     coalesce(e.missing, 0) AS missing,
+    coalesce(e.doubted, 0) AS doubted,
     coalesce(f.right_count / nullif(f.right_count + f.wrong, 0), 1) AS precision,
     coalesce(1 - e.missing / nullif(e.decided, 0), 1) AS recall,
     coalesce(labels, '') AS labels
 FROM expected AS e
 FULL JOIN found AS f ON e.kind = f.kind
+LEFT JOIN repeated AS r ON coalesce(e.kind, f.kind) = r.kind
 LEFT JOIN labelled AS s ON coalesce(e.kind, f.kind) = s.kind
 -- Truth that says nothing of a kind does not judge it.
 WHERE e.kind IS NOT NULL

@@ -50,13 +50,18 @@ WITH happened AS (
 ),
 declared AS (
     SELECT DISTINCT event FROM simulated_declared
+),
+emitted AS (
+    SELECT host, pid, tid, ts_ns, any_value(cpu) AS cpu FROM simulated_emitted GROUP BY ALL
 )
 SELECT
-    h.kind, h.id::VARCHAR AS id, h.host, h.pid, h.tid, h.event, h.ts_ns,
+    h.kind, h.id::VARCHAR AS id, h.host, h.pid, h.tid, e.cpu, h.event, h.ts_ns,
     d.event IS NOT NULL AS is_declared,
     d.event IS NOT NULL AND u.ts_ns IS NULL AS is_recorded
 FROM happened AS h
 LEFT JOIN declared AS d ON h.event = d.event
+LEFT JOIN emitted AS e
+    ON h.host = e.host AND h.pid = e.pid AND h.tid = e.tid AND h.ts_ns = e.ts_ns
 LEFT JOIN simulated_unrecorded AS u
     ON h.host = u.host AND h.pid = u.pid AND h.tid = u.tid AND h.event = u.event
     AND h.ts_ns = u.ts_ns
@@ -149,11 +154,14 @@ shared_stamp AS (
     GROUP BY source_timestamp_ns
     HAVING count(*) > 1
 ),
--- Processes of which a ring buffer event is missing.
-unknown_buffer AS (
-    SELECT DISTINCT host, pid
-    FROM simulated_unrecorded
-    WHERE event LIKE 'ros2:rclcpp%buffer%' OR event LIKE '%\_ipb%' ESCAPE '\'
+-- What lay in a ring buffer while events were missing: others may have gone through its place.
+doubtful_buffer AS (
+    SELECT DISTINCT t.take_id
+    FROM simulated_transport AS t
+    JOIN truth_hole AS h
+        ON t.take_host = h.host
+        AND t.publication_intra_ns < h.end_ns AND t.take_dequeue_ns > h.begin_ns
+    WHERE t.method = 'ring_buffer' AND coalesce(t.take_pid = h.pid, true)
 ),
 -- Hosts whose clocks are too far apart from the start to tell messages by time, or too coarse.
 far_host AS (
@@ -197,7 +205,7 @@ message AS (
         AND (
             CASE
                 WHEN t.method = 'ring_buffer' THEN
-                    (t.take_host, t.take_pid) NOT IN (SELECT (host, pid) FROM unknown_buffer)
+                    t.take_id NOT IN (SELECT take_id FROM doubtful_buffer)
                 WHEN is_rmw_stamped OR is_dds_stamped THEN
                     t.publication_id NOT IN (SELECT publication_id FROM twin WHERE is_equal)
                     AND (t.publication_host, t.publication_pid)
@@ -227,18 +235,40 @@ message AS (
     JOIN recorded AS r ON r.kind = 'take' AND t.take_id::VARCHAR = r.id
     JOIN simulated_publication AS s ON t.publication_id = s.publication_id
 ),
--- Nothing pairs across a gap: the next event that is missing on the host lies behind the callback,
--- and there is none where a callback does not end.
+-- Nothing pairs across a gap: no hole of the CPUs on which the thread was seen while a callback
+-- ran, or of its process, lies within it; nor any behind its start, where it is not seen to end.
+visited AS (
+    SELECT DISTINCT c.callback_instance_id, c.host, c.pid, c.start_ns, c.end_ns, e.cpu
+    FROM simulated_callback_instance AS c
+    JOIN truth_recorded AS e
+        ON c.host = e.host AND c.pid = e.pid AND c.tid = e.tid
+        AND e.ts_ns BETWEEN c.start_ns AND coalesce(c.end_ns, c.start_ns)
+),
+torn_callback AS (
+    SELECT DISTINCT c.callback_instance_id
+    FROM visited AS c
+    JOIN truth_hole AS h
+        ON c.host = h.host AND coalesce(c.pid = h.pid, true)
+        AND (c.end_ns IS NULL OR coalesce(c.cpu = h.cpu, true))
+        AND c.start_ns < h.end_ns AND coalesce(c.end_ns, 9223372036854775807) > h.begin_ns
+),
 whole_callback AS (
     SELECT c.callback_instance_id::VARCHAR AS id
     FROM simulated_callback_instance AS c
     JOIN recorded AS r ON r.kind = 'callback_instance' AND c.callback_instance_id::VARCHAR = r.id
-    ASOF LEFT JOIN (
-        SELECT host, ts_ns FROM simulated_unrecorded WHERE cause <> 'late start'
-    ) AS u ON c.host = u.host AND c.start_ns <= u.ts_ns
     WHERE r.is_whole
-        AND (u.ts_ns IS NULL OR coalesce(u.ts_ns > c.end_ns, false))
+        AND c.callback_instance_id NOT IN (FROM torn_callback)
         AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM mixed_process)
+),
+-- What else may have happened between cause and publication.
+doubtful_cause AS (
+    SELECT DISTINCT c.callback_instance_id, c.take_id, c.publication_id
+    FROM simulated_causal AS c
+    JOIN truth_hole AS h
+        ON c.host = h.host AND coalesce(c.pid = h.pid, true)
+        AND coalesce(c.callback_start_ns, c.take_rmw_ns) < h.end_ns
+        AND coalesce(c.publication_rmw_ns, c.publication_rcl_ns) > h.begin_ns
+    WHERE c.kind <> 'direct'
 ),
 -- Which of several runs filled a cache is not in the trace. It is decided where the run that did
 -- ended before the publishing one began, and (partial_sync) no other of its callback ran from its
@@ -260,13 +290,11 @@ doubtful AS (
     WHERE c.kind IN ('periodic_async', 'partial_sync')
         AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
 ),
--- Who is annotated says so once, and an input that is missing leaves an older one in its cache.
-told AS (
-    SELECT t.host, d.event
-    FROM (SELECT DISTINCT host FROM simulated_trace) AS t
-    CROSS JOIN (SELECT DISTINCT event FROM simulated_declared) AS d
-    WHERE d.event LIKE 'ros2:message_link_%'
-        AND t.host NOT IN (SELECT host FROM simulated_unrecorded)
+-- Who is annotated says so once, by handles.
+untold_process AS (
+    FROM unknown_process
+    UNION
+    SELECT host, pid FROM simulated_unrecorded WHERE event LIKE 'ros2:message_link_%'
 )
 SELECT
     'publication' AS kind, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id,
@@ -323,9 +351,15 @@ SELECT
     AND p.is_whole
     AND (
         c.kind NOT IN ('periodic_async', 'partial_sync')
-        OR (c.host, 'ros2:message_link_' || c.kind) IN (SELECT (host, event) FROM told)
+        OR 'ros2:message_link_' || c.kind IN (SELECT event FROM simulated_declared)
+        AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM untold_process)
         AND (c.callback_instance_id, c.publication_id) NOT IN (
             SELECT (callback_instance_id, publication_id) FROM doubtful
+        )
+        AND (c.callback_instance_id, c.publication_id) NOT IN (
+            SELECT (callback_instance_id, publication_id)
+            FROM doubtful_cause
+            WHERE callback_instance_id IS NOT NULL
         )
     ),
     'derive.link_causal_' || c.kind
@@ -336,9 +370,9 @@ WHERE c.callback_instance_id IS NOT NULL
 UNION ALL
 SELECT
     c.kind, 'take', c.take_id::VARCHAR, 'publication', c.publication_id::VARCHAR,
-    -- That nothing came in between is sure only where nothing of the host is missing.
-    t.is_whole AND p.is_whole AND c.host NOT IN (
-        SELECT host FROM simulated_unrecorded WHERE cause <> 'late start'
+    -- That nothing came in between is sure only where nothing of the host is missing meanwhile.
+    t.is_whole AND p.is_whole AND (c.take_id, c.publication_id) NOT IN (
+        SELECT (take_id, publication_id) FROM doubtful_cause WHERE callback_instance_id IS NULL
     ),
     'derive.link_causal_' || c.kind
 FROM simulated_causal AS c
@@ -370,208 +404,18 @@ JOIN recorded AS s ON s.kind = 'response_sent' AND q.request_id::VARCHAR = s.id
 JOIN recorded AS t ON t.kind = 'request_taken' AND q.request_id::VARCHAR = t.id
 LEFT JOIN whole_callback AS w ON q.callback_instance_id::VARCHAR = w.id;
 
--- Messages that a subscription did not take, where the publication is in the trace. An address may
--- have been that of several subscriptions: `life` says the how manieth had it. `undecided` says why
--- the trace does not decide the reason, NULL where it does. A trace shows what was taken, and of
--- everything else only what follows from that: when the two were connected shows by the first
--- message that was taken, that a message is not merely late by one after it.
-CREATE OR REPLACE TEMP TABLE truth_drop AS
-WITH life AS (
+-- Instances that a loss may have torn in two.
+CREATE OR REPLACE TEMP TABLE truth_torn AS
+SELECT e.kind, e.id
+FROM (
     SELECT
-        subscription_id, host, pid, subscription_handle, created_ns,
-        row_number() OVER (
-            PARTITION BY host, pid, subscription_handle ORDER BY created_ns
-        ) AS life
-    FROM simulated_subscription
-),
--- Subscriptions that ended before others of their process.
-outlived AS (
-    SELECT DISTINCT s.subscription_id
-    FROM simulated_subscription AS s
-    JOIN simulated_subscription AS o
-        ON s.host = o.host AND s.pid = o.pid AND o.created_ns <= s.ended_ns
-        AND (o.ended_ns IS NULL OR o.ended_ns > s.ended_ns)
-),
--- What was taken, as far as the trace tells which message it was.
-taken AS (
-    SELECT
-        t.subscription_id, p.host, p.pid, p.publisher_handle,
-        min(p.source_timestamp_ns) AS first_stamp_ns,
-        max(p.source_timestamp_ns) AS last_stamp_ns
-    FROM truth_link AS l
-    JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
-    JOIN simulated_publication AS p ON l.from_id = p.publication_id::VARCHAR
-    WHERE l.kind = 'transport' AND l.is_decided
-    GROUP BY ALL
-),
-of_publisher AS (
-    SELECT
-        subscription_id, host, pid, publisher_handle,
-        min(first_stamp_ns) AS first_stamp_ns, max(last_stamp_ns) AS last_stamp_ns
-    FROM taken
-    GROUP BY ALL
-),
-of_any AS (
-    SELECT subscription_id, max(last_stamp_ns) AS last_stamp_ns FROM taken GROUP BY ALL
-),
-equal_stamp AS (
-    SELECT topic_name, source_timestamp_ns
-    FROM simulated_publication
-    GROUP BY ALL
-    HAVING count(*) > 1
-),
--- How the clocks of two hosts are apart, and how long messages are on their way, where the trace
--- tells it.
-way AS (
-    SELECT
-        t.publication_host, t.take_host,
-        median(t.take_rmw_ns - t.publication_rmw_ns - t.latency_ns) AS apart_ns,
-        max(t.latency_ns) AS longest_ns
-    FROM truth_link AS l
-    JOIN simulated_transport AS t
-        ON l.from_id = t.publication_id::VARCHAR AND l.to_id = t.take_id::VARCHAR
-    WHERE l.kind = 'transport' AND l.is_decided
-    GROUP BY ALL
-),
-lost AS (
-    SELECT DISTINCT host FROM simulated_unrecorded WHERE cause <> 'late start'
-),
-unnamed AS (
-    SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
-)
-SELECT
-    u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
-    u.reason, u.is_internal,
-    p.host IN (FROM lost) OR s.host IN (FROM lost) AS is_spoilt,
-    CASE
-        WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
-            OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
-            THEN 'initialisation is missing'
-        WHEN q.topic_name IS NOT NULL THEN 'another message has its stamp'
-        WHEN u.reason = 'before_subscription' THEN CASE
-            WHEN p.host <> s.host AND w.apart_ns IS NULL THEN 'clocks are apart'
-            WHEN p.host <> s.host
-                AND coalesce(p.rmw_ns, p.rcl_ns) + w.apart_ns + w.longest_ns >= s.created_ns
-                THEN 'clocks are apart'
-        END
-        WHEN u.reason = 'overwritten' THEN CASE
-            WHEN a.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
-            WHEN b.first_stamp_ns < p.source_timestamp_ns IS NOT TRUE THEN 'nothing earlier taken'
-        END
-        WHEN u.reason IN ('lost_in_transport', 'take_failed') THEN CASE
-            WHEN b.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
-            WHEN b.first_stamp_ns < p.source_timestamp_ns IS NOT TRUE THEN 'nothing earlier taken'
-        END
-        WHEN u.reason = 'before_discovery' THEN CASE
-            WHEN b.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
-        END
-        WHEN u.reason = 'expired' THEN 'no event of expiry'
-        -- That its process ends shows.
-        WHEN u.reason = 'subscription_ended' THEN CASE
-            WHEN s.subscription_id IN (FROM outlived)
-                THEN 'no event of destruction'
-        END
-        ELSE 'trace ends'
-    END AS undecided
-FROM simulated_undelivered AS u
-JOIN simulated_publication AS p ON u.publication_id = p.publication_id
-JOIN life AS s ON u.subscription_id = s.subscription_id
-JOIN truth_link AS l ON l.kind = 'publication' AND u.publication_id::VARCHAR = l.from_id
-LEFT JOIN of_publisher AS b
-    ON u.subscription_id = b.subscription_id AND p.host = b.host AND p.pid = b.pid
-    AND p.publisher_handle IS NOT DISTINCT FROM b.publisher_handle
-LEFT JOIN of_any AS a ON u.subscription_id = a.subscription_id
-LEFT JOIN way AS w ON p.host = w.publication_host AND s.host = w.take_host
-LEFT JOIN equal_stamp AS q
-    ON p.topic_name = q.topic_name AND p.source_timestamp_ns = q.source_timestamp_ns
-WHERE l.is_decided;
-
--- Processes of which it cannot be told which of their subscriptions had a handle.
-CREATE OR REPLACE TEMP TABLE truth_mixed AS
-SELECT DISTINCT host, pid
-FROM simulated_subscription
-SEMI JOIN (
-    SELECT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
-) AS u USING (host, pid)
-GROUP BY host, pid, subscription_handle
-HAVING count(*) > 1;
-
--- Messages that a subscription did take, and why the event of that is not in the trace, if it is
--- not. Copies of messages that come through a ring buffer as well are no deliveries.
-CREATE OR REPLACE TEMP TABLE truth_delivery AS
-WITH life AS (
-    SELECT
-        subscription_id, host, pid, subscription_handle,
-        row_number() OVER (
-            PARTITION BY host, pid, subscription_handle ORDER BY created_ns
-        ) AS life
-    FROM simulated_subscription
-)
-SELECT
-    t.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
-    coalesce(any_value(u.cause), 'recorded') AS cause
-FROM simulated_take AS t
-JOIN life AS s ON t.subscription_id = s.subscription_id
-LEFT JOIN simulated_unrecorded AS u
-    ON t.host = u.host AND t.pid = u.pid AND t.tid = u.tid
-    AND u.ts_ns = coalesce(t.dequeue_ns, t.rmw_ns)
-WHERE t.method <> 'rmw'
-    OR (t.publication_id, t.subscription_id) NOT IN (
-        SELECT (publication_id, subscription_id) FROM simulated_take WHERE method = 'ring_buffer'
-    )
-GROUP BY ALL;
-
--- What became of the events that would tell each take its publication.
-CREATE OR REPLACE TEMP TABLE truth_origin AS
-WITH layout AS (
-    SELECT
-        coalesce(bool_or(event = 'dds:write' AND field = 'timestamp'), false)
-        AND NOT coalesce(bool_or(event = 'ros2:rmw_publish' AND field = 'timestamp'), false)
-            AS is_dds_stamped
-    FROM simulated_declared
-),
-written AS (
-    SELECT publication_id, max(ts_ns) AS ts_ns
-    FROM simulated_dds_event
-    WHERE event = 'dds:write'
-    GROUP BY publication_id
-),
-sent AS (
-    SELECT
-        p.publication_id, p.host, p.pid, p.tid, p.intra_ns,
-        CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END AS stamped_ns
-    FROM simulated_publication AS p
-    CROSS JOIN layout AS l
-    LEFT JOIN written AS w ON p.publication_id = w.publication_id
-),
-decided AS (
-    SELECT to_id, bool_or(is_decided) AS is_decided
-    FROM truth_link
-    WHERE kind = 'transport'
-    GROUP BY to_id
-)
-SELECT
-    t.take_id::VARCHAR AS take_id,
-    CASE
-        WHEN t.method = 'callback_only' THEN 'no event'
-        WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
-        WHEN k.cause IS NOT NULL THEN concat('taken, ', k.cause)
-        WHEN u.cause IS NOT NULL THEN concat('sent, ', u.cause)
-        ELSE 'recorded'
-    END AS truth,
-    CASE
-        WHEN k.cause IS NULL AND u.cause IS NULL AND t.method <> 'callback_only'
-            AND NOT d.is_decided
-            THEN 'the link is not decided'
-    END AS undecided
-FROM simulated_take AS t
-JOIN simulated_transport AS x ON t.take_id = x.take_id
-JOIN sent AS s ON t.publication_id = s.publication_id
-LEFT JOIN decided AS d ON t.take_id::VARCHAR = d.to_id
-LEFT JOIN simulated_unrecorded AS k
-    ON t.host = k.host AND t.pid = k.pid AND t.tid = k.tid AND t.rmw_ns = k.ts_ns
-    AND k.event = 'ros2:rmw_take'
-LEFT JOIN simulated_unrecorded AS u
-    ON s.host = u.host AND s.pid = u.pid AND s.tid = u.tid
-    AND u.ts_ns = CASE WHEN t.method = 'ring_buffer' THEN s.intra_ns ELSE s.stamped_ns END
-    AND u.event IN ('ros2:rmw_publish', 'dds:write', 'ros2:rclcpp_intra_publish');
+        kind, id, any_value(host) AS host, any_value(pid) AS pid, min(ts_ns) AS start_ns,
+        max(ts_ns) AS end_ns, bool_and(is_recorded OR NOT is_declared) AS is_whole
+    FROM truth_event
+    GROUP BY kind, id
+) AS e
+LEFT JOIN truth_hole AS h
+    ON e.host = h.host AND coalesce(e.pid = h.pid, true)
+    AND e.start_ns < h.end_ns AND e.end_ns > h.begin_ns
+GROUP BY e.kind, e.id
+HAVING count(h.host) > 0 OR NOT bool_and(e.is_whole);

@@ -78,8 +78,11 @@ trace — one row per trace:
     host, pid (NULL: of all processes), path, clock_error_ns (what its time stamps are ahead of the
     times in these tables)
 unrecorded — one row per event of the layout that happened and is not in a trace:
-    host, pid, tid, event, ts_ns, cause ('late start', 'pause', 'loss', 'packets',
+    host, pid, tid, cpu, event, ts_ns, cause ('late start', 'pause', 'loss', 'packets',
     'truncation', 'stop')
+emitted — one row per event that came into the buffers of a trace, recorded or not, of recordings
+that are not perfect:
+    host, pid, tid, cpu, ts_ns
 executor_state — one row per executor event, lasting until the next one of the thread:
     host, pid, tid, start_ns, end_ns (NULL: the last), state ('process' for get_next_ready,
     'wait' for wait_for_work, 'execute' for execute)

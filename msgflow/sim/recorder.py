@@ -161,12 +161,20 @@ class Recorder:
         """Whether what happens at `time` is lost."""
         return any(begin <= time < end for begin, end in self._losses)
 
-    def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
+    def emitted(self, cpu: int, time: int, context: bytes) -> None:
+        """Write down when something came into the buffers of a CPU."""
+        pid, tid, _ = thread_of(context)
+        identity = self._identity
+        self._truth.emitted.add(identity.hostname, pid, tid, cpu, time + identity.epoch_ns)
+
+    def unrecorded(
+        self, cpu: int, tracepoint: Tracepoint, time: int, context: bytes, cause: str
+    ) -> None:
         """Write down an event that the trace should have and has not."""
         pid, tid, _ = thread_of(context)
         identity = self._identity
         self._truth.unrecorded.add(
-            identity.hostname, pid, tid, tracepoint.name, time + identity.epoch_ns, cause
+            identity.hostname, pid, tid, cpu, tracepoint.name, time + identity.epoch_ns, cause
         )
 
     def _on_clock(self, emit: Callable[..., None]) -> Callable[..., None]:
@@ -204,10 +212,10 @@ class Recorder:
                 if self._snapshot is not None and tracepoint.name.endswith(_INITIALISATION):
                     self._snapshot.streams[cpu].emit(tracepoint, time, context, *values)
                 else:
-                    self.unrecorded(tracepoint, time, context, "late start")
+                    self.unrecorded(cpu, tracepoint, time, context, "late start")
                 return
             if self._recording.handover_ns and (cause := absence(context, time)) is not None:
-                self.unrecorded(tracepoint, time, context, cause)
+                self.unrecorded(cpu, tracepoint, time, context, cause)
                 return
             pid, name = 0, ""
             if is_per_process:

@@ -102,8 +102,9 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     ),
     "declared": _schema(event=_TEXT, field=_TEXT),
     "unrecorded": _schema(
-        host=_TEXT, pid=_NUMBER, tid=_NUMBER, event=_TEXT, ts_ns=_TIME, cause=_TEXT
+        host=_TEXT, pid=_NUMBER, tid=_NUMBER, cpu=_NUMBER, event=_TEXT, ts_ns=_TIME, cause=_TEXT
     ),
+    "emitted": _schema(host=_TEXT, pid=_NUMBER, tid=_NUMBER, cpu=_NUMBER, ts_ns=_TIME),
 }  # fmt: skip
 
 
@@ -172,6 +173,7 @@ class Truth:
         self.dds_event = self.tables["dds_event"]
         self.declared = self.tables["declared"]
         self.unrecorded = self.tables["unrecorded"]
+        self.emitted = self.tables["emitted"]
 
     def close(self) -> None:
         """Complete all files."""

@@ -1,7 +1,8 @@
 -- name: staging.loss_interval
 -- description: Gaps of the traces. A packet counts what was lost since the one before ended: behind
 --     its own last event until it ended, and, since the next packet is opened only when there is
---     room, between the end of the one before and its begin; on its CPU only. Lost packets lie
+--     room, between the end of the one before and its begin (only there, if the packet takes no
+--     time); on its CPU only. Lost packets lie
 --     between the packets around them, in whichever chunks of the recording these are; before the
 --     first packet of a stream, as its number tells; and behind the last, where others have later
 --     events: stopping flushes a packet into every stream. Where all streams of a recording are
@@ -27,6 +28,8 @@ stream_packet AS (
         recording_index,
         cpu_id,
         begin_ns,
+        known_end_ns,
+        last_event_ns,
         discarded_event_count,
         lost_packet_count,
         lag(known_end_ns) OVER (
@@ -36,6 +39,15 @@ stream_packet AS (
         min(begin_ns) OVER (PARTITION BY recording_index) AS recording_begin_ns
     FROM packet
 ),
+lossy_packet AS (
+    SELECT
+        *,
+        lost_packet_count IS NOT DISTINCT FROM 0 AND coalesce(begin_ns > previous_end_ns, false)
+            AS is_opened_late,
+        known_end_ns <= begin_ns AS is_instant
+    FROM stream_packet
+    WHERE discarded_event_count IS DISTINCT FROM 0
+),
 lost_event AS (
     SELECT
         trace_id,
@@ -44,15 +56,16 @@ lost_event AS (
         coalesce(last_event_ns, begin_ns) AS start_ns,
         known_end_ns AS end_ns,
         discarded_event_count AS event_count
-    FROM packet
-    WHERE discarded_event_count IS DISTINCT FROM 0
+    FROM lossy_packet
+    WHERE NOT (is_instant AND is_opened_late)
     UNION ALL
-    -- How many of them were lost before the packet was opened, nobody counted.
-    SELECT trace_id, cpu_id, 'loss', previous_end_ns, begin_ns, NULL
-    FROM stream_packet
-    WHERE discarded_event_count IS DISTINCT FROM 0
-        AND lost_packet_count IS NOT DISTINCT FROM 0
-        AND begin_ns > previous_end_ns
+    -- How many of them were lost before the packet was opened, nobody counted, unless no time was
+    -- left for others.
+    SELECT
+        trace_id, cpu_id, 'loss', previous_end_ns, begin_ns,
+        CASE WHEN is_instant THEN discarded_event_count END
+    FROM lossy_packet
+    WHERE is_opened_late
 ),
 lost_packet AS (
     SELECT

@@ -74,6 +74,28 @@ def test_a_packet_may_hold_nothing_but_a_loss(system: RosSystem, analyse: Analys
     assert analyse(system).rows(GAPS) == [("loss", 0, 100, 200, 7)]
 
 
+def test_nothing_is_lost_within_a_packet_that_takes_no_time(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """A run of a callback that starts where it lies is whole."""
+    system.add_packet(0, 100)
+    system.add_packet(180, 180, count=0, discarded=7)
+    system.add_packet(180, 300)
+    start = system.add("ros2:callback_start", Thread(100), ts=180, callback=0xC1)
+    end = system.add("ros2:callback_end", Thread(100), ts=200, callback=0xC1)
+    model = analyse(system)
+    assert model.rows(GAPS) == [("loss", 0, 100, 180, 7)]
+    assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, end)]
+
+
+def test_a_packet_that_takes_no_time_may_have_no_other_place_for_a_loss(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    system.add_packet(0, 100)
+    system.add_packet(100, 100, count=0, discarded=7)
+    assert analyse(system).rows(GAPS) == [("loss", 0, 100, 100, 7)]
+
+
 def test_lost_packets_lie_between_those_around_them(system: RosSystem, analyse: Analyse) -> None:
     system.add_packet(0, 100)
     system.add_packet(400, 500, lost_packets=3)

@@ -10,7 +10,7 @@ from pathlib import Path
 import duckdb
 import pytest
 from ingested import ingest_one
-from scoring import compare_recorded, compare_simulated
+from scoring import compare, compare_recorded, compare_simulated
 
 from msgflow.sim import Recording, simulate
 
@@ -132,6 +132,8 @@ def test_reasons_are_judged_where_the_trace_decides_them(losses):
     judged = {drop.truth for drop in drops if not drop.undecided}
     assert {"before_subscription", "before_discovery", "lost_in_transport"} <= judged
     assert all(drop.is_right for drop in drops if not drop.undecided)
+    # Nothing is missing.
+    assert not any(drop.undecided == "events are missing" for drop in drops)
     assert {drop.undecided for drop in drops if not drop.is_right} <= {
         "nothing later taken", "nothing earlier taken", "no event of expiry",
         "no event of destruction",
@@ -146,6 +148,93 @@ def test_a_wrong_reason_is_found(losses, tmp_path, truth):
     _change(changed, "UPDATE store.undelivered SET reason = 'overwritten'")
     _, drops = compare_simulated(changed, simulation.truth)
     assert any(drop.truth == truth and not drop.undecided and not drop.is_right for drop in drops)
+
+
+@pytest.mark.parametrize("reason", ["unknown", "receiver_gap"])
+def test_no_loss_excuses_anything_where_none_was(losses, tmp_path, reason):
+    """Not a reason of what was not taken, nor one of what was."""
+    simulation, path = losses
+    changed = tmp_path / "changed.duckdb"
+    shutil.copyfile(path, changed)
+    _change(changed, f"UPDATE store.undelivered SET reason = '{reason}'")
+    _change(
+        changed,
+        f"""
+        INSERT INTO store.undelivered
+        SELECT run_id, publication_id, publisher_id, subscription_id, '{reason}'
+        FROM store.link_transport
+        ORDER BY take_id
+        LIMIT 3
+        """,
+    )
+    _change(
+        changed,
+        "DELETE FROM store.link_transport WHERE take_id IN "
+        "(SELECT take_id FROM store.link_transport ORDER BY take_id LIMIT 3)",
+    )
+    _, drops = compare_simulated(changed, simulation.truth)
+    wrong = {drop.truth for drop in drops if drop.reason == reason and not drop.undecided}
+    assert {"before_subscription", "lost_in_transport", "delivered, recorded"} <= wrong
+    assert not any(drop.is_right for drop in drops if drop.reason == reason)
+
+
+def test_a_loss_excuses_what_is_near_it(simulation, database):
+    """Where every message is said to be hidden by a gap, those within are excused, and few more."""
+    scores, drops = compare_simulated(database, simulation.truth)
+    assert all(drop.is_right for drop in drops if not drop.undecided)
+    excused = {score.kind: score for score in scores}["excused"]
+    allowed = int(excused.labels.removeprefix("at most "))
+    assert excused.wrong == 0
+    assert excused.found <= allowed < excused.happened / 2
+    _change(database, "UPDATE store.undelivered SET reason = 'receiver_gap'")
+    _change(database, "UPDATE store.orphan_take SET reason = 'unknown'")
+    _, drops = compare_simulated(database, simulation.truth)
+    said = {(drop.truth, drop.reason): drop for drop in drops}
+    assert said["before_subscription", "receiver_gap"].undecided is None
+    assert said["delivered, loss", "receiver_gap"].is_right
+    assert said["sent, loss", "unknown"].undecided is None
+
+
+def test_excuses_where_nothing_is_missing_are_wrong(losses, monkeypatch):
+    simulation, path = losses
+    monkeypatch.setattr(compare, "_EXCUSE", None)
+    scores, drops = compare_simulated(path, simulation.truth)
+    excused = {score.kind: score for score in scores}["excused"]
+    assert excused.labels == "at most 0"
+    assert excused.wrong == sum(drop.messages for drop in drops if drop.undecided is None) > 0
+
+
+@pytest.fixture(scope="module")
+def caches(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("caches")
+    simulation = simulate("partial_sync", directory / "trace", factor=0.1)
+    path = directory / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    return simulation, path
+
+
+def test_a_decided_link_is_the_only_candidate(caches, tmp_path):
+    simulation, path = caches
+    assert _scores(simulation, path)["partial_sync"].doubted == 0
+    changed = tmp_path / "changed.duckdb"
+    shutil.copyfile(path, changed)
+    _change(changed, "UPDATE store.link_causal SET candidate_count = 2")
+    score = _scores(simulation, changed)["partial_sync"]
+    assert 0 < score.doubted <= score.decided
+
+
+def test_an_indirect_link_stored_twice_is_repeated(caches, tmp_path):
+    """Also where two annotations give some links twice."""
+    simulation, path = caches
+    changed = tmp_path / "changed.duckdb"
+    shutil.copyfile(path, changed)
+    _change(
+        changed,
+        "INSERT INTO store.link_causal SELECT * FROM store.link_causal "
+        "WHERE kind = 'partial_sync' ORDER BY ALL LIMIT 5",
+    )
+    assert _scores(simulation, path)["partial_sync"].repeated == 0
+    assert _scores(simulation, changed)["partial_sync"].repeated == 5
 
 
 @pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_jazzy", "pingpong", "services"])

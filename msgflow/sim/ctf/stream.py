@@ -59,7 +59,12 @@ class Faults(Protocol):
     def is_losing(self, time: int) -> bool:
         """Whether what happens at `time` is lost."""
 
-    def unrecorded(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
+    def emitted(self, cpu: int, time: int, context: bytes) -> None:
+        """An event is in the buffers of the trace."""
+
+    def unrecorded(
+        self, cpu: int, tracepoint: Tracepoint, time: int, context: bytes, cause: str
+    ) -> None:
         """An event is not in the trace."""
 
 
@@ -177,6 +182,7 @@ class StreamWriter:
         self._records.append(record)
         if self._faults is not None:
             self._entries.append((tracepoint, time, context))
+            self._faults.emitted(self._cpu, time, context)
         self._size = size
         self._last = cycles
 
@@ -310,7 +316,7 @@ class StreamWriter:
 
     def _lose(self, tracepoint: Tracepoint, time: int, context: bytes, cause: str) -> None:
         if self._faults is not None:
-            self._faults.unrecorded(tracepoint, time, context, cause)
+            self._faults.unrecorded(self._cpu, tracepoint, time, context, cause)
 
     def _open(self, directory: Path) -> None:
         self._file = (directory / f"ros2_{self._cpu}").open("wb")

@@ -1,0 +1,302 @@
+-- What became of the messages of a simulation, and what of that the trace decides. Nothing is
+-- excused but by a hole (see holes.sql) in the very time that the reason is about.
+
+-- Each message and subscription of its topic, on the clock of the subscription: when it could be
+-- taken at the earliest (NULL: the trace does not tell how far the clocks are apart); since when
+-- nothing of its publisher was; and when a later message of its publisher was, as the trace tells.
+-- An address may have been that of several subscriptions: `life` says the how manieth had it.
+CREATE OR REPLACE TEMP TABLE truth_pair AS
+WITH life AS (
+    SELECT
+        subscription_id, host, pid, subscription_handle, created_ns, ended_ns,
+        row_number() OVER (
+            PARTITION BY host, pid, subscription_handle ORDER BY created_ns
+        ) AS life
+    FROM simulated_subscription
+),
+sent AS (
+    SELECT
+        publication_id, host, pid, publisher_handle, coalesce(rmw_ns, rcl_ns, intra_ns) AS sent_ns
+    FROM simulated_publication
+),
+pair AS (
+    SELECT publication_id, subscription_id FROM simulated_undelivered
+    UNION
+    SELECT publication_id, subscription_id FROM simulated_take WHERE publication_id IS NOT NULL
+),
+-- What was taken, as far as the trace tells which message it was.
+taken AS (
+    SELECT
+        t.subscription_id, s.host, s.pid, s.publisher_handle, s.sent_ns,
+        min(coalesce(t.dequeue_ns, t.rmw_ns)) AS taken_ns
+    FROM truth_link AS l
+    JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
+    JOIN sent AS s ON l.from_id = s.publication_id::VARCHAR
+    WHERE l.kind = 'transport' AND l.is_decided
+    GROUP BY ALL
+),
+earliest AS (
+    SELECT subscription_id, host, pid, publisher_handle, min(sent_ns) AS sent_ns
+    FROM taken
+    GROUP BY ALL
+),
+-- How the clocks of two hosts are apart, and how long messages are on their way, where the trace
+-- tells it.
+way AS (
+    SELECT
+        t.publication_host, t.take_host,
+        median(t.take_rmw_ns - t.publication_rmw_ns - t.latency_ns) AS apart_ns,
+        max(t.latency_ns) AS longest_ns
+    FROM truth_link AS l
+    JOIN simulated_transport AS t
+        ON l.from_id = t.publication_id::VARCHAR AND l.to_id = t.take_id::VARCHAR
+    WHERE l.kind = 'transport' AND l.is_decided
+    GROUP BY ALL
+)
+SELECT
+    a.publication_id, a.subscription_id, s.host, s.pid, s.subscription_handle, s.life,
+    s.created_ns, p.host <> s.host AS has_two_clocks, w.longest_ns,
+    p.sent_ns + CASE WHEN p.host = s.host THEN 0 ELSE w.apart_ns END AS arrival_ns,
+    CASE
+        WHEN f.sent_ns < p.sent_ns
+            THEN p.sent_ns + CASE WHEN p.host = s.host THEN 0 ELSE w.apart_ns END
+        ELSE s.created_ns
+    END AS since_ns,
+    coalesce(n.taken_ns, s.ended_ns, 9223372036854775807) AS until_ns,
+    f.sent_ns < p.sent_ns AS has_earlier,
+    n.taken_ns IS NOT NULL AS has_later
+FROM pair AS a
+JOIN sent AS p ON a.publication_id = p.publication_id
+JOIN life AS s ON a.subscription_id = s.subscription_id
+LEFT JOIN earliest AS f
+    ON a.subscription_id = f.subscription_id AND p.host = f.host AND p.pid = f.pid
+    AND p.publisher_handle IS NOT DISTINCT FROM f.publisher_handle
+LEFT JOIN way AS w ON p.host = w.publication_host AND s.host = w.take_host
+ASOF LEFT JOIN taken AS n
+    ON a.subscription_id = n.subscription_id AND p.host = n.host AND p.pid = n.pid
+    AND coalesce(p.publisher_handle, 0) = coalesce(n.publisher_handle, 0)
+    AND p.sent_ns < n.sent_ns;
+
+-- Pairs of which the trace may not tell what became of them: the take may be in a hole; it may be
+-- one of those that are recorded, but whose message the trace does not tell; or whether the two
+-- knew each other shows in a hole only.
+CREATE OR REPLACE TEMP TABLE truth_excuse AS
+WITH unidentified AS (
+    SELECT t.subscription_id, coalesce(t.dequeue_ns, t.rmw_ns) AS taken_ns
+    FROM truth_link AS l
+    JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
+    JOIN truth_link AS r ON r.kind = 'take' AND l.to_id = r.to_id
+    WHERE l.kind = 'transport' AND NOT l.is_decided AND r.is_decided
+)
+SELECT
+    p.publication_id, p.subscription_id,
+    coalesce(
+        bool_or(p.arrival_ns IS NULL OR h.end_ns > p.arrival_ns) FILTER (h.host IS NOT NULL), false
+    ) AS is_in_hole,
+    bool_or(h.host IS NOT NULL OR p.arrival_ns IS NULL)
+    OR bool_or(
+        (p.subscription_id, p.publication_id) IN (
+            SELECT (a.subscription_id, a.publication_id)
+            FROM truth_pair AS a
+            JOIN unidentified AS u
+                ON a.subscription_id = u.subscription_id
+                AND u.taken_ns BETWEEN a.arrival_ns AND a.until_ns
+        )
+    ) AS is_unclear
+FROM truth_pair AS p
+LEFT JOIN truth_hole AS h
+    ON p.host = h.host AND coalesce(p.pid = h.pid, true)
+    AND h.begin_ns < p.until_ns AND h.end_ns > p.since_ns
+GROUP BY p.publication_id, p.subscription_id;
+
+-- Messages that a subscription did not take, where the publication is in the trace. `undecided`
+-- says why the trace does not decide the reason even if nothing of it is missing, NULL where it
+-- does. A trace shows what was taken, and of everything else only what follows from that: when the
+-- two were connected shows by the first message that was taken, that a message is not merely late
+-- by one after it.
+CREATE OR REPLACE TEMP TABLE truth_drop AS
+WITH
+-- Subscriptions that ended before others of their process.
+outlived AS (
+    SELECT DISTINCT s.subscription_id
+    FROM simulated_subscription AS s
+    JOIN simulated_subscription AS o
+        ON s.host = o.host AND s.pid = o.pid AND o.created_ns <= s.ended_ns
+        AND (o.ended_ns IS NULL OR o.ended_ns > s.ended_ns)
+),
+of_any AS (
+    SELECT t.subscription_id, max(p.source_timestamp_ns) AS last_stamp_ns
+    FROM truth_link AS l
+    JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
+    JOIN simulated_publication AS p ON l.from_id = p.publication_id::VARCHAR
+    WHERE l.kind = 'transport' AND l.is_decided
+    GROUP BY ALL
+),
+equal_stamp AS (
+    SELECT topic_name, source_timestamp_ns
+    FROM simulated_publication
+    GROUP BY ALL
+    HAVING count(*) > 1
+),
+unnamed AS (
+    SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+)
+SELECT
+    u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
+    u.reason, u.is_internal, x.is_in_hole, x.is_unclear,
+    CASE
+        WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
+            OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
+            THEN 'initialisation is missing'
+        WHEN q.topic_name IS NOT NULL THEN 'another message has its stamp'
+        WHEN u.reason = 'before_subscription' THEN CASE
+            WHEN s.has_two_clocks AND (s.arrival_ns + s.longest_ns >= s.created_ns) IS NOT FALSE
+                THEN 'clocks are apart'
+        END
+        WHEN u.reason = 'overwritten' THEN CASE
+            WHEN a.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
+            WHEN s.has_earlier IS NOT TRUE THEN 'nothing earlier taken'
+        END
+        WHEN u.reason IN ('lost_in_transport', 'take_failed') THEN CASE
+            WHEN NOT s.has_later THEN 'nothing later taken'
+            WHEN s.has_earlier IS NOT TRUE THEN 'nothing earlier taken'
+        END
+        WHEN u.reason = 'before_discovery' THEN CASE
+            WHEN NOT s.has_later THEN 'nothing later taken'
+        END
+        WHEN u.reason = 'expired' THEN 'no event of expiry'
+        -- That its process ends shows.
+        WHEN u.reason = 'subscription_ended' THEN CASE
+            WHEN s.subscription_id IN (FROM outlived)
+                THEN 'no event of destruction'
+        END
+        ELSE 'trace ends'
+    END AS undecided
+FROM simulated_undelivered AS u
+JOIN simulated_publication AS p ON u.publication_id = p.publication_id
+JOIN truth_pair AS s
+    ON u.publication_id = s.publication_id AND u.subscription_id = s.subscription_id
+JOIN truth_excuse AS x
+    ON u.publication_id = x.publication_id AND u.subscription_id = x.subscription_id
+JOIN truth_link AS l ON l.kind = 'publication' AND u.publication_id::VARCHAR = l.from_id
+LEFT JOIN of_any AS a ON u.subscription_id = a.subscription_id
+LEFT JOIN equal_stamp AS q
+    ON p.topic_name = q.topic_name AND p.source_timestamp_ns = q.source_timestamp_ns
+WHERE l.is_decided;
+
+-- Processes of which it cannot be told which of their subscriptions had a handle.
+CREATE OR REPLACE TEMP TABLE truth_mixed AS
+SELECT DISTINCT host, pid
+FROM simulated_subscription
+SEMI JOIN (
+    SELECT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+) AS u USING (host, pid)
+GROUP BY host, pid, subscription_handle
+HAVING count(*) > 1;
+
+-- Messages that a subscription did take, and why the event of that is not in the trace, if it is
+-- not. Copies of messages that come through a ring buffer as well are no deliveries.
+CREATE OR REPLACE TEMP TABLE truth_delivery AS
+SELECT
+    t.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
+    coalesce(any_value(u.cause), 'recorded') AS cause,
+    bool_or(x.is_in_hole) AS is_in_hole,
+    bool_or(x.is_unclear) AS is_unclear,
+    bool_or(coalesce(l.is_decided, false)) AS is_decided
+FROM simulated_take AS t
+JOIN truth_pair AS s
+    ON t.publication_id = s.publication_id AND t.subscription_id = s.subscription_id
+JOIN truth_excuse AS x
+    ON t.publication_id = x.publication_id AND t.subscription_id = x.subscription_id
+LEFT JOIN truth_link AS l ON l.kind = 'transport' AND t.take_id::VARCHAR = l.to_id
+LEFT JOIN simulated_unrecorded AS u
+    ON t.host = u.host AND t.pid = u.pid AND t.tid = u.tid
+    AND u.ts_ns = coalesce(t.dequeue_ns, t.rmw_ns)
+WHERE t.method <> 'rmw'
+    OR (t.publication_id, t.subscription_id) NOT IN (
+        SELECT (publication_id, subscription_id) FROM simulated_take WHERE method = 'ring_buffer'
+    )
+GROUP BY ALL;
+
+-- What became of the events that would tell each take its publication. Where some process that
+-- publishes on the topic was not recorded when the message was sent, and another one was, either may
+-- have sent it; so may any, where initialisation is missing, which alone tells who publishes what.
+CREATE OR REPLACE TEMP TABLE truth_origin AS
+WITH layout AS (
+    SELECT
+        coalesce(bool_or(event = 'dds:write' AND field = 'timestamp'), false)
+        AND NOT coalesce(bool_or(event = 'ros2:rmw_publish' AND field = 'timestamp'), false)
+            AS is_dds_stamped
+    FROM simulated_declared
+),
+written AS (
+    SELECT publication_id, max(ts_ns) AS ts_ns
+    FROM simulated_dds_event
+    WHERE event = 'dds:write'
+    GROUP BY publication_id
+),
+sent AS (
+    SELECT
+        p.publication_id, p.topic_name, p.host, p.pid, p.tid, p.intra_ns,
+        CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END AS stamped_ns
+    FROM simulated_publication AS p
+    CROSS JOIN layout AS l
+    LEFT JOIN written AS w ON p.publication_id = w.publication_id
+),
+sender AS (
+    SELECT DISTINCT topic_name, host, pid FROM simulated_publication
+),
+shared_topic AS (
+    SELECT topic_name FROM sender GROUP BY topic_name HAVING count(*) > 1
+),
+absent AS (
+    SELECT DISTINCT s.publication_id
+    FROM sent AS s
+    JOIN truth_hole AS h
+        ON s.host = h.host AND s.pid = h.pid AND h.cpu IS NULL
+        AND s.stamped_ns BETWEEN h.begin_ns AND h.end_ns
+    WHERE s.topic_name IN (FROM shared_topic)
+        OR EXISTS (FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\')
+),
+decided AS (
+    SELECT to_id, bool_or(is_decided) AS is_decided
+    FROM truth_link
+    WHERE kind = 'transport'
+    GROUP BY to_id
+),
+hidden AS (
+    SELECT DISTINCT t.take_id
+    FROM simulated_take AS t
+    JOIN sent AS s ON t.publication_id = s.publication_id
+    JOIN truth_hole AS h
+        ON t.host = h.host AND coalesce(t.pid = h.pid, true)
+        AND s.intra_ns < h.end_ns AND t.dequeue_ns > h.begin_ns
+    WHERE t.method = 'ring_buffer'
+)
+SELECT
+    t.take_id::VARCHAR AS take_id,
+    CASE
+        WHEN t.method = 'callback_only' THEN 'no event'
+        WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
+        -- What there is of a packet that is cut may have been read.
+        WHEN k.cause = 'truncation' AND u.cause IS NOT NULL THEN concat('taken or sent, ', u.cause)
+        WHEN k.cause IS NOT NULL THEN concat('taken, ', k.cause)
+        WHEN u.cause IS NOT NULL THEN concat('sent, ', u.cause)
+        ELSE 'recorded'
+    END AS truth,
+    k.cause IS NULL AND u.cause IS NULL AND t.method <> 'callback_only' AND NOT d.is_decided
+        AS is_undecided,
+    t.take_id IN (FROM hidden) AS is_in_hole,
+    t.publication_id IN (FROM absent) AS has_absent
+FROM simulated_take AS t
+JOIN simulated_transport AS x ON t.take_id = x.take_id
+JOIN sent AS s ON t.publication_id = s.publication_id
+LEFT JOIN decided AS d ON t.take_id::VARCHAR = d.to_id
+LEFT JOIN simulated_unrecorded AS k
+    ON t.host = k.host AND t.pid = k.pid AND t.tid = k.tid
+    AND k.ts_ns = coalesce(t.dequeue_ns, t.rmw_ns)
+    AND k.event IN ('ros2:rmw_take', 'ros2:rclcpp_ring_buffer_dequeue')
+LEFT JOIN simulated_unrecorded AS u
+    ON s.host = u.host AND s.pid = u.pid AND s.tid = u.tid
+    AND u.ts_ns = CASE WHEN t.method = 'ring_buffer' THEN s.intra_ns ELSE s.stamped_ns END
+    AND u.event IN ('ros2:rmw_publish', 'dds:write', 'ros2:rclcpp_intra_publish');
