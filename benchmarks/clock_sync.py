@@ -178,8 +178,11 @@ def main() -> int:
         for kind in given.kind or TRAFFIC
         for number in range(given.count)
     ]
+    outcomes = []
     with ProcessPoolExecutor(given.jobs) as pool:
-        outcomes = list(pool.map(_judge_one, cases))
+        for outcome in pool.map(_judge_one, cases):
+            outcomes.append(outcome)
+            print(f"{len(outcomes)} of {len(cases)}: {outcome}", file=sys.stderr, flush=True)
     print("kind               runs  good  messages  bound at best    at worst     error   us")
     for kind in given.kind or TRAFFIC:
         of_kind = [outcome for outcome in outcomes if outcome.kind == kind]

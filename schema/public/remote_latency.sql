@@ -55,6 +55,6 @@ SELECT
     END AS uncertainty_ns
 FROM way AS w
 ASOF LEFT JOIN derive.clock_piece AS f
-    ON w.from_clock_id = f.clock_id AND w.sent_ns >= f.at_ns
+    ON w.from_clock_id = f.clock_id AND w.sent_ns >= f.from_ns
 ASOF LEFT JOIN derive.clock_piece AS o
-    ON w.to_clock_id = o.clock_id AND w.taken_ns >= o.at_ns
+    ON w.to_clock_id = o.clock_id AND w.taken_ns >= o.from_ns
