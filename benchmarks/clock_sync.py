@@ -12,7 +12,8 @@ recording
   rounds to nanoseconds;
 - the stated bound with what the messages allow, calculated independently from all messages that the
   simulator says were exchanged and that both traces have (see possible_lines.py): it may be wider
-  by 4 ns, for offset, drift in 1e-9, and bound are whole numbers, and narrower by 4 ns.
+  by 4 ns, for offset, drift in 1e-9, and bound are whole numbers, and narrower by 4 ns; likewise the
+  bound of the drift, by 2e-9.
 
 The exit code is 1 if any is wrong.
 """
@@ -39,6 +40,7 @@ from msgflow.sim.scenario.traffic import TRAFFIC, traffic
 SECOND = 1_000_000_000
 _TIMES = 41
 _ROUNDING_NS = 4
+_ROUNDING_PPB = 2
 # Messages as the simulator knows them, where both their traces have them.
 _SENT = """
 SELECT b.end_ns, t.taken_ns, x.publication_host
@@ -65,7 +67,8 @@ class Outcome:
         outside: by how much the error exceeds the bound at most; negative if it never does.
         wider: by how much the bound exceeds what the messages allow at most.
         narrower: by how much it falls short of that at most.
-        is_drift_right: the true drift differs by no more than is stated.
+        is_drift_right: the true drift differs by no more than is stated, which is no more than the
+            possible lines leave open.
     """
 
     kind: str
@@ -138,6 +141,9 @@ def judge(kind: str, seed: int, directory: Path) -> Outcome:
         least = max(highest - chosen, chosen - lowest)
         outcomes.append((bound.at(time), abs(chosen - true), bound.at(time) - least))
     true_drift = (1 / own - 1) * 1e9
+    possible_drift = max(
+        lines.highest_drift * 1e9 - chosen_drift, chosen_drift - lines.lowest_drift * 1e9
+    )
     return Outcome(
         kind,
         seed,
@@ -150,7 +156,8 @@ def judge(kind: str, seed: int, directory: Path) -> Outcome:
         max(error - stated for stated, error, _ in outcomes),
         max(excess for _, _, excess in outcomes),
         max(-excess for _, _, excess in outcomes),
-        abs(chosen_drift - true_drift) <= drift_uncertainty + 1,
+        abs(chosen_drift - true_drift) <= drift_uncertainty + 1
+        and abs(drift_uncertainty - possible_drift) <= _ROUNDING_PPB,
     )
 
 

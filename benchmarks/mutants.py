@@ -1,33 +1,37 @@
-"""Which changes of the numbers and comparisons of an SQL file no test notices.
+"""Which changes of the numbers and comparisons of SQL files no test notices.
 
-    python benchmarks/mutants.py FILE… --tests SELECTION… [--line N]… [--timeout 600]
+    python benchmarks/mutants.py FILE… --tests SELECTION… [--line N]… [--replace OLD NEW]…
+        [--timeout 300]
 
-Copies the checkout, then for each number of the files (doubled, halved) and each comparison
-(turned round) runs the tests with that one change. Prints a line for each: the test that failed
-first, or `SURVIVED`. Numbers 0 and 1 and those in comments and quotes are left alone. The exit code
-is 1 if a change survived.
+Collects the tests once, then for each number of the files (doubled, halved) and each comparison
+(turned round), or each place of OLD, runs them in a child that reads the file with that one change.
+No file is written. Prints a line for each change: the test that failed first, or `SURVIVED`.
+Numbers 0 and 1 and those in comments and quotes are left alone. The exit code is 1 if a change
+survived.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
-import shutil
-import subprocess
+import signal
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pytest
+
+from msgflow.db import objects
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 ROOT = Path(__file__).parents[1]
-LEFT_OUT = (".git", ".venv", ".mypy_cache", ".pytest_cache", ".ruff_cache", "__pycache__")
 # Comments and quotes come first, so that nothing within them counts.
 TOKEN = re.compile(
-    r"--[^\n]*|'(?:[^']|'')*'|(?P<number>(?<![\w.])\d+(?:\.\d+)?(?:e\d+)?(?![\w.]))"
+    r"--[^\n]*|'(?:[^']|'')*'|(?P<number>(?<![\w.])\d[\d_]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]))"
     r"|(?P<comparison><=|>=|<>|(?<![<>!:=-])[<>](?![<>=]))"
 )
 TURNED = {"<=": ">", ">=": "<", "<": ">=", ">": "<=", "<>": "="}
@@ -50,48 +54,101 @@ class Mutant:
         return f"{self.file}:{self.line}: {self.old} → {self.new}"
 
 
-def mutants(file: Path) -> Iterator[Mutant]:
+def mutants(file: Path, replaced: Sequence[Sequence[str]]) -> Iterator[Mutant]:
     """Return every change of a file, given from the root of the checkout."""
     text = (ROOT / file).read_text()
-    for match in TOKEN.finditer(text):
-        old = match[0]
-        changes: list[str] = []
-        if match["number"] and old not in TRIVIAL:
-            value = float(old)
-            whole = value.is_integer() and "." not in old and "e" not in old
-            changes = [str(round(each)) if whole else repr(each) for each in (value * 2, value / 2)]
-        elif match["comparison"]:
-            changes = [TURNED[old]]
-        line = text.count("\n", 0, match.start()) + 1
-        for new in changes:
-            yield Mutant(file, match.start(), match.end(), old, new, line)
+    found = [
+        (place.start(), old, new)
+        for old, new in replaced
+        for place in re.finditer(re.escape(old), text)
+    ]
+    if not replaced:
+        found = [
+            (match.start(), match[0], new) for match in TOKEN.finditer(text) for new in _new(match)
+        ]
+    for begin, old, new in found:
+        yield Mutant(file, begin, begin + len(old), old, new, text.count("\n", 0, begin) + 1)
 
 
-def caught_by(mutant: Mutant, checkout: Path, tests: list[str], timeout: float) -> str | None:
-    """Return the first test that fails with a change, or None if all pass."""
-    path = checkout / mutant.file
-    text = path.read_text()
-    path.write_text(text[: mutant.begin] + mutant.new + text[mutant.end :])
-    try:
-        return first_failure(checkout, tests, timeout)
-    finally:
-        path.write_text(text)
+def _new(match: re.Match[str]) -> list[str]:
+    old = match[0]
+    if match["comparison"]:
+        return [TURNED[old]]
+    if not match["number"] or old in TRIVIAL:
+        return []
+    value = float(old)
+    whole = value.is_integer() and "." not in old and "e" not in old
+    return [str(round(each)) if whole else repr(each) for each in (value * 2, value / 2)]
 
 
-def first_failure(checkout: Path, tests: list[str], timeout: float) -> str | None:
-    """Run the tests of a checkout; a run that takes too long has failed."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    try:
-        done = subprocess.run(
-            command, cwd=checkout, env={"PYTHONPATH": str(checkout), "PATH": ""},
-            capture_output=True, text=True, timeout=timeout, check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return "timeout"
-    if done.returncode == 0:
-        return None
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
-    return failed[1] if failed else f"exit code {done.returncode}"
+class Loop:
+    """Runs the collected tests for each change, in place of once."""
+
+    def __init__(self, todo: Sequence[Mutant], timeout: int) -> None:
+        self.todo = todo
+        self.timeout = timeout
+        self.survived = 0
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Run the tests without any change, and then with each."""
+        if failure := self.first_failure(session, None):
+            pytest.exit(f"fails without any change — {failure}", 2)
+        for mutant in self.todo:
+            failure = self.first_failure(session, mutant)
+            self.survived += failure is None
+            print(f"{mutant}  {failure or 'SURVIVED'}", flush=True)
+        print(f"\n{len(self.todo)} changes, {self.survived} survived")
+        return True
+
+    def first_failure(self, session: pytest.Session, mutant: Mutant | None) -> str | None:
+        """Return the first test that fails in a child; one that takes too long has failed."""
+        reading, writing = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.close(reading)
+            signal.alarm(self.timeout)
+            failure = "the tests cannot be run"
+            try:
+                failure = _run(session, mutant) or ""
+            finally:
+                os.write(writing, failure.encode())
+                os._exit(0)
+        os.close(writing)
+        with os.fdopen(reading) as pipe:
+            failure = pipe.read()
+        _, status = os.waitpid(child, 0)
+        return "timeout or crash" if status else failure or None
+
+
+def _run(session: pytest.Session, mutant: Mutant | None) -> str | None:
+    if mutant is not None:
+        _change(mutant)
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
+    for place, item in enumerate(session.items):
+        following = session.items[place + 1] if place + 1 < len(session.items) else None
+        failed = session.testsfailed
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+        if session.testsfailed > failed:
+            return item.nodeid
+    return None
+
+
+def _change(mutant: Mutant) -> None:
+    """Let everything that reads the file find it changed."""
+    read = Path.read_text
+
+    def changed(path: Path, *arguments: str, **named: str) -> str:
+        text = read(path, *arguments, **named)
+        if path.name != mutant.file.name or path.resolve() != ROOT / mutant.file:
+            return text
+        return text[: mutant.begin] + mutant.new + text[mutant.end :]
+
+    Path.read_text = changed  # type: ignore[assignment, method-assign]
+    # What collecting the tests has read.
+    for cached in (objects.load, objects.definition_hash, objects.derivation_hash):
+        cached.cache_clear()
 
 
 def main() -> None:
@@ -102,26 +159,22 @@ def main() -> None:
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="from the root")
     parser.add_argument("--tests", nargs="+", required=True, help="what pytest is to run")
     parser.add_argument("--line", action="append", type=int, help="only changes of this line")
-    parser.add_argument("--timeout", type=float, default=600, help="seconds for the tests")
+    parser.add_argument("--replace", action="append", nargs=2, default=[], metavar=("OLD", "NEW"))
+    parser.add_argument("--timeout", type=int, default=300, help="seconds for the tests")
     arguments = parser.parse_args()
-    todo = [
-        mutant
-        for file in arguments.files
-        for mutant in mutants(file)
-        if not arguments.line or mutant.line in arguments.line
-    ]
-    survived = 0
-    with tempfile.TemporaryDirectory() as temporary:
-        checkout = Path(temporary) / "checkout"
-        shutil.copytree(ROOT, checkout, ignore=shutil.ignore_patterns(*LEFT_OUT))
-        if failure := first_failure(checkout, arguments.tests, arguments.timeout):
-            sys.exit(f"fails without any change — {failure}")
-        for mutant in todo:
-            caught = caught_by(mutant, checkout, arguments.tests, arguments.timeout)
-            survived += caught is None
-            print(f"{mutant}  {caught or 'SURVIVED'}", flush=True)
-    print(f"\n{len(todo)} changes, {survived} survived")
-    sys.exit(1 if survived else 0)
+    loop = Loop(
+        [
+            mutant
+            for file in arguments.files
+            for mutant in mutants(file, arguments.replace)
+            if not arguments.line or mutant.line in arguments.line
+        ],
+        arguments.timeout,
+    )
+    os.chdir(ROOT)
+    options = ["-p", "no:cacheprovider", "-p", "no:xdist", "-s", *arguments.tests]
+    code = pytest.main(options, plugins=[loop])
+    sys.exit(code or bool(loop.survived))
 
 
 if __name__ == "__main__":

@@ -18,10 +18,6 @@ base AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id,
         min(at_ns) AS base_ns,
-        max(at_ns) - min(at_ns) AS length_ns,
-        least(max(CASE WHEN sense < 0 THEN at_ns END), max(CASE WHEN sense > 0 THEN at_ns END))
-        - greatest(min(CASE WHEN sense < 0 THEN at_ns END), min(CASE WHEN sense > 0 THEN at_ns END))
-            AS overlap_ns,
         coalesce(max(CASE WHEN sense < 0 THEN bound_ns END), min(-bound_ns)) AS base_bound_ns,
         count(CASE WHEN sense < 0 AND NOT is_packet THEN 1 END) AS received_count,
         count(CASE WHEN sense > 0 AND NOT is_packet THEN 1 END) AS sent_count,
@@ -35,22 +31,11 @@ placed AS MATERIALIZED (
         m.clock_id, m.other_clock_id, m.sense,
         (m.at_ns - b.base_ns)::DOUBLE AS moment,
         (m.bound_ns + m.sense * b.base_bound_ns)::DOUBLE AS bound,
-        derive.clock_drift_limit() * (m.at_ns - b.base_ns) AS drifted,
-        (m.at_ns - b.base_ns) // (b.length_ns // 256 + 1) AS stretch
+        derive.clock_drift_limit() * (m.at_ns - b.base_ns) AS drifted
     FROM bound AS m
     JOIN base AS b ON m.clock_id = b.clock_id AND m.other_clock_id = b.other_clock_id
 ),
-stretches AS (
-    SELECT
-        clock_id, other_clock_id,
-        least(
-            count(DISTINCT CASE WHEN sense < 0 THEN stretch END),
-            count(DISTINCT CASE WHEN sense > 0 THEN stretch END)
-        ) AS stretches
-    FROM placed
-    GROUP BY clock_id, other_clock_id
-),
-telling AS (
+relevant AS (
     SELECT clock_id, other_clock_id, sense, moment, bound
     FROM placed
     QUALIFY coalesce(
@@ -64,7 +49,7 @@ telling AS (
 ),
 thinned (round, clock_id, other_clock_id, sense, moment, bound) AS (
     SELECT 0, clock_id, other_clock_id, sense, moment, bound
-    FROM telling
+    FROM relevant
     UNION ALL
     SELECT round + 1, clock_id, other_clock_id, sense, moment, bound
     FROM (
@@ -92,8 +77,6 @@ corner AS (
 )
 SELECT
     c.clock_id, c.other_clock_id, c.sense, c.moment, c.bound, b.base_ns, b.base_bound_ns,
-    b.overlap_ns, s.stretches, b.received_count, b.sent_count, b.received_packet_count,
-    b.sent_packet_count
+    b.received_count, b.sent_count, b.received_packet_count, b.sent_packet_count
 FROM corner AS c
 JOIN base AS b ON c.clock_id = b.clock_id AND c.other_clock_id = b.other_clock_id
-JOIN stretches AS s ON c.clock_id = s.clock_id AND c.other_clock_id = s.other_clock_id

@@ -7,11 +7,8 @@
 --     the offset and half the distance bounds its error; the possible line there that is parallel
 --     to the longest edge of the hulls is the drift, and the steepest and the flattest line bound
 --     its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar and Dagenais 2014).
---     With some in a quarter of the stretches, and long enough for them to tell more than what is
---     possible at all, the bound of the drift is narrowed: one way at one time and the other at
---     another are supposed to take together at least three quarters of the shortest round trip.
 --     `bounds` holds how far a possible line is from that one at most, at moments between which
---     that is a straight line: without any supposition. It grows where nothing passes one way.
+--     that is a straight line. It grows where nothing passes one way.
 --     Where no line is possible, the clocks do not run evenly, or drift apart faster than clocks
 --     do: the line that misses least is given, and its error at any time is bounded by the fastest
 --     of each stretch.
@@ -21,16 +18,14 @@
 CREATE OR REPLACE MACRO derive.clock_pair(of_run) AS TABLE
 WITH corner AS MATERIALIZED (
     SELECT
-        clock_id, other_clock_id, sense, moment, bound, base_ns, base_bound_ns, overlap_ns,
-        stretches, received_count, sent_count, received_packet_count, sent_packet_count
+        clock_id, other_clock_id, sense, moment, bound, base_ns, base_bound_ns, received_count,
+        sent_count, received_packet_count, sent_packet_count
     FROM derive.clock_hull(of_run)
 ),
 pair AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, any_value(base_ns) AS base_ns,
         any_value(base_bound_ns) AS base_bound_ns,
-        any_value(overlap_ns) AS overlap_ns,
-        any_value(stretches) AS stretches,
         any_value(received_count) AS received_count,
         any_value(sent_count) AS sent_count,
         any_value(received_packet_count) AS received_packet_count,
@@ -84,12 +79,14 @@ nearest AS (
 steepness AS (
     SELECT
         l.clock_id, l.other_clock_id,
-        max(CASE WHEN u.moment < l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END)
-            AS least_slope,
-        min(CASE WHEN u.moment > l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END)
-            AS greatest_slope,
-        greatest(-derive.clock_drift_limit(), least_slope) AS lowest,
-        least(derive.clock_drift_limit(), greatest_slope) AS highest
+        greatest(
+            -derive.clock_drift_limit(),
+            max(CASE WHEN u.moment < l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END)
+        ) AS lowest,
+        least(
+            derive.clock_drift_limit(),
+            min(CASE WHEN u.moment > l.moment THEN (-u.bound - l.bound) / (u.moment - l.moment) END)
+        ) AS highest
     FROM corner AS l
     JOIN corner AS u ON l.clock_id = u.clock_id AND l.other_clock_id = u.other_clock_id
     WHERE l.sense < 0 AND u.sense > 0
@@ -129,8 +126,7 @@ longest AS (
 line AS MATERIALIZED (
     SELECT
         n.clock_id, n.other_clock_id, n.moment, n.distance, n.distance >= 0 AS is_even,
-        s.lowest, s.highest, s.least_slope, s.greatest_slope,
-        coalesce(o.slope NOT BETWEEN n.flattest AND n.steepest, true) AS is_guess,
+        s.lowest, s.highest,
         round(n.middle) AS middle,
         round(
             CASE
@@ -320,24 +316,10 @@ SELECT
     p.base_ns + l.moment::BIGINT AS reference_ns,
     p.base_bound_ns + l.middle::BIGINT AS offset_ns,
     l.drift_ppb::BIGINT AS drift_ppb,
-    coalesce(m.greatest_miss, floor(l.distance / 2))::BIGINT AS uncertainty_ns,
+    coalesce(m.greatest_miss, ceil(l.distance / 2))::BIGINT AS uncertainty_ns,
     CASE
         WHEN l.is_even THEN greatest(
-            ceil(
-                least(
-                    greatest(l.highest * 1e9 - l.drift_ppb, l.drift_ppb - l.lowest * 1e9),
-                    CASE
-                        WHEN p.stretches >= 64
-                            AND NOT l.is_guess
-                            AND l.distance < derive.clock_drift_limit() * p.overlap_ns
-                            THEN greatest(
-                            l.greatest_slope * 1e9 - l.drift_ppb,
-                            l.drift_ppb - l.least_slope * 1e9
-                        ) - 0.75 * l.distance * 1e9 / p.overlap_ns
-                    END
-                )
-            ),
-            1
+            ceil(greatest(l.highest * 1e9 - l.drift_ppb, l.drift_ppb - l.lowest * 1e9)), 1
         )
     END::BIGINT AS drift_uncertainty_ppb,
     l.is_even,

@@ -1,4 +1,4 @@
-"""The macros that match messages by time, over tables of publications and messages."""
+"""The macros that match messages by time and compare clocks, over tables of what they read."""
 
 from __future__ import annotations
 
@@ -33,6 +33,29 @@ CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT
 CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHERE run_id = only_run;
 CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
 """
+# Likewise of what messages say of two clocks.
+CLOCKS = ("clock_drift_limit", "clock_hull", "clock_pair")
+CLOCK_STAGE = """
+CREATE SCHEMA derive;
+CREATE SCHEMA store;
+CREATE TABLE bound (clock_id BIGINT DEFAULT 2, other_clock_id BIGINT DEFAULT 1,
+    is_packet BOOLEAN DEFAULT false, sense INTEGER, at_ns BIGINT, bound_ns BIGINT);
+CREATE TABLE store.host (run_id BIGINT DEFAULT 1, host_id BIGINT, clock_id BIGINT);
+CREATE TABLE store.trace (host_id BIGINT, start_ns BIGINT, end_ns BIGINT);
+INSERT INTO store.host (host_id, clock_id) VALUES (1, 1), (2, 2);
+CREATE MACRO derive.clock_bound(of_run) AS TABLE FROM bound;
+"""
+
+
+@pytest.fixture
+def clocks() -> Iterator[duckdb.DuckDBPyConnection]:
+    """How two clocks are compared, without a message between them."""
+    with duckdb.connect() as con:
+        con.execute(CLOCK_STAGE)
+        for header in objects.views():
+            if header.name.removeprefix("derive.") in CLOCKS:
+                con.execute(header.body)
+        yield con
 
 
 @pytest.fixture
