@@ -12,8 +12,8 @@ recording
   rounds to nanoseconds;
 - the stated bound with what the messages allow, calculated independently from all messages that the
   simulator says were exchanged and that both traces have (see possible_lines.py): it may be wider
-  by 4 ns, for offset, drift in 1e-9, and bound are whole numbers, and narrower by 4 ns; likewise the
-  bound of the drift, by 2e-9.
+  by 4 ns, for offset, drift in 1e-9, and bound are whole numbers, and narrower by 4 ns;
+- the stated bound of the drift likewise, to within 2e-9.
 
 The exit code is 1 if any is wrong.
 """

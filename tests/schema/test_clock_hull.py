@@ -97,6 +97,6 @@ def test_without_messages_received_those_sent_are_the_base(
 ) -> None:
     add(clocks, 1, [(0, -1), (1, 3)])
     assert corners(clocks, 1) == [(0, -1), (1, 3)]
-    assert clocks.execute(
-        "SELECT DISTINCT base_bound_ns FROM derive.clock_hull(1)"
-    ).fetchall() == [((BEHIND - 3) * 1_000,)]
+    assert clocks.execute("SELECT DISTINCT base_bound_ns FROM derive.clock_hull(1)").fetchall() == [
+        ((BEHIND - 3) * 1_000,)
+    ]

@@ -192,7 +192,7 @@ def test_without_a_possible_line_the_fastest_of_each_stretch_counts(
 def test_without_a_possible_line_the_one_that_misses_least_is_taken(
     clocks: duckdb.DuckDBPyConnection,
 ) -> None:
-    """That is parallel to the edges. In the middle a message takes 9 us more, and 50 ps per 5 us."""
+    """That is parallel to the edges. One message between takes 9 us more."""
     exchange(clocks, {0: 1, 10: 101}, {0: -1, 10: 99})
     assert line(clocks) == (0, 0, 1, 10, None)
     exchange(clocks, {5.00005: 41}, {})
