@@ -271,13 +271,13 @@ class Database:
                 the run when None.
             publication_id: identity of a publication.
             take_id: identity of a take.
-            callback_instance_id: identity of a run of a callback.
+            callback_instance_id: identity of a callback instance.
             request_id: identity of a request to a service.
             response_id: identity of a response of a service.
             run: a name or an id, for `topic` only; the latest run when None.
             direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
             depth: most messages in a row, each way.
-            limit: most publications, takes, callback runs, requests and responses.
+            limit: most publications, takes, callback instances, requests and responses.
             internal: follow what goes to ROS's own topics and services too.
 
         Raises:
@@ -298,8 +298,8 @@ class Database:
         starts = [Start(kind, number) for kind, number in given.items() if number is not None]
         if len(starts) + (topic is not None) != 1:
             raise UsageError(
-                "a flow starts from one thing: a topic, a publication, a take, a callback run, "
-                "a request or a response",
+                "a flow starts from one thing: a topic, a publication, a take, a callback "
+                "instance, a request or a response",
                 "msgflow flow --topic /chatter --at 2.5s, or msgflow flow --publication 1",
             )
         if starts and not at is run is None:

@@ -1,13 +1,13 @@
 -- name: callback-duration
 -- title: Callback durations and periods
--- description: How long callbacks ran, and how far apart their starts were. Runs that were never
---     seen to end are counted apart.
+-- description: How long callbacks ran, and how far apart their starts were. Instances that were
+--     never seen to end are counted apart.
 -- grain: one row per callback object that ran
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR              Node of the callback
 -- column: callback VARCHAR          What triggers it
 -- column: count BIGINT              Runs that began in the time window
--- column: open BIGINT               Runs never seen to end
+-- column: open BIGINT               Instances never seen to end
 -- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
@@ -22,7 +22,7 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- needs: main.callback_instance, main.callback, main.callback_label
-WITH run AS (
+WITH instance AS (
     SELECT
         run_id,
         callback_id,
@@ -47,7 +47,7 @@ measured AS (
         round(avg(duration_ns))::BIGINT AS mean_ns,
         max(duration_ns) AS max_ns,
         sum(duration_ns)::BIGINT AS total_ns
-    FROM run
+    FROM instance
     GROUP BY run_id, callback_id
 )
 SELECT

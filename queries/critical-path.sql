@@ -18,18 +18,20 @@
 -- column: at_ns BIGINT [ns]        Begin, since the start of the flow
 -- column: duration_ns BIGINT [ns]  Duration; negative where parts of the flow overlap
 -- column: hop BIGINT               Which message of the path it is, or leads to
--- column: part VARCHAR             Part of the flow, as in path-breakdown
--- column: activity VARCHAR         What happened: the part itself, or in waits 'busy' (the executor
---     ran something else), 'blocked' (a callback ran that excludes the waiting one), 'timer' (not
---     due yet), 'unpublished' (the message that was waited for had not been published), or a part
---     of the way of that message
+-- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
+--     'service', 'publish' or its layer, 'publish_to_take' or 'take_to_callback'
+-- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
+--     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
+--     one) or 'undecided' (nothing tells when the message arrived); in a cache 'timer' (not due
+--     yet), 'unpublished' (the message that was waited for had not been published), or a part of
+--     the way of that message
 -- column: node VARCHAR             Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: share DOUBLE             Part of the latency, rounded to 4 places
--- column: is_certain BOOLEAN       Of 'busy' and 'blocked': what waited was ready by then; no: it
---     may have arrived during this piece
+-- column: is_certain BOOLEAN       Of 'executor_busy' and 'blocked': what waited was ready by then;
+--     no: it may have arrived during this piece
 -- column: from_ns BIGINT [epoch ns]  Begin
--- column: callback_instance_id BIGINT  Run of the callback
+-- column: callback_instance_id BIGINT  Callback instance
 -- column: publication_id BIGINT    Message
 -- column: take_id BIGINT           Take at the end of the flow
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
@@ -48,8 +50,8 @@ SELECT
     ) AS node,
     CASE
         WHEN c.activity IN (
-            'callback', 'cache', 'executor', 'request', 'service', 'busy', 'blocked', 'timer'
-        ) THEN l.label
+            'callback', 'cache', 'take_to_callback', 'service', 'executor_busy', 'blocked', 'timer'
+        ) OR c.part = 'request_to_take' THEN l.label
         ELSE coalesce(p.topic_name, '?')
     END AS what,
     round(c.duration_ns / nullif(c.latency_ns, 0), 4) AS share,

@@ -1,10 +1,10 @@
 -- name: data-quality
 -- title: Data quality, and what share of the answers it touches
--- description: What the traces lack, by trace, process and topic. `affected` of `total` things of
---     a kind are touched: events that were discarded among those that happened, time in gaps,
---     callback runs never seen to end, objects that were never seen to be created (those of ROS
---     itself left out), takes without a publication, messages with an unknown fate, links that lost
---     events may have spoilt. The last rows give the share of the whole run.
+-- description: What the traces lack, by trace, process and topic. `affected` of `total` things of a
+--     kind are touched: events that were discarded among those that happened, time in gaps,
+--     callback instances never seen to end, objects that were never seen to be created (those of
+--     ROS itself left out), takes without a publication, messages with an unknown fate, links that
+--     lost events may have spoilt. The last rows give the share of the whole run.
 -- grain: one row per trace, process, topic or run, and measure
 -- param: all BOOLEAN = false     Show measures with nothing affected, too
 -- column: run_id BIGINT          Run

@@ -2,10 +2,10 @@
 -- title: Messages delivered, skipped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Skipped: newer messages took their place in the queue. Lost: they did not arrive
---     or could not be taken. Edge: the two were not connected yet, or not any more, or the trace
---     ended. Unknown: events are lost, or nothing tells. The five add up to what was published.
---     Whether a message was overwritten or lost on the way is told by the depth of the queue alone;
---     incompatible QoS, lifespan and best effort do not show in a trace.
+--     or could not be taken. Unconnected: the two were not connected yet, or not any more, or the
+--     trace ended. Unknown: events are lost, or nothing tells. The five add up to what was
+--     published. Whether a message was overwritten or lost on the way is told by the depth of the
+--     queue alone; incompatible QoS, lifespan and best effort do not show in a trace.
 -- grain: one row per topic and subscription
 -- param: topic VARCHAR = NULL       Only this topic
 -- column: run_id BIGINT             Run
@@ -15,9 +15,9 @@
 -- column: delivered BIGINT          Of these, taken
 -- column: skipped BIGINT            Of these, replaced by newer ones
 -- column: lost BIGINT               Of these, lost
--- column: edge BIGINT               Of these, before or after the two were connected
+-- column: unconnected BIGINT        Of these, before or after the two were connected
 -- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, those at the edge left out
+-- column: delivered_percent DOUBLE [%]  Share delivered, those unconnected left out
 -- column: orphans BIGINT            Takes in the time window whose publication is not known
 -- column: reasons VARCHAR           Why messages were not taken, with counts
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
@@ -41,7 +41,7 @@ delivery AS (
         sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
         sum(CASE WHEN status = 'skipped' THEN number ELSE 0 END)::BIGINT AS skipped,
         sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
-        sum(CASE WHEN status = 'edge' THEN number ELSE 0 END)::BIGINT AS edge,
+        sum(CASE WHEN status = 'unconnected' THEN number ELSE 0 END)::BIGINT AS unconnected,
         sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM outcome
@@ -72,9 +72,9 @@ SELECT
     coalesce(d.delivered, 0) AS delivered,
     coalesce(d.skipped, 0) AS skipped,
     coalesce(d.lost, 0) AS lost,
-    coalesce(d.edge, 0) AS edge,
+    coalesce(d.unconnected, 0) AS unconnected,
     coalesce(d.unknown, 0) AS unknown,
-    100 * d.delivered / nullif(d.published - d.edge, 0) AS delivered_percent,
+    100 * d.delivered / nullif(d.published - d.unconnected, 0) AS delivered_percent,
     coalesce(o.orphans, 0) AS orphans,
     d.reasons,
     o.orphan_reasons,

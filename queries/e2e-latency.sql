@@ -21,7 +21,7 @@
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
 -- column: lost BIGINT              Roots lost on the way although later ones arrived
--- column: edge BIGINT              Roots too close to the begin or end of the trace to tell
+-- column: cut_by_recording BIGINT  Roots too close to the begin or end of the trace to tell
 -- column: loss_affected BIGINT     Roots with a gap of a trace in their time: what is said of them
 --     may be wrong
 -- column: pairs BIGINT             Pairs of root and arrival that the latencies are from
@@ -82,7 +82,7 @@ completeness AS (
         count(*) FILTER (WHERE status = 'reached') AS reached,
         count(*) FILTER (WHERE status = 'superseded') AS superseded,
         count(*) FILTER (WHERE status = 'lost') AS lost,
-        count(*) FILTER (WHERE status = 'edge') AS edge,
+        count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected
     FROM root
     GROUP BY run_id, path_id
@@ -118,7 +118,7 @@ SELECT
     coalesce(c.reached, 0) AS reached,
     coalesce(c.superseded, 0) AS superseded,
     coalesce(c.lost, 0) AS lost,
-    coalesce(c.edge, 0) AS edge,
+    coalesce(c.cut_by_recording, 0) AS cut_by_recording,
     coalesce(c.loss_affected, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(o.number, 0) AS looped,

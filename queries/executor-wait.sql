@@ -5,15 +5,15 @@
 --     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds:
 --     at least what ran after the executor had found it ready, at most what ran since it can have
 --     been there. The rest of the wait was the network, an idle executor or its overhead. The
---     callback that others kept waiting most comes first. Totals are over the runs in the time
---     window; 'waits' has them one by one, 'interference' every pair of callbacks.
+--     callback that others kept waiting most comes first. Totals are over the callback instances
+--     in the time window; 'waits' has them one by one, 'interference' every pair of callbacks.
 -- grain: one row per callback object that ran
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR              Node of the callback
 -- column: callback VARCHAR          What triggers it
--- column: count BIGINT              Runs that began in the time window
--- column: delayed_min BIGINT        Runs that others ran before for certain though it was ready
--- column: delayed_max BIGINT        Runs for which that is possible
+-- column: count BIGINT              Callback instances that began in the time window
+-- column: delayed_min BIGINT        Of these, kept waiting for certain: ready while others ran
+-- column: delayed_max BIGINT        Of these, possibly kept waiting
 -- column: wait_median_ns BIGINT [ns]  Median wait, where its beginning is known
 -- column: wait_max_ns BIGINT [ns]   Longest wait
 -- column: busy_worst_ns BIGINT [ns]   Longest that the executor can have been busy during one wait
@@ -23,8 +23,8 @@
 -- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
 -- column: meanwhile VARCHAR         What ran meanwhile, by its share: the three with the most, with
 --     their node where it is another
--- column: unknown BIGINT            Runs of which the beginning of the wait is not known
--- column: loss_affected BIGINT      Runs with a gap of the trace in their wait
+-- column: unknown BIGINT            Of these, with an unknown beginning of the wait
+-- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- note: clocks

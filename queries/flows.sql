@@ -20,7 +20,8 @@
 -- column: take_id BIGINT           Take at the end of the path; NULL: not reached
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]   From the start of the root to the end
--- column: status VARCHAR           'reached', 'superseded', 'lost' or 'edge'
+-- column: status VARCHAR           'reached', 'superseded', 'lost' or
+--     'cut_by_recording'
 -- column: reason VARCHAR           Why it did not arrive
 -- column: path VARCHAR             Nodes and topics
 -- note: clocks

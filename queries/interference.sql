@@ -2,7 +2,8 @@
 -- title: Which callbacks keep which waiting
 -- description: For every pair of callbacks of one executor how long one ran while the other waited
 --     (literature: interference, or blocking where the one that ran was not to come first; no
---     run is ever interrupted). Bounds as in executor-wait. Threads of one executor count each.
+--     callback is ever interrupted). Bounds as in executor-wait. Threads of one executor count
+--     each.
 -- grain: one row per waiting callback and callback that ran meanwhile
 -- column: run_id BIGINT             Run
 -- column: node VARCHAR              Node of the callback that waited
@@ -10,7 +11,7 @@
 -- column: meanwhile_node VARCHAR    Node of the callback that ran
 -- column: meanwhile_callback VARCHAR  What triggers it
 -- column: waits BIGINT              Waits during which it may have run
--- column: runs BIGINT               Its runs during these waits
+-- column: instances BIGINT          Callback instances that ran during these waits
 -- column: overlap_min_ns BIGINT [ns]  How long it ran during waits, at least
 -- column: overlap_max_ns BIGINT [ns]  How long it ran during waits, at most
 -- column: worst_ns BIGINT [ns]      The most of it during one wait
@@ -26,7 +27,7 @@ WITH pair AS (
         w.callback_id,
         w.callback_instance_id,
         r.callback_id AS meanwhile_callback_id,
-        count(*) AS runs,
+        count(*) AS instances,
         sum(i.certain_ns)::BIGINT AS overlap_min_ns,
         sum(i.overlap_ns)::BIGINT AS overlap_max_ns
     FROM main.executor_interference AS i
@@ -41,7 +42,7 @@ measured AS (
         callback_id,
         meanwhile_callback_id,
         count(*) AS waits,
-        sum(runs)::BIGINT AS runs,
+        sum(instances)::BIGINT AS instances,
         sum(overlap_min_ns)::BIGINT AS overlap_min_ns,
         sum(overlap_max_ns)::BIGINT AS overlap_max_ns,
         max(overlap_max_ns) AS worst_ns
@@ -55,7 +56,7 @@ SELECT
     o.node AS meanwhile_node,
     o.label AS meanwhile_callback,
     m.waits,
-    m.runs,
+    m.instances,
     m.overlap_min_ns,
     m.overlap_max_ns,
     m.worst_ns,

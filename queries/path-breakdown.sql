@@ -4,8 +4,11 @@
 --     from its start to its end and add up to its latency exactly. A part is negative where the
 --     next began before it ended (overlaps), as between hosts whose clocks are apart. Parts of a
 --     hop are the callback up to its publication; the wait in a cache for other messages or a
---     timer; calls of services; publishing by layer; transport up to the take, with any wait for
---     a busy executor; and from the take to the callback.
+--     timer; calls of services; publishing by layer; what passed up to the take; and from the take
+--     to the callback. A trace does not say when a message arrived, so what passed up to the take
+--     is three parts, with the bounds of executor-wait: the network or an idle executor; the
+--     executor busy with other callbacks; and undecided, the one or the other. Executors were busy
+--     at least executor_busy, at most executor_busy and undecided together.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
 -- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
@@ -20,10 +23,10 @@
 -- column: run_id BIGINT            Run
 -- column: path_id BIGINT           Number of the path
 -- column: hop BIGINT               Which message of the path it is, or leads to
--- column: part VARCHAR             'callback', 'cache', 'request', 'service', a layer of publishing
---     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known), 'transport' or
---     'executor'
--- column: node VARCHAR             Node that runs the callback, or that publishes
+-- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
+--     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
+--     'network_or_idle', 'undecided', 'executor_busy' or 'take_to_callback'
+-- column: node VARCHAR             Node that runs the callback, waits for it, or publishes
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
 -- column: overlaps BIGINT          Flows in which it is negative
@@ -36,18 +39,50 @@
 -- column: total_ns BIGINT [ns]     Sum over all flows; adds up to that of their latencies
 -- column: path VARCHAR             Nodes and topics
 -- note: clocks
--- needs: main.end_to_end_part, main.flow_path, main.callback_instance, main.callback_label,
---     main.publisher, main.node, main.process
-WITH part AS MATERIALIZED (
+-- needs: main.end_to_end_part, main.executor_wait, main.flow_path, main.callback_instance,
+--     main.callback_label, main.publisher, main.node, main.process
+WITH whole AS MATERIALIZED (
     SELECT
-        e.run_id, e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, i.callback_id
+        e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_instance_id,
+        i.callback_id
     FROM main.end_to_end_part(
         $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
         max_depth := $max_depth, max_paths := $max_paths
     ) AS e
-    LEFT JOIN main.callback_instance AS i
-        ON e.callback_instance_id = i.callback_instance_id
-        AND e.part IN ('callback', 'cache', 'executor', 'request', 'service')
+    LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id
+),
+-- How long the executor was busy before each take. Between clocks that are apart the time that
+-- they show may be shorter than that.
+taken AS (
+    SELECT
+        e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_id,
+        least(coalesce(w.busy_min_ns, 0), greatest(e.duration_ns, 0)) AS busy_min_ns,
+        least(coalesce(w.busy_max_ns, e.duration_ns), greatest(e.duration_ns, 0)) AS busy_max_ns
+    FROM whole AS e
+    LEFT JOIN main.executor_wait AS w ON e.callback_instance_id = w.callback_instance_id
+    WHERE e.part IN ('publish_to_take', 'request_to_take')
+),
+part AS (
+    SELECT
+        path_id, flow_id, hop, position, part, duration_ns,
+        CASE WHEN part IN ('callback', 'cache', 'take_to_callback', 'service') THEN callback_id END
+            AS callback_id
+    FROM whole
+    WHERE part NOT IN ('publish_to_take', 'request_to_take')
+    UNION ALL
+    SELECT
+        path_id, flow_id, hop, position, 'network_or_idle',
+        duration_ns - greatest(busy_max_ns, busy_min_ns),
+        CASE WHEN part = 'request_to_take' THEN callback_id END
+    FROM taken
+    UNION ALL
+    SELECT
+        path_id, flow_id, hop, position, 'undecided', greatest(busy_max_ns - busy_min_ns, 0),
+        callback_id
+    FROM taken
+    UNION ALL
+    SELECT path_id, flow_id, hop, position, 'executor_busy', busy_min_ns, callback_id
+    FROM taken
 ),
 measured AS (
     SELECT
@@ -101,4 +136,7 @@ LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
 LEFT JOIN main.process AS r ON b.process_id = r.process_id
 LEFT JOIN main.node AS n ON b.node_id = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
-ORDER BY p.run_id, p.path, m.path_id, m.hop, m.position, m.part, m.callback_id
+ORDER BY
+    p.run_id, p.path, m.path_id, m.hop, m.position,
+    list_position(['network_or_idle', 'undecided', 'executor_busy'], m.part), m.part,
+    m.callback_id

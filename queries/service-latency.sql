@@ -2,10 +2,10 @@
 -- title: Latency of services by service and client
 -- description: How long calls of services took, in all and by part. The round trip is measured on
 --     the client's clock alone, from the sending of the request to the take of the response; the
---     two transports compare the clocks of client and service, and are negative where those are
---     apart (and by microseconds with Fast DDS, which reports a request after writing it). Every
---     part is measured where both its ends were traced. A request that nobody was seen to take is
---     counted with the only service of that name, if there is one.
+--     ways there and back compare the clocks of client and service, and are negative where those
+--     are apart (and by microseconds with Fast DDS, which reports a request after writing it).
+--     Every part is measured where both its ends were traced. A request that nobody was seen to
+--     take is counted with the only service of that name, if there is one.
 -- grain: one row per service and client
 -- column: run_id BIGINT               Run
 -- column: service_name VARCHAR        Service
@@ -16,13 +16,13 @@
 -- column: not_taken BIGINT            Requests that no service was seen to take
 -- column: not_answered BIGINT         Requests that were taken, without any sign of a response
 -- column: not_received BIGINT         Requests whose response was sent, but not seen to be taken
--- column: negative BIGINT             Requests or responses with negative transport
--- column: request_median_ns BIGINT [ns]   Median transport of the request, sending to take
+-- column: negative BIGINT             Requests or responses that were taken before they were sent
+-- column: request_median_ns BIGINT [ns]   Median from the sending of the request to its take
 -- column: wait_median_ns BIGINT [ns]      Median time from its take to the service callback
 -- column: callback_median_ns BIGINT [ns]  Median duration of the service callback
 -- column: reply_median_ns BIGINT [ns]     Median time from the end of the service callback to the
 --     sending of the response; negative where the callback sends it itself
--- column: response_median_ns BIGINT [ns]  Median transport of the response, sending to take
+-- column: response_median_ns BIGINT [ns]  Median from the sending of the response to its take
 -- column: round_trip_min_ns BIGINT [ns]     Shortest round trip
 -- column: round_trip_median_ns BIGINT [ns]  Median round trip
 -- column: round_trip_mean_ns BIGINT [ns]    Mean round trip

@@ -1,8 +1,10 @@
 -- name: transport-latency
--- title: Transport latency by topic and subscription
+-- title: Latency from publication to take by topic and subscription
 -- description: How long messages took from the end of their publication to their take, which
---     includes the time they waited for the receiving executor. A negative latency means that the
---     clocks of two hosts are apart. Takes without a known publication are counted, not measured.
+--     includes the time for which the receiving executor was busy with other callbacks. When a
+--     message arrived is not in a trace, so that time is given as bounds, those of executor-wait;
+--     the rest was the network or an idle executor. A negative latency means that the clocks of two
+--     hosts are apart. Takes without a known publication are counted, not measured.
 -- grain: one row per topic, receiving node and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR        Topic
@@ -14,17 +16,26 @@
 -- column: min_ns BIGINT [ns]        Shortest latency
 -- column: median_ns BIGINT [ns]     Median latency
 -- column: mean_ns BIGINT [ns]       Mean latency
+-- column: busy_mean_min_ns BIGINT [ns]  Of the mean, executor busy, at least
+-- column: busy_mean_max_ns BIGINT [ns]  Of the mean, executor busy, at most
 -- column: p95_ns BIGINT [ns]        95 % of the latencies are at most this
 -- column: p99_ns BIGINT [ns]        99 % of the latencies are at most this
 -- column: max_ns BIGINT [ns]        Longest latency
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- note: clocks
--- needs: main.take, main.link_transport, main.subscription, main.node, main.process
+-- needs: main.take, main.link_transport, main.callback_instance, main.executor_wait,
+--     main.subscription, main.node, main.process
 WITH received AS (
-    SELECT t.run_id, t.subscription_id, t.take_id, l.candidate_count, l.latency_ns
+    SELECT
+        t.run_id, t.subscription_id, t.take_id, l.candidate_count, l.latency_ns,
+        -- Between clocks that are apart the time that they show may be shorter.
+        least(coalesce(w.busy_min_ns, 0), greatest(l.latency_ns, 0)) AS busy_min_ns,
+        least(coalesce(w.busy_max_ns, l.latency_ns), greatest(l.latency_ns, 0)) AS busy_max_ns
     FROM main.take AS t
     LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
+    LEFT JOIN main.callback_instance AS i ON t.take_id = i.take_id
+    LEFT JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
     WHERE list_contains($runs, t.run_id)
         AND t.taken_ns >= $start_ns
         AND t.taken_ns < $end_ns
@@ -41,6 +52,9 @@ measured AS (
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
         round(avg(latency_ns))::BIGINT AS mean_ns,
+        round(avg(busy_min_ns) FILTER (WHERE latency_ns IS NOT NULL))::BIGINT AS busy_mean_min_ns,
+        round(avg(greatest(busy_min_ns, busy_max_ns)) FILTER (WHERE latency_ns IS NOT NULL))::BIGINT
+            AS busy_mean_max_ns,
         max(latency_ns) AS max_ns
     FROM received
     GROUP BY run_id, subscription_id
@@ -56,6 +70,8 @@ SELECT
     m.min_ns,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
+    m.busy_mean_min_ns,
+    m.busy_mean_max_ns,
     m.quantiles[2] AS p95_ns,
     m.quantiles[3] AS p99_ns,
     m.max_ns,

@@ -16,8 +16,8 @@
 -- column: topic_name VARCHAR      Topic
 -- column: publisher VARCHAR       Node that published; NULL: not known
 -- column: subscriber VARCHAR      Node that took, or should have taken
--- column: status VARCHAR          'skipped', 'lost', 'edge', 'unknown', as in delivery; 'orphan': a
---     take without a publication
+-- column: status VARCHAR          'skipped', 'lost', 'unconnected', 'unknown', as in delivery;
+--     'orphan': a take without a publication
 -- column: reason VARCHAR          Why the other side is missing
 -- column: source_timestamp_ns BIGINT [epoch ns]  Stamp of the message
 -- column: publication_id BIGINT   Identity of the publication

@@ -1,12 +1,13 @@
 -- name: waits
 -- title: Waits of callbacks, one by one
--- description: For every run of a callback the time since the end of the publication of its message
+-- description: For every callback instance the time since the end of the publication of its message
 --     (or since the timer was due, or the request was sent), how much of it the executor was busy
---     with other callbacks, as bounds, and with which. Runs inside of others have no wait of their
---     own.
--- grain: one row per run of a callback that is not nested in another
--- param: callback_id BIGINT = NULL  Only runs of this callback, see executor-wait
--- param: min_busy_ns BIGINT {0..} = 0  Only runs whose executor may have been busy that long [ns]
+--     with other callbacks, as bounds, and with which. Those nested in others have no wait of
+--     their own.
+-- grain: one row per callback instance that is not nested in another
+-- param: callback_id BIGINT = NULL  Only instances of this callback, see executor-wait
+-- param: min_busy_ns BIGINT {0..} = 0  Only where the executor may have been busy that
+--     long [ns]
 -- column: run_id BIGINT             Run
 -- column: start_ns BIGINT [epoch ns]  Start of the callback
 -- column: node VARCHAR              Node of the callback
@@ -21,7 +22,7 @@
 -- column: meanwhile VARCHAR         What ran meanwhile and how long, the longest first, with
 --     its node where it is another
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
--- column: callback_instance_id BIGINT  Identity of the run of the callback
+-- column: callback_instance_id BIGINT  Identity of the callback instance
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- note: clocks

@@ -358,9 +358,9 @@ CREATE TABLE store.ring_buffer_event (
     event_id       BIGINT                        -- The event [event order]
 );
 
--- One row per run of a callback.
+-- One row per callback instance.
 CREATE TABLE store.callback_instance (
-    callback_instance_id   BIGINT NOT NULL,      -- Identity of the run
+    callback_instance_id   BIGINT NOT NULL,      -- Identity of the callback instance
     run_id                 BIGINT NOT NULL,      -- Run that the row belongs to -> run.run_id
     trace_id               BIGINT NOT NULL,      -- Trace it was recorded in -> trace.trace_id
     callback_id            BIGINT NOT NULL,      -- Callback that ran -> callback.callback_id
@@ -416,7 +416,7 @@ CREATE TABLE store.executor_state (
     state                VARCHAR NOT NULL,       -- 'wait', 'process' or 'execute'
     start_ns             BIGINT NOT NULL,        -- Executor event that began it [epoch ns]
     end_ns               BIGINT,                 -- Next executor event; NULL: not known (the last, or a gap) [epoch ns]
-    callback_instance_id BIGINT,                 -- First callback run in it -> callback_instance.callback_instance_id
+    callback_instance_id BIGINT,                 -- First callback instance in it -> callback_instance.callback_instance_id
     start_event_id       BIGINT                  -- Executor event that began it [event order]
 );
 
@@ -481,7 +481,7 @@ CREATE TABLE store.link_packet (
     sequence_number     BIGINT                   -- Sequence number of its first byte; NULL: not TCP
 );
 
--- One row per callback run, or take outside of any, that led to a publication.
+-- One row per callback instance, or take outside of any, that led to a publication.
 CREATE TABLE store.link_causal (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id
     callback_instance_id BIGINT,                 -- Cause; NULL: the take itself -> callback_instance.callback_instance_id
@@ -491,18 +491,18 @@ CREATE TABLE store.link_causal (
     publisher_id         BIGINT,                 -- Publisher of the effect -> publisher.publisher_id
     kind                 VARCHAR NOT NULL,       -- 'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'
     annotation_id        BIGINT,                 -- Annotation that declares it -> annotation.annotation_id
-    candidate_count      BIGINT,                 -- Runs that it could have been
+    candidate_count      BIGINT,                 -- Callback instances that it could have been
     is_loss_affected     BOOLEAN NOT NULL        -- A gap of the trace may hide a better partner
 );
 
--- One row per request that a callback run or thread sent.
+-- One row per request that a callback instance or thread sent.
 CREATE TABLE store.link_request (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id
     request_id           BIGINT NOT NULL,        -- Effect -> request.request_id
     callback_instance_id BIGINT                  -- Cause -> callback_instance.callback_instance_id
 );
 
--- One row per response and the callback run that sent it.
+-- One row per response and the callback instance that sent it.
 CREATE TABLE store.link_response (
     run_id               BIGINT NOT NULL,        -- Run that the row belongs to -> run.run_id
     response_id          BIGINT NOT NULL,        -- Effect -> response.response_id

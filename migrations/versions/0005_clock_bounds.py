@@ -11,9 +11,48 @@ down_revision = "0004"
 branch_labels = None
 depends_on = None
 
+# A run is a recording; one execution of a callback is a callback instance.
+WORDS = (
+    (
+        "TABLE store.callback_instance",
+        "One row per run of a callback",
+        "One row per callback instance",
+    ),
+    (
+        "COLUMN store.callback_instance.callback_instance_id",
+        "Identity of the run",
+        "Identity of the callback instance",
+    ),
+    (
+        "COLUMN store.executor_state.callback_instance_id",
+        "First callback run in it",
+        "First callback instance in it",
+    ),
+    (
+        "TABLE store.link_causal",
+        "One row per callback run, or take outside of any, that led to a publication",
+        "One row per callback instance, or take outside of any, that led to a publication",
+    ),
+    (
+        "COLUMN store.link_causal.candidate_count",
+        "Runs that it could have been",
+        "Callback instances that it could have been",
+    ),
+    (
+        "TABLE store.link_request",
+        "One row per request that a callback run or thread sent",
+        "One row per request that a callback instance or thread sent",
+    ),
+    (
+        "TABLE store.link_response",
+        "One row per response and the callback run that sent it",
+        "One row per response and the callback instance that sent it",
+    ),
+)
+
 
 def upgrade() -> None:
-    """Add the table and the column.
+    """Add the table and the columns, and say callback instance where that is meant.
 
     Clocks that are corrected already have no rows until they are so anew.
     """
@@ -54,10 +93,14 @@ def upgrade() -> None:
         ),
         schema="store",
     )
+    for thing, _, new in WORDS:
+        op.execute(f"COMMENT ON {thing} IS '{new}'")
 
 
 def downgrade() -> None:
     """Drop the columns and the table."""
+    for thing, old, _ in WORDS:
+        op.execute(f"COMMENT ON {thing} IS '{old}'")
     op.drop_column("stamp_clock", "segment", schema="store")
     op.drop_column("link_transport", "is_copy", schema="store")
     op.drop_table("clock_uncertainty", schema="store")

@@ -44,7 +44,8 @@ def command(
         Thing,
         typer.Option(
             "--what",
-            help="End-to-end latency by path, duration by callback, or transport latency by topic",
+            help="Latency end to end by path, duration by callback, or from publication to take by"
+            " topic",
             rich_help_panel=SELECTION,
         ),
     ] = Thing.PATHS,

@@ -102,7 +102,7 @@ def command(
             metavar="N",
             min=1,
             max=10_000,
-            help="Most publications, takes, callback runs, requests and responses",
+            help="Most publications, takes, callback instances, requests and responses",
             rich_help_panel=SELECTION,
         ),
     ] = 1_000,
@@ -129,7 +129,7 @@ def command(
 ) -> None:
     """Print the flow of one message: what it was caused by, and what it caused.
 
-    A line is a publication, a message taken with the callback run it was for, a request, or a
+    A line is a publication, a message taken with the callback instance it was for, a request, or a
     response taken by its client.
 
     Times count from the first line. NA is what the trace does not show.

@@ -567,8 +567,8 @@ ring_buffer_event = _table(
 
 callback_instance = _table(
     "callback_instance",
-    "One row per run of a callback",
-    _id("callback_instance_id", "Identity of the run"),
+    "One row per callback instance",
+    _id("callback_instance_id", "Identity of the callback instance"),
     _run(),
     _trace(),
     _reference("callback_id", "Callback that ran", to="callback.callback_id", required=True),
@@ -637,7 +637,7 @@ executor_state = _table(
     _time("end_ns", "Next executor event; NULL: not known (the last, or a gap)"),
     _reference(
         "callback_instance_id",
-        "First callback run in it",
+        "First callback instance in it",
         to="callback_instance.callback_instance_id",
     ),
     _order("start_event_id", "Executor event that began it"),
@@ -739,7 +739,7 @@ link_packet = _table(
 
 link_causal = _table(
     "link_causal",
-    "One row per callback run, or take outside of any, that led to a publication",
+    "One row per callback instance, or take outside of any, that led to a publication",
     _run(),
     _reference(
         "callback_instance_id",
@@ -754,13 +754,13 @@ link_causal = _table(
     _reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
     _text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
     _reference("annotation_id", "Annotation that declares it", to="annotation.annotation_id"),
-    _count("candidate_count", "Runs that it could have been"),
+    _count("candidate_count", "Callback instances that it could have been"),
     _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
 )
 
 link_request = _table(
     "link_request",
-    "One row per request that a callback run or thread sent",
+    "One row per request that a callback instance or thread sent",
     _run(),
     _reference("request_id", "Effect", to="request.request_id", required=True),
     _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
@@ -768,7 +768,7 @@ link_request = _table(
 
 link_response = _table(
     "link_response",
-    "One row per response and the callback run that sent it",
+    "One row per response and the callback instance that sent it",
     _run(),
     _reference("response_id", "Effect", to="response.response_id", required=True),
     _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),

@@ -34,6 +34,8 @@ _NODE = (
     "symbol",
     "thread",
     "host",
+    "busy_min_ns",
+    "busy_max_ns",
 )
 _STATE = ("missing", "reason", "cut_count", "internal_count")
 NOT_TAKEN = "not_taken"
@@ -51,7 +53,8 @@ class Flow:
         depth: most messages in a row, each way.
         limit: most vertices.
         run: the run it belongs to.
-        table: the rows of `main.flow_step`, nearest to the start first.
+        table: the rows of `main.flow_step`, nearest to the start first, with the bounds of
+            `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns).
         notes: what the rows do not say themselves, a sentence each.
     """
 
@@ -101,7 +104,7 @@ class Flow:
         ]
 
     def to_arrow(self) -> pa.Table:
-        """Return the rows of `main.flow_step` as a pyarrow.Table."""
+        """Return the rows, as `table` has them, as a pyarrow.Table."""
         return self.table
 
     def to_dict(self) -> Row:
@@ -159,7 +162,7 @@ def read_flow(
     """
     run = require_start(connection, start)
     table = read_steps(
-        connection, start, direction=direction, depth=depth, limit=limit, internal=internal
+        connection, start, run, direction=direction, depth=depth, limit=limit, internal=internal
     )
     flow = Flow(start, direction, depth, limit, run, table, list(start.notes))
     flow.notes.extend(_notes(flow))

@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class Item:
-    """One vertex, or a take with the callback run it was for, or a message that was not taken.
+    """One vertex, or a take with the callback instance it was for, or a message that was not taken.
 
     Attributes:
-        node: the vertex; of the callback run where a take is drawn with it.
+        node: the vertex; of the callback instance where a take is drawn with it.
         take: that take.
-        handover: the link from the take to the callback run.
+        handover: the link from the take to the callback instance.
         number: given where another line refers to this one.
         causes: items that lead here, with the links.
         effects: items that this leads to, with the links.

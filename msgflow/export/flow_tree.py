@@ -146,7 +146,7 @@ class _Painter:
         node = item.node
         label, place = _printable(node["label"]), _printable(node["node"])
         if node["kind"] == "publication":
-            # Else who published it stands on the line of the callback run.
+            # Else who published it stands on the line of the callback instance.
             is_alone = link is None or not item.causes
             return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
         if node["kind"] == "request":
@@ -170,11 +170,12 @@ class _Painter:
         if link is not None and link["link_kind"] not in _OF_EFFECT:
             details.append(_waits(link))
         requested = [edge for _, edge in item.causes if edge["link_kind"] == "callback"]
+        details += _busy(node)
         for edge in [item.handover, *requested]:
             if edge is not None:
-                details.append(f"wait {format_cell(edge['wait_ns'], 'ns')}")
+                details.append(f"take to callback {format_cell(edge['wait_ns'], 'ns')}")
         if node["kind"] in ("request", "response"):
-            details += _transport(node)
+            details += _sending(node)
         elif node["missing"] == "end":
             details.append("ran NA: never seen to end")
         elif node["kind"] == "callback_instance":
@@ -199,7 +200,8 @@ class _Painter:
 
 
 def _waits(edge: Row) -> str:
-    text = str(edge["link_kind"])
+    kind = str(edge["link_kind"])
+    text = "publish to take" if kind == "transport" else kind
     if edge["wait_ns"] is not None:
         text += f" {format_duration(edge['wait_ns'])}"
     doubts = []
@@ -210,12 +212,25 @@ def _waits(edge: Row) -> str:
     return f"{text} ({', '.join(doubts)})" if doubts else text
 
 
-def _transport(node: Row) -> list[str]:
+def _busy(node: Row) -> list[str]:
+    """Return how long its executor was busy with other callbacks before the take."""
+    least_ns, most_ns = node["busy_min_ns"], node["busy_max_ns"]
+    if most_ns is None:
+        return [f"executor busy at least {format_duration(least_ns)}"] if least_ns else []
+    if most_ns == 0:
+        return []
+    if least_ns == most_ns:
+        return [f"executor busy {format_duration(most_ns)}"]
+    least = f"{format_duration(least_ns)} to" if least_ns else "up to"
+    return [f"executor busy {least} {format_duration(most_ns)}"]
+
+
+def _sending(node: Row) -> list[str]:
     if node["missing"] == "sending":
         return []
     if node["end_ns"] is None:
         return ["NA: it was not taken"]
-    return [f"transport {format_duration(node['end_ns'] - node['start_ns'])}"]
+    return [f"sending to take {format_duration(node['end_ns'] - node['start_ns'])}"]
 
 
 def _reason(row: Row | None) -> str:

@@ -33,7 +33,7 @@ _CONDITION = re.compile(
     rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
 )
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
-_UNITS = {"paths": "flows", "callbacks": "callback runs", "topics": "takes"}
+_UNITS = {"paths": "flows", "callbacks": "callback instances", "topics": "takes"}
 _LOST = """
 SELECT run_id, sum(discarded_event_count)::BIGINT
 FROM main.trace

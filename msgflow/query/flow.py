@@ -36,14 +36,20 @@ JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
 WHERE b.run_id = $run_id AND p.topic_name = $topic
 """
 _STEPS = """
-SELECT run_id, depth, from_kind, from_id, link_kind, wait_ns, candidate_count, is_loss_affected,
-    kind, id, start_ns, end_ns, node, label, topic_name, symbol, thread, host, missing, reason,
-    cut_count, internal_count
+SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
+    s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
+    s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
+    w.busy_min_ns, w.busy_max_ns
 FROM main.flow_step(
     $kind, $id,
     direction := $direction, max_depth := $max_depth, max_vertices := $limit, internal := $internal
-)
-ORDER BY abs(depth), depth, start_ns, kind, id, from_kind, from_id, link_kind
+) AS s
+LEFT JOIN (
+    SELECT callback_instance_id, busy_min_ns, busy_max_ns
+    FROM main.executor_wait
+    WHERE run_id = $run_id AND since IN ('publication', 'request')
+) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
+ORDER BY abs(s.depth), s.depth, s.start_ns, s.kind, s.id, s.from_kind, s.from_id, s.link_kind
 """
 
 
@@ -128,17 +134,19 @@ def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
 def read_steps(
     connection: duckdb.DuckDBPyConnection,
     start: Start,
+    run: Run,
     *,
     direction: str,
     depth: int,
     limit: int,
     internal: bool,
 ) -> pa.Table:
-    """Return the steps of a flow, nearest to the start first.
+    """Return the steps of a flow, nearest to the start first, with how long executors were busy.
 
     Args:
         connection: to a database with the public views.
         start: where to begin.
+        run: the run that it belongs to.
         direction: one of `DIRECTIONS`.
         depth: most messages in a row, each way.
         limit: most vertices.
@@ -159,6 +167,7 @@ def read_steps(
     bindings = {
         "kind": start.kind,
         "id": start.id,
+        "run_id": run.run_id,
         "direction": direction,
         # No flow within the limit has more steps.
         "max_depth": min(depth * STEPS_PER_MESSAGE, MOST_VERTICES),

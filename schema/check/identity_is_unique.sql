@@ -1,5 +1,5 @@
 -- name: check.identity_is_unique
--- description: Publications, takes, runs of callbacks, requests and responses have an identity of
+-- description: Publications, takes, callback instances, requests and responses have an identity of
 --     their own.
 -- grain: one row per identity used twice
 -- severity: error

@@ -1,6 +1,6 @@
 -- name: check.interval_is_ordered
 -- description: Nothing ends before it begins.
--- grain: one row per publication, callback run or executor state that does
+-- grain: one row per publication, callback instance or executor state that does
 -- severity: error
 -- needs: store.publication, store.callback_instance, store.executor_state
 SELECT run_id, 'publication' AS kind, start_event_id

@@ -1,5 +1,5 @@
 -- name: check.publication_has_one_direct_cause
--- description: A publication is made inside at most one run of a callback.
+-- description: A publication is made inside at most one callback instance.
 -- grain: one row per publication with several
 -- severity: error
 -- needs: store.link_causal

@@ -1,6 +1,6 @@
 -- name: check.request_has_one_callback_instance
--- description: A request leads to at most one run of a callback, and both say so.
--- grain: one row per request and run of a callback that do not agree
+-- description: A request leads to at most one callback instance, and both say so.
+-- grain: one row per request and callback instance that do not agree
 -- severity: error
 -- needs: store.request, store.callback_instance
 SELECT

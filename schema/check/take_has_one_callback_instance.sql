@@ -1,5 +1,5 @@
 -- name: check.take_has_one_callback_instance
--- description: A take leads to at most one run of a callback.
+-- description: A take leads to at most one callback instance.
 -- grain: one row per take with several
 -- severity: error
 -- needs: store.callback_instance

@@ -1,7 +1,7 @@
 -- name: finding.unbalanced_callbacks
 -- title: Callbacks without an end
--- description: Runs of callbacks have no end although their thread went on afterwards, and no gap
---     in the record of the thread before the next run of the callback explains it. Their durations
+-- description: Callback instances have no end although their thread went on afterwards, and no gap
+--     in the record of the thread before the next callback instance explains it. Their durations
 --     are not known; what they published is still linked.
 -- cause: The callback threw an exception that was caught further up, or the event callback_end is
 --     not enabled.

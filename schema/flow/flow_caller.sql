@@ -1,6 +1,6 @@
 -- name: derive.flow_caller
--- description: Runs of callbacks on whose request service callbacks ran: directly, or through other
---     services in between. The route tells by what way: first the node of the client that the
+-- description: Callback instances on whose request service callbacks ran: directly, or through
+--     other services in between. The route tells by what way: first the node of the client that the
 --     caller used (the negative process where the node is not known, 0 where nothing is), then the
 --     services in order (0: not known), each of them once.
 -- grain: one row per run of a service callback, run that it was called from, and route

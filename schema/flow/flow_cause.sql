@@ -1,6 +1,6 @@
 -- name: derive.flow_cause
 -- description: Causes of publications, each once, however many annotations declare it.
--- grain: one row per run of a callback, or take outside of any, publication that it led to, and
+-- grain: one row per callback instance, or take outside of any, publication that it led to, and
 --     kind of link
 -- needs: store.link_causal
 SELECT

@@ -1,5 +1,5 @@
 -- name: staging.callback_binding
--- description: Runs of callbacks with their callback object and the take that they were called
+-- description: Callback instances with their callback object and the take that they were called
 --     with. The callback_start directly follows the take's last layer on its thread, with no event
 --     of the executor between the two; an rmw take is not for an intra-process run, nor a dequeue
 --     for another; the subscriptions agree where both are known.

@@ -1,7 +1,7 @@
 -- name: staging.callback_instance
--- description: Runs of callbacks, numbered in the order in which they began, with the run that
+-- description: Callback instances, numbered in the order in which they began, with the run that
 --     each is nested in.
--- grain: one row per run of a callback
+-- grain: one row per callback instance
 -- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take,
 --     staging.beside_gap, staging.callback_gap, staging.request_origin
 WITH callback_of AS (

@@ -1,5 +1,5 @@
 -- name: staging.callback_open
--- description: Runs of callbacks that were never seen to end. Apart, since they are few, which
+-- description: Callback instances that were never seen to end. Apart, since they are few, which
 --     decides how what closes them is best looked for.
 -- grain: one row per such run
 -- needs: staging.callback_pair

@@ -1,5 +1,5 @@
 -- name: staging.callback_outer
--- description: Runs of callbacks that others may be nested in: those with anything of a callback
+-- description: Callback instances that others may be nested in: those with anything of a callback
 --     before their end, and those never seen to end. The latter last, for what is inside them,
 --     until the first event of their thread that cannot be inside: the next begin or end of a
 --     callback, executor event, or event behind a gap of any CPU.

@@ -1,6 +1,6 @@
 -- name: staging.callback_run
 -- kind: inline
--- description: Runs of callbacks with their extent and nesting.
+-- description: Callback instances with their extent and nesting.
 -- grain: one row per callback_start
 -- needs: staging.callback_pair, staging.callback_outer, staging.callback_depth
 SELECT

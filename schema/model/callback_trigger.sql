@@ -1,5 +1,5 @@
 -- name: staging.callback_trigger
--- description: What the executor said directly before runs of callbacks without a known owner:
+-- description: What the executor said directly before callback instances without a known owner:
 --     their creation was not traced, and no message or request was ever seen to be for them. It
 --     names the handle of what it executes, if that is a timer or a subscription; else it only
 --     looks for what is ready. Where something else comes in between, it is neither.

@@ -184,7 +184,7 @@ SELECT
     'open_callback',
     'info',
     count(*),
-    'runs of callbacks that were never seen to end: the trace or the process ended, a callback '
+    'callback instances that were never seen to end: the trace or the process ended, a callback '
     || 'threw, or events were lost'
 FROM staging.callback_instance
 WHERE end_ns IS NULL

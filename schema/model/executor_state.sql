@@ -21,7 +21,7 @@ WITH state AS (
     FROM staging.executor_event
     GROUP BY thread_id
 ),
--- The first run of a callback after the event: the callback event before it was earlier.
+-- The first callback instance after the event: the callback event before it was earlier.
 first_run AS (
     SELECT p.executor_event_id, c.callback_instance_id
     FROM staging.callback_pair AS p

@@ -1,5 +1,5 @@
 -- name: staging.link_request
--- description: Requests and the run of a callback that sent them; NULL where the thread did so by
+-- description: Requests and the callback instance that sent them; NULL where the thread did so by
 --     itself.
 -- grain: one row per request that was seen to be sent
 -- needs: staging.request_origin, staging.sender_run

@@ -1,8 +1,8 @@
 -- name: staging.request_callback
--- description: Runs of service callbacks with the request that they were called with: the
+-- description: Instances of service callbacks with the request that they were called with: the
 --     callback_start directly follows its rmw_take_request on the thread, with no event of the
 --     executor between the two, and the services agree where both are known.
--- grain: one row per request that was taken and led to a run of a callback
+-- grain: one row per request that was taken and led to a callback instance
 -- needs: staging.service_event, staging.callback_run, staging.callback_binding,
 --     staging.callback_known
 SELECT e.event_id AS take_event_id, r.start_event_id

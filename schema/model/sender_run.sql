@@ -1,7 +1,7 @@
 -- name: staging.sender_run
--- description: Runs of callbacks that requests and responses were sent in: the innermost on the
+-- description: Callback instances that requests and responses were sent in: the innermost on the
 --     thread that had begun and was not over.
--- grain: one row per request or response sent inside a run of a callback
+-- grain: one row per request or response sent inside a callback instance
 -- needs: staging.client_event, staging.service_event, staging.callback_instance
 WITH send AS (
     SELECT event_id, thread_id FROM staging.client_event WHERE is_request

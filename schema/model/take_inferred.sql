@@ -3,7 +3,7 @@
 --     initialisation was not traced: that of the ring buffer, else of the callback that was handed
 --     the message without a traced take. A callback that none was traced for is a subscription of
 --     its own, a placeholder by its first run.
--- grain: one row per such take or run of a callback
+-- grain: one row per such take or callback instance
 -- needs: staging.take_chain, staging.take_subscription, staging.callback_binding,
 --     staging.buffer_owner
 WITH dequeue AS (

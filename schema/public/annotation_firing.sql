@@ -1,13 +1,13 @@
 -- name: main.annotation_firing
 -- description: Publications that annotations explain. One is complete where every input has a
---     message: one that an indirect link leads from, or the one that the publishing run of a
---     callback was called with. Of partial_sync annotations, only what is published in runs of
---     callbacks of their inputs; all publications of a run are one firing.
+--     message: one that an indirect link leads from, or the one that the publishing callback
+--     instance was called with. Of partial_sync annotations, only what is published in callback
+--     instances of their inputs; all publications of one are one firing.
 -- grain: one row per annotation and publication that it applies to
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: annotation_id BIGINT  The annotation
 -- column: publication_id BIGINT  The publication
--- column: callback_instance_id BIGINT  Run of a callback that published; NULL: none
+-- column: callback_instance_id BIGINT  Callback instance that published; NULL: none
 -- column: input_count BIGINT  Inputs of the annotation
 -- column: linked_count BIGINT  Inputs with a message
 -- column: is_complete BOOLEAN  Every input has a message

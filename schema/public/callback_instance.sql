@@ -1,7 +1,7 @@
 -- name: main.callback_instance
--- description: Runs of callbacks.
--- grain: one row per run of a callback
--- column: callback_instance_id BIGINT  Identity of the run
+-- description: Callback instances.
+-- grain: one row per callback instance
+-- column: callback_instance_id BIGINT  Identity of the callback instance
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: trace_id BIGINT  Trace it was recorded in
 -- column: callback_id BIGINT  Callback that ran
@@ -12,7 +12,7 @@
 -- column: take_id BIGINT  Message it was called with
 -- column: request_id BIGINT  Request it was called with
 -- column: is_intra_process BOOLEAN  Called with an intra-process message
--- column: parent_id BIGINT  Run it is nested in
+-- column: parent_id BIGINT  Callback instance that it is nested in
 -- column: depth INTEGER  Nesting depth on its thread, from 1
 -- column: is_loss_affected BOOLEAN  A gap inside or beside it on its thread may hide its end or
 --     what it did

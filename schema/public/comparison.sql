@@ -9,8 +9,8 @@
 --     same interval. What is estimated is how surely these two recordings differ: not how much a
 --     system differs from itself when it is started again.
 -- grain: one row per thing compared and statistic; things that only one run has, too
--- param: what VARCHAR  'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (transport
---     latency)
+-- param: what VARCHAR  'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (from
+--     publication to take)
 -- param: run_a BIGINT  Run that the other one is compared with
 -- param: run_b BIGINT  The other one
 -- param: from_topic VARCHAR = NULL  Topic where paths start; every source when NULL
@@ -43,11 +43,11 @@
 --     statistic: their number by the time, in values, for which they are alike; NULL where they
 --     are alike for so long that it cannot be told
 -- column: b_independent BIGINT  Likewise of run B
--- column: a_share DOUBLE  Share of the roots that reached the end, of the runs of a callback that
---     were seen to end, of the takes whose publication is known; in run A
+-- column: a_share DOUBLE  Share of the roots that reached the end, of the instances of a callback
+--     that were seen to end, of the takes whose publication is known; in run A
 -- column: b_share DOUBLE  Likewise in run B
--- column: a_loss_affected BIGINT  Of those roots, runs or takes, the ones with lost events in their
---     time: what is said of them may be wrong
+-- column: a_loss_affected BIGINT  Of those roots, callback instances or takes, the ones with lost
+--     events in their time: what is said of them may be wrong
 -- column: b_loss_affected BIGINT  Likewise in run B
 -- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
@@ -60,7 +60,7 @@ CREATE OR REPLACE MACRO main.comparison(
     max_depth := 32, max_paths := 1000
 ) AS TABLE
 WITH thing AS (
-    -- A root counts once, however often it arrived; of those at the edge it is not known.
+    -- A root counts once, however often it arrived; of those cut by the recording nothing is known.
     SELECT
         e.run_id,
         p.path AS subject,
@@ -74,7 +74,7 @@ WITH thing AS (
             WHEN wanted_case = 'newest' AND NOT e.is_newest THEN NULL
             ELSE e.latency_ns
         END AS value_ns,
-        e.is_first AND e.status <> 'edge' AS is_unit,
+        e.is_first AND e.status <> 'cut_by_recording' AS is_unit,
         e.status = 'reached' AS is_complete,
         e.is_loss_affected,
         p.is_cut

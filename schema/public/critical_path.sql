@@ -2,10 +2,10 @@
 -- kind: macro
 -- description: What one flow had to wait for, moment by moment: its parts (main.end_to_end_part),
 --     in which waits are replaced by what they waited for, as far as the trace shows. While a
---     message or request waited for its callback, the runs that its executor was busy with or that
---     exclude the callback; in a cache, the timer until it was due, or the message that completed
---     the set, from the callback that published it. The pieces follow each other and add up to the
---     latency of the flow exactly; a part that is negative is one piece.
+--     message or request waited for its callback, the callback instances that its executor was busy
+--     with or that exclude the callback; in a cache, the timer until it was due, or the message
+--     that completed the set, from the callback that published it. The pieces follow each other and
+--     add up to the latency of the flow exactly; a part that is negative is one piece.
 -- grain: one row per piece of the flow
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR  Topic where flows start; every source when NULL
@@ -26,16 +26,17 @@
 -- column: hop BIGINT  Which message of the path it is, or leads to
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
--- column: activity VARCHAR  What happened: the part itself; in waits also 'busy' (the executor ran
---     something else), 'blocked' (a callback ran that excludes the waiting one), 'timer' (not due
+-- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
+--     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
+--     one) or 'undecided' (nothing tells when the message arrived); in a cache 'timer' (not due
 --     yet), 'unpublished' (the message that was waited for had not been published), or a part of
 --     the way of that message
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
--- column: is_certain BOOLEAN  Of 'busy' and 'blocked': what waited was ready by then; false: it may
---     have arrived during this piece. Else NULL
--- column: callback_instance_id BIGINT  Run of the callback that it is, or that it waits for
+-- column: is_certain BOOLEAN  Of 'executor_busy' and 'blocked': what waited was ready by then;
+--     false: it may have arrived during this piece. Else NULL
+-- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
 -- needs: main.end_to_end_part, main.executor_wait, main.executor_interference,
 --     main.callback_instance, main.publication, main.take, derive.executor_busy,
@@ -55,16 +56,17 @@ WITH part AS MATERIALIZED (
     )
 ),
 waiting AS MATERIALIZED (
-    SELECT position, part, from_ns, to_ns, callback_instance_id
+    SELECT position, part, from_ns, to_ns, callback_instance_id, publication_id
     FROM part
-    WHERE part IN ('transport', 'request', 'executor', 'cache')
+    WHERE part IN ('publish_to_take', 'request_to_take', 'take_to_callback', 'cache')
         AND callback_instance_id IS NOT NULL
         AND to_ns > from_ns
 ),
 wait AS MATERIALIZED (
     SELECT
         callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
-        coalesce(earliest_ns, latest_ns) AS earliest_ns, latest_ns, start_ns
+        coalesce(earliest_ns, latest_ns) AS earliest_ns, latest_ns, start_ns,
+        earliest_ns IS NOT NULL AS is_bounded
     FROM main.executor_wait
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
@@ -97,14 +99,15 @@ full_house AS (
 ),
 occupied AS (
     SELECT
-        m.callback_instance_id, 1 AS priority, 'busy' AS activity, m.from_ns, m.to_ns, m.latest_ns,
+        m.callback_instance_id, 1 AS priority, 'executor_busy' AS activity, m.from_ns, m.to_ns,
+        m.latest_ns,
         m.meanwhile_id
     FROM meanwhile AS m
     JOIN derive.executor_size AS s ON m.executor_id = s.executor_id
     WHERE s.thread_count = 1
     UNION ALL
     SELECT
-        m.callback_instance_id, 1, 'busy', greatest(m.from_ns, b.start_ns),
+        m.callback_instance_id, 1, 'executor_busy', greatest(m.from_ns, b.start_ns),
         least(m.to_ns, b.end_ns), m.latest_ns, m.meanwhile_id
     FROM meanwhile AS m
     JOIN full_house AS b
@@ -147,22 +150,36 @@ candidate AS (
     JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
     WHERE w.part = 'cache' AND i.since = 'timer'
     UNION ALL
-    SELECT c.position, 4, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
+    -- Before it is known that the input was there, the executor may have been what it waited for.
+    SELECT
+        w.position, 4, 'undecided', coalesce(c.end_ns, w.from_ns),
+        CASE WHEN i.callback_instance_id IS NULL THEN coalesce(c.taken_ns, w.to_ns)
+            ELSE least(c.taken_ns, i.latest_ns) END,
+        NULL, w.callback_instance_id, coalesce(c.publication_id, w.publication_id)
+    FROM waiting AS w
+    LEFT JOIN completing AS c ON w.position = c.position
+    LEFT JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
+    WHERE (w.part IN ('publish_to_take', 'request_to_take') OR c.position IS NOT NULL)
+        AND i.is_bounded IS DISTINCT FROM true
+    UNION ALL
+    SELECT c.position, 5, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
         NULL, c.publishing_id, c.publication_id
     FROM completing AS c
     JOIN waiting AS w ON c.position = w.position
     UNION ALL
-    SELECT position, 4, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
+    SELECT position, 5, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
     FROM completing
     WHERE publishing_ns IS NOT NULL
     UNION ALL
-    SELECT position, 4, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
+    SELECT position, 5, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
     FROM completing
     UNION ALL
-    SELECT position, 4, 'transport', end_ns, taken_ns, NULL, callback_instance_id, publication_id
+    SELECT
+        position, 5, 'network_or_idle', end_ns, taken_ns, NULL, callback_instance_id,
+        publication_id
     FROM completing
     UNION ALL
-    SELECT c.position, 4, 'executor', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
+    SELECT c.position, 5, 'take_to_callback', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
         c.publication_id
     FROM completing AS c
     JOIN waiting AS w ON c.position = w.position
@@ -213,7 +230,12 @@ named AS (
     SELECT
         p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.hop, p.part,
         p.position, c.from_ns, c.to_ns,
-        coalesce(c.activity, p.part) AS activity,
+        CASE
+            WHEN c.activity IS NOT NULL THEN c.activity
+            WHEN p.part NOT IN ('publish_to_take', 'request_to_take') THEN p.part
+            WHEN p.callback_instance_id IS NULL AND p.duration_ns > 0 THEN 'undecided'
+            ELSE 'network_or_idle'
+        END AS activity,
         CASE WHEN c.priority <= 2 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
         CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id END
             AS callback_instance_id,

@@ -1,10 +1,10 @@
 -- name: main.end_to_end
 -- kind: macro
 -- description: What became of every root of every path. A root that reached the sink has a row per
---     take there; one that did not has a single row that says why. Roots are runs of timers that
---     published, or publications (always with from_event 'publish'); the time window is that of
---     the roots. A message is lost between the first and the last that passed the same step, and
---     at the edge of the trace before and after.
+--     take there; one that did not has a single row that says why. Roots are callback instances of
+--     timers that published, or publications (always with from_event 'publish'); the time window is
+--     that of the roots. A message is lost between the first and the last that passed the same
+--     step, and cut by the recording before and after.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR  Topic where flows start; every source when NULL
@@ -25,7 +25,7 @@
 --     shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: status VARCHAR  'reached', 'superseded', 'lost' or 'edge'
+-- column: status VARCHAR  'reached', 'superseded', 'lost' or 'cut_by_recording'
 -- column: reason VARCHAR  Why it did not arrive: 'not_published', 'superseded',
 --     'callback_not_finished', or a reason of main.stat_delivery for the message that stopped it
 -- column: is_first BOOLEAN  First arrival of the root
@@ -63,7 +63,7 @@ path AS MATERIALIZED (
     FROM chain
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
--- root_key: positive for a callback run, negative for a publication.
+-- root_key: positive for a callback instance, negative for a publication.
 root AS MATERIALIZED (
     SELECT
         r.run_id,
@@ -250,7 +250,7 @@ explained AS (
                 ELSE s.taken_ns < c.first_ns OR s.taken_ns > c.last_ns
             END,
             false
-        ) AS is_edge
+        ) AS is_cut
     FROM stuck AS s
     LEFT JOIN main.publication AS b ON s.publication_id = b.publication_id
     LEFT JOIN delivered AS d
@@ -287,11 +287,11 @@ outcome AS MATERIALIZED (
         NULL,
         NULL,
         CASE
-            WHEN x.is_edge THEN 'edge'
+            WHEN x.is_cut THEN 'cut_by_recording'
             WHEN x.is_cached THEN 'superseded'
             ELSE 'lost'
         END,
-        CASE WHEN x.is_cached AND NOT x.is_edge THEN 'superseded' ELSE x.reason END
+        CASE WHEN x.is_cached AND NOT x.is_cut THEN 'superseded' ELSE x.reason END
     FROM missing AS m
     JOIN explained AS x ON m.path_id = x.path_id AND m.root_key = x.root_key
 ),

@@ -29,15 +29,17 @@
 --     callback at the end
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
---     publishes or calls), 'cache' (from the end of the callback to the run that publishes for it),
+--     publishes or calls), 'cache' (from the end of the callback to the callback instance that
+--     publishes for it),
 --     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'transport' (to the take), 'executor' (from the take to the
---     callback), 'request' (transport of a request), 'service' (from the start of the service
---     callback to what it publishes or calls)
+--     (publishing, layer not known), 'publish_to_take' (from its end to the take: the network, an
+--     idle executor or a busy one, see main.executor_wait), 'take_to_callback', 'request_to_take'
+--     (from the sending of a request), 'service' (from the start of the service callback to what
+--     it publishes or calls)
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
--- column: callback_instance_id BIGINT  Run of the callback that it is, or that it waits for
+-- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
 -- needs: main.end_to_end, main.flow_path, main.publication, main.take, main.callback_instance,
 --     main.request, derive.flow_transport, derive.flow_caller, derive.flow_root,
@@ -81,12 +83,12 @@ transport AS MATERIALIZED (
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
--- What led to each publication: the run of the callback that the flow came in with, and the run
+-- What led to each publication: the callback instance that the flow came in with, and the one
 -- (of a service that it called) that the publication is linked to.
 continuation AS MATERIALIZED (
     SELECT
         l.publication_id, l.take_id, l.subscription_id,
-        l.callback_instance_id AS run_id_in, l.callback_instance_id AS run_id_out, l.kind,
+        l.callback_instance_id AS entered_id, l.callback_instance_id AS left_id, l.kind,
         []::BIGINT[] AS route
     FROM store.link_causal AS l
     WHERE list_contains(runs, l.run_id)
@@ -163,13 +165,13 @@ entered AS MATERIALIZED (
 cause AS MATERIALIZED (
     SELECT
         e.flow_id, e.hop, e.publication_id, e.callback_instance_id,
-        c.run_id_out AS publishing_id, c.kind
+        c.left_id AS publishing_id, c.kind
     FROM entered AS e
     JOIN continuation AS c
-        ON e.publication_id = c.publication_id AND e.callback_instance_id = c.run_id_in
+        ON e.publication_id = c.publication_id AND e.callback_instance_id = c.entered_id
     QUALIFY row_number() OVER (
         PARTITION BY e.flow_id, e.hop
-        ORDER BY c.run_id_out <> c.run_id_in, c.kind <> 'direct', c.run_id_out
+        ORDER BY c.left_id <> c.entered_id, c.kind <> 'direct', c.left_id
     ) = 1
 ),
 -- Calls of services between the two, from the last one back to the first.
@@ -232,11 +234,11 @@ moment AS (
     LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.take AS t ON e.previous_take_id = t.take_id
     UNION ALL
-    SELECT flow_id, hop, 2, -3 * level, 'request', sent_ns, callback_instance_id, NULL
+    SELECT flow_id, hop, 2, -3 * level, 'request_to_take', sent_ns, callback_instance_id, NULL
     FROM call
     WHERE sent_ns IS NOT NULL
     UNION ALL
-    SELECT flow_id, hop, 2, 1 - 3 * level, 'executor', taken_ns, callback_instance_id, NULL
+    SELECT flow_id, hop, 2, 1 - 3 * level, 'take_to_callback', taken_ns, callback_instance_id, NULL
     FROM call
     WHERE taken_ns IS NOT NULL
     UNION ALL
@@ -264,10 +266,12 @@ moment AS (
     SELECT flow_id, hop, 6, layer.rank, layer.part, layer.at_ns, NULL, publication_id
     FROM layer
     UNION ALL
-    SELECT flow_id, hop, 7, 0, 'transport', end_ns, callback_instance_id, publication_id
+    SELECT flow_id, hop, 7, 0, 'publish_to_take', end_ns, callback_instance_id, publication_id
     FROM message
     UNION ALL
-    SELECT m.flow_id, m.hop, 8, 0, 'executor', m.taken_ns, m.callback_instance_id, m.publication_id
+    SELECT
+        m.flow_id, m.hop, 8, 0, 'take_to_callback', m.taken_ns, m.callback_instance_id,
+        m.publication_id
     FROM message AS m
     JOIN flow AS f ON m.flow_id = f.flow_id
     JOIN path AS p ON f.path_id = p.path_id

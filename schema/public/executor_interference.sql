@@ -1,11 +1,11 @@
 -- name: main.executor_interference
--- description: What the threads of its executor ran while a run of a callback waited. Overlaps of
+-- description: What the threads of its executor ran while a callback instance waited. Overlaps of
 --     one thread add up to the time for which it was busy; those of several threads run side by
 --     side.
--- grain: one row per waiting run and run of a callback that its executor was busy with meanwhile
+-- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
 -- column: run_id BIGINT  Run that the row belongs to
--- column: callback_instance_id BIGINT  Run of a callback that waited
--- column: meanwhile_id BIGINT  Run of a callback that the executor was busy with
+-- column: callback_instance_id BIGINT  Callback instance that waited
+-- column: meanwhile_id BIGINT  Callback instance that the executor was busy with
 -- column: executor_id BIGINT  Their executor
 -- column: thread_id BIGINT  Thread that was busy
 -- column: overlap_ns BIGINT [ns]  From earliest_ns of the wait on (latest_ns where that is unknown)
@@ -29,7 +29,7 @@ run AS (
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
--- Runs of a thread are in order, so those that overlap a wait are neighbours: from the one that
+-- What a thread runs is in order, so those that overlap a wait are neighbours: from the one that
 -- was under way when it began to the last one that began before it ended.
 bounded AS (
     SELECT

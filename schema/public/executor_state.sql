@@ -8,7 +8,7 @@
 -- column: start_ns BIGINT [epoch ns]  Executor event that began it
 -- column: end_ns BIGINT [epoch ns]  Next executor event of the thread; NULL: not known
 --     (the last, or a gap follows)
--- column: callback_instance_id BIGINT  First callback run in it
+-- column: callback_instance_id BIGINT  First callback instance in it
 -- needs: store.executor_state, store.thread, derive.corrected_ns, derive.process_clock
 SELECT
     self.run_id,

@@ -1,13 +1,13 @@
 -- name: main.executor_wait
--- description: How long runs of callbacks waited in their executor, and what for. When exactly an
+-- description: How long callback instances waited in their executor, and what for. When exactly an
 --     input arrived is not in a trace, so that time is given as bounds: it became ready between
 --     earliest_ns and latest_ns. It could not start (busy) while all threads of the executor ran
 --     callbacks, or one ran that it excludes; what else passed was the network, an idle executor,
---     or its own overhead. Runs nested in others are left out: these are served by an executor
---     inside of a callback.
--- grain: one row per run of a callback that is not nested in another
+--     or its own overhead. Callback instances nested in others are left out: these are served by an
+--     executor inside of a callback.
+-- grain: one row per callback instance that is not nested in another
 -- column: run_id BIGINT  Run that the row belongs to
--- column: callback_instance_id BIGINT  Run of a callback that waited
+-- column: callback_instance_id BIGINT  Callback instance that waited
 -- column: executor_id BIGINT  Its executor
 -- column: thread_id BIGINT  Thread that ran it
 -- column: callback_id BIGINT  Its callback
@@ -19,8 +19,8 @@
 -- column: latest_ns BIGINT [epoch ns]  It was ready by then
 -- column: start_ns BIGINT [epoch ns]  callback_start
 -- column: wait_ns BIGINT [ns]  From origin_ns to start_ns
--- column: busy_min_ns BIGINT [ns]  Executor busy with other runs from latest_ns on
--- column: busy_max_ns BIGINT [ns]  Executor busy with other runs from earliest_ns on
+-- column: busy_min_ns BIGINT [ns]  Executor busy with other callbacks from latest_ns on
+-- column: busy_max_ns BIGINT [ns]  Executor busy with other callbacks from earliest_ns on
 -- column: blocked_max_ns BIGINT [ns]  Part of busy_max_ns for which a thread was free, but a
 --     callback ran that never runs beside this one
 -- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known

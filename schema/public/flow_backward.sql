@@ -1,7 +1,7 @@
 -- name: main.flow_backward
 -- kind: macro
--- description: Everything that a publication, take, callback run, request or response is caused
---     by, directly or through others, itself included.
+-- description: Everything that a publication, take, callback instance, request or response is
+--     caused by, directly or through others, itself included.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'

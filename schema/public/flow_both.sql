@@ -1,8 +1,8 @@
 -- name: main.flow_both
 -- kind: macro
--- description: The flow of one message: everything that a publication, take, callback run, request
---     or response causes and is caused by, itself included. What its causes lead to besides is
---     left out.
+-- description: The flow of one message: everything that a publication, take, callback instance,
+--     request or response causes and is caused by, itself included. What its causes lead to besides
+--     is left out.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'

@@ -1,7 +1,7 @@
 -- name: main.flow_component
 -- kind: macro
--- description: Everything that a publication, take, callback run, request or response is connected
---     with in any direction, itself included.
+-- description: Everything that a publication, take, callback instance, request or response is
+--     connected with in any direction, itself included.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'

@@ -10,9 +10,9 @@
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' (from a request to its response),
 --     or the kind of the causal link
 -- column: from_ns BIGINT [epoch ns]  End of the publication, the take (also of a request), or start
---     of the callback run
--- column: to_ns BIGINT [epoch ns]  Take, start of the callback run or publication, or sending of
---     the request or response
+--     of the callback instance
+-- column: to_ns BIGINT [epoch ns]  Take, start of the callback instance or publication, or sending
+--     of the request or response
 -- needs: main.link_transport, derive.flow_cause, main.publication, main.take,
 --     main.callback_instance, main.link_request, main.link_response, main.request, main.response
 SELECT

@@ -1,6 +1,6 @@
 -- name: main.flow_forward
 -- kind: macro
--- description: Everything that a publication, take, callback run, request or response causes,
+-- description: Everything that a publication, take, callback instance, request or response causes,
 --     directly or through others, itself included.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or

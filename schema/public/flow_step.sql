@@ -1,6 +1,6 @@
 -- name: main.flow_step
 -- kind: macro
--- description: The picture of one message: what a publication, take, callback run, request or
+-- description: The picture of one message: what a publication, take, callback instance, request or
 --     response causes, what it is caused by, or both, with times, names, and what is missing where
 --     a branch ends. Vertices nearest to the start come first where a limit cuts the flow.
 -- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
@@ -24,8 +24,8 @@
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request', 'response', or
 --     'subscription' where the message was not taken
 -- column: id BIGINT  Identity of the vertex
--- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback run; the take; when the
---     request or response was sent (taken, where that is all there is)
+-- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback instance; the take; when
+--     the request or response was sent (taken, where that is all there is)
 -- column: end_ns BIGINT [epoch ns]  Its end; when the request or response was taken
 -- column: node VARCHAR  Node, or process in brackets; of requests and responses that of the client,
 --     ? where it is not known
@@ -35,8 +35,8 @@
 -- column: thread VARCHAR  Name and id of the thread
 -- column: host VARCHAR  Machine or container
 -- column: missing VARCHAR  What the trace does not show here: 'publication' that was taken, 'take'
---     of the message, 'callback' it was taken for, 'sending' of the request or response,
---     'response' to the request, or the 'end' of the callback run; 'copy': nothing is missing, the
+--     of the message, 'callback' it was taken for, 'sending' of the request or response, 'response'
+--     to the request, or the 'end' of the callback instance; 'copy': nothing is missing, the
 --     message came through a ring buffer and this is its copy from the middleware
 -- column: reason VARCHAR  Why it is missing, as far as known
 -- column: cut_count BIGINT  Links that lead on from here beyond the limits

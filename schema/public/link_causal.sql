@@ -1,6 +1,6 @@
 -- name: main.link_causal
 -- description: What led to each publication.
--- grain: one row per run of a callback, or take outside of any, and publication that it led to
+-- grain: one row per callback instance, or take outside of any, and publication that it led to
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: callback_instance_id BIGINT  Cause; NULL: the take itself
 -- column: take_id BIGINT  Message that led to it; NULL: none (timers, services)
@@ -9,8 +9,8 @@
 -- column: annotation_id BIGINT  Annotation that declares it; NULL for direct links
 -- column: wait_ns BIGINT [ns]  From the end of the callback, or the take, to the publication; 0 for
 --     direct links
--- column: candidate_count BIGINT  Runs that it could have been; of an input of an indirect link
---     that had no message when the publishing run began, one more
+-- column: candidate_count BIGINT  Callback instances that it could have been; of an input of an
+--     indirect link that had no message when the publishing one began, one more
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
 -- needs: store.link_causal, main.callback_instance, main.publication, main.take
 SELECT

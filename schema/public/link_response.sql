@@ -1,6 +1,6 @@
 -- name: main.link_response
--- description: Responses and the callback run that sent them.
--- grain: one row per response and the callback run that sent it
+-- description: Responses and the callback instance that sent them.
+-- grain: one row per response and the callback instance that sent it
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: response_id BIGINT  Effect
 -- column: callback_instance_id BIGINT  Cause

@@ -10,8 +10,8 @@
 -- column: publisher_id BIGINT  Its publisher
 -- column: subscription_id BIGINT  Who should have taken it
 -- column: take_id BIGINT  Where it was taken; NULL: not, or not known
--- column: status VARCHAR  'delivered', 'skipped' (newer messages took its place), 'lost', 'edge'
---     (before or after the two were connected, as far as traced) or 'unknown'
+-- column: status VARCHAR  'delivered', 'skipped' (newer messages took its place), 'lost',
+--     'unconnected' (before or after the two were connected, as far as traced) or 'unknown'
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',
 --     'receiver_gap', 'take_failed', 'before_discovery', 'not_delivered', 'overwritten',
 --     'lost_in_transport', 'pending_at_end' or 'unknown', the first that holds; NULL: delivered

@@ -1,7 +1,8 @@
 -- name: derive.annotation_firing
 -- description: Publications by the outputs of annotations, with how many inputs they have a message
---     of: through an indirect link, or the message that the publishing run was called with. Where
---     all inputs have to come together (partial_sync), only what the run of an input publishes.
+--     of: through an indirect link, or the message that the publishing callback instance was called
+--     with. Where all inputs have to come together (partial_sync), only what the callback of an
+--     input publishes.
 -- grain: one row per annotation and publication that it applies to
 -- needs: store.annotation, store.annotation_input, store.annotation_output, store.publication,
 --     store.link_causal, store.callback_instance, store.callback

@@ -5,7 +5,7 @@
 --     have found it (unless that callback ran in between: then more of its input may have
 --     waited). Ready at the latest when the executor last learned what is ready before it picked
 --     this callback.
--- grain: one row per run of a callback that is not nested in another
+-- grain: one row per callback instance that is not nested in another
 -- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
 --     store.executor_thread, store.executor_state, store.thread_break
 WITH release AS (

@@ -1,11 +1,11 @@
 -- name: derive.callback_release
--- description: Since when a run of a callback can have been due (its release): a message since the
+-- description: Since when a callback instance can have been due (its release): a message since the
 --     end of its publication, where the two clocks can be compared, else since its stamp; a request
---     since it was sent; a timer since the first instant after its previous run that is a whole
+--     since it was sent; a timer since the first instant after its previous call that is a whole
 --     number of periods after its creation (unless it ran before that: it was reset). And by when
 --     it was due for certain. Times are those of the executor's clock, those of others brought
 --     to it.
--- grain: one row per run of a callback that is not nested in another
+-- grain: one row per callback instance that is not nested in another
 -- needs: store.callback_instance, store.executor_thread, store.callback, store.timer,
 --     store.subscription, store.take, store.link_transport, store.publication, store.request,
 --     store.thread, derive.clock_comparable, derive.process_clock, derive.corrected_ns

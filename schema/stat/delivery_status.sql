@@ -8,6 +8,6 @@ CASE
     WHEN reason IN ('take_failed', 'not_delivered', 'lost_in_transport') THEN 'lost'
     WHEN reason IN (
         'before_subscription', 'subscription_ended', 'before_discovery', 'pending_at_end'
-    ) THEN 'edge'
+    ) THEN 'unconnected'
     ELSE 'unknown'
 END

@@ -1,9 +1,9 @@
 -- name: derive.executor_run
--- description: The runs of callbacks that occupied threads of executors, numbered on each thread in
---     order of time. Runs nested in others are part of these. They never overlap on one thread,
---     which is what makes sums over any stretch of time two look-ups. Times are those of the
---     executor's clock.
--- grain: one row per run of a callback that is not nested in another
+-- description: The callback instances that occupied threads of executors, numbered on each thread
+--     in order of time. Callback instances nested in others are part of these. They never overlap
+--     on one thread, which is what makes sums over any stretch of time two look-ups. Times are
+--     those of the executor's clock.
+-- grain: one row per callback instance that is not nested in another
 -- needs: store.callback_instance, store.executor_thread
 SELECT
     i.run_id,

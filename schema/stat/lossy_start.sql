@@ -1,6 +1,6 @@
 -- name: derive.lossy_start
 -- description: Processes of which events may have been lost while they were created: a gap other
---     than a pause lies before the first run of a callback, or before the process was seen at all.
+--     than a pause lies before the first callback instance, or before the process was seen at all.
 -- grain: one row per process
 -- needs: derive.process_presence, store.callback_instance, store.loss_interval, store.trace
 WITH recording AS (

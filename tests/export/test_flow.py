@@ -39,16 +39,43 @@ def test_a_chain_goes_straight_down_and_what_was_asked_for_is_marked(robot: Data
         "publication 2, /detections; times count from 1970-01-01T00:00:00.000000100Z",
         "  +0 ns  /camera  Timer(100 ms)  ran 90 ns  thread thread 1  Camera::tick",
         " +10 ns  publishes /image  in 10 ns",
-        "+120 ns  /detector  Subscription(/image)  transport 80 ns  wait 20 ns  ran 60 ns"
-        "  thread thread 1  Detector::on_image",
+        "+120 ns  /detector  Subscription(/image)  publish to take 80 ns  take to callback 20 ns"
+        "  ran 60 ns  thread thread 1  Detector::on_image",
         "+150 ns  publishes /detections  in 10 ns  ◀",
         "+220 ns  /tracker  Subscription(/detections)"
-        "  transport 40 ns (events were lost here)  wait 20 ns  ran NA: never seen to end"
-        "  thread thread 1  Tracker::on_detections",
+        "  publish to take 40 ns (events were lost here)  take to callback 20 ns"
+        "  ran NA: never seen to end  thread thread 1  Tracker::on_detections",
         "+250 ns  publishes /tracks  in 10 ns",
         "├──      NA  /recorder  Subscription(/tracks)  not taken: lost_in_transport",
         "└──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
     ]
+
+
+def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path) -> None:
+    """The numbers are worked out by hand in the golden cases of executor-wait."""
+    path = tmp_path / "busy.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
+        fill(connection, CASES.parents[2] / "query/cases/path-breakdown/busy_executor/input")
+    with Database(path) as database:
+        lines = {}
+        for topic in ("/a", "/b", "/c"):
+            flow = database.flow(topic)
+            lines[topic] = str(flow).splitlines()[-1].split("  ran ")[0].split(f"({topic})  ")[1]
+            bounds = [
+                (node["busy_min_ns"], node["busy_max_ns"])
+                for node in flow.to_dict()["nodes"]
+                if node["kind"] == "callback_instance"
+            ]
+            if topic == "/c":
+                assert bounds == [(9_700_000, 29_600_000)]
+    assert lines == {
+        "/a": "publish to take 14.150 ms  take to callback 50.000 µs",
+        "/b": "publish to take 35.250 ms  executor busy up to 29.700 ms"
+        "  take to callback 50.000 µs",
+        "/c": "publish to take 30.350 ms  executor busy 9.700 ms to 29.600 ms"
+        "  take to callback 50.000 µs",
+    }
 
 
 @pytest.mark.parametrize("reason", ["receiver_gap", "unknown"])
@@ -79,19 +106,19 @@ def test_branches_are_indented_and_nothing_is_drawn_twice(robot: Database) -> No
     assert str(robot.flow("/image", direction="forward")).splitlines() == [
         "publication 1, /image; times count from 1970-01-01T00:00:00.000000110Z",
         "  +0 ns  /camera  publishes /image  in 10 ns  thread thread 1",
-        "├──  +95 ns  /recorder  Subscription(/image)  transport 85 ns"
+        "├──  +95 ns  /recorder  Subscription(/image)  publish to take 85 ns"
         "  NA: no callback was seen  thread thread 1",
-        "├── +110 ns  /detector  Subscription(/image)  transport 80 ns  wait 20 ns  ran 60 ns"
-        "  thread thread 1  Detector::on_image",
+        "├── +110 ns  /detector  Subscription(/image)  publish to take 80 ns"
+        "  take to callback 20 ns  ran 60 ns  thread thread 1  Detector::on_image",
         "│   +140 ns  publishes /detections  in 10 ns",
         "│   +210 ns  /tracker  Subscription(/detections)"
-        "  transport 40 ns (events were lost here)  wait 20 ns  ran NA: never seen to end"
-        "  thread thread 1  Tracker::on_detections",
+        "  publish to take 40 ns (events were lost here)  take to callback 20 ns"
+        "  ran NA: never seen to end  thread thread 1  Tracker::on_detections",
         "│   +240 ns  [1] publishes /tracks  in 10 ns",
         "│   ├──      NA  /recorder  Subscription(/tracks)  not taken: lost_in_transport",
         "│   └──      NA  /camera  Subscription(/tracks)  not taken: before_subscription",
-        "└── +120 ns  /tracker  Subscription(/image)  transport 90 ns (one of 2 candidates)"
-        "  wait 20 ns  ran 10 ns  thread thread 1  Tracker::on_image",
+        "└── +120 ns  /tracker  Subscription(/image)  publish to take 90 ns (one of 2 candidates)"
+        "  take to callback 20 ns  ran 10 ns  thread thread 1  Tracker::on_image",
         "    +240 ns  see [1]  publishes /tracks",
     ]
 
@@ -105,24 +132,26 @@ def test_calls_of_services(empty_database: Path, tmp_path: Path) -> None:
     assert str(flow).splitlines() == [
         "callback_instance 5, Timer(2 ms); times count from 1970-01-01T00:00:00.000000500Z",
         f"  +0 ns  /caller  Timer(2 ms)  ran 30 ns{thread}  call  ◀",
-        "├──  +10 ns  requests /add  transport 80 ns",
-        f"│   +100 ns  /server  Service(/add)  wait 10 ns  ran 50 ns{thread}  add",
+        "├──  +10 ns  requests /add  sending to take 80 ns",
+        f"│   +100 ns  /server  Service(/add)  take to callback 10 ns  ran 50 ns{thread}  add",
         "│   ├── +120 ns  publishes /result  in 5 ns",
-        "│   │   +200 ns  /sink  Subscription(/result)  transport 65 ns  wait 10 ns  ran 20 ns"
+        "│   │   +200 ns  /sink  Subscription(/result)  publish to take 65 ns"
+        "  take to callback 10 ns  ran 20 ns"
         f"{thread}  on_result",
         f"│   └── +152 ns  /caller  Client(/add)  service 2 ns  NA: it was not taken{thread}",
-        "├──  +20 ns  requests /sub  transport 40 ns  NA: no callback was seen",
-        f"│    +70 ns  /caller  Client(/sub)  service 10 ns  transport 10 ns{thread}",
-        "└──  +26 ns  requests /sub  transport 40 ns  NA: no callback was seen",
+        "├──  +20 ns  requests /sub  sending to take 40 ns  NA: no callback was seen",
+        f"│    +70 ns  /caller  Client(/sub)  service 10 ns  sending to take 10 ns{thread}",
+        "└──  +26 ns  requests /sub  sending to take 40 ns  NA: no callback was seen",
     ]
     assert flow.notes == [
         "1 message on topics and services of ROS itself left out; --internal shows them"
     ]
     assert answered[1:5] == [
-        f"  +0 ns  /caller  Client(/add)  service 2 ns  transport 18 ns{thread}",
-        f" -52 ns  /server  Service(/add)  wait 10 ns  ran 50 ns{thread}  add",
-        "-142 ns  requests /add  transport 80 ns",
-        "-152 ns  /caller  Subscription(/tick)  transport 78 ns  wait 10 ns  ran 30 ns"
+        f"  +0 ns  /caller  Client(/add)  service 2 ns  sending to take 18 ns{thread}",
+        f" -52 ns  /server  Service(/add)  take to callback 10 ns  ran 50 ns{thread}  add",
+        "-142 ns  requests /add  sending to take 80 ns",
+        "-152 ns  /caller  Subscription(/tick)  publish to take 78 ns  take to callback 10 ns"
+        "  ran 30 ns"
         f"{thread}  on_tick",
     ]
     assert unknown[1] == (f"  +0 ns  ?  requests /add  NA: its sending was not seen{thread}")

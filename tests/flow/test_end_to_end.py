@@ -142,13 +142,13 @@ def test_what_became_of_every_root(built: Analysis, chain: Chain) -> None:
         begin, end = times[f"{root} start"], times[f"{sink} end"]
         expected.append(("callback_instance", begin, end, end - begin, "reached", None))
     for root, status, reason in (
-        ("A", "edge", "before_discovery"),
+        ("A", "cut_by_recording", "before_discovery"),
         ("D", "lost", "lost_in_transport"),
         ("E", "lost", "not_published"),
         ("F", "lost", "lost_in_transport"),
         ("G", "lost", "callback_not_finished"),
-        ("I", "edge", "pending_at_end"),
-        ("J", "edge", "pending_at_end"),
+        ("I", "cut_by_recording", "pending_at_end"),
+        ("J", "cut_by_recording", "pending_at_end"),
     ):
         begin = times[f"{root} start"]
         expected.append(("callback_instance", begin, None, None, status, reason))
@@ -228,7 +228,7 @@ def test_from_the_middle_the_publication_is_the_root(built: Analysis, chain: Cha
     expected += [
         ("publication", at["16 published"], None, "lost"),
         ("publication", at["17 published"], None, "lost"),
-        ("publication", at["19 published"], None, "edge"),
+        ("publication", at["19 published"], None, "cut_by_recording"),
     ]
     assert sorted(rows, key=str) == sorted(expected, key=str)
 
@@ -241,9 +241,9 @@ def test_to_the_middle_the_relay_is_the_sink(built: Analysis, chain: Chain) -> N
         (at[f"{root} start"], at[f"{message} end"], "reached") for root, message in heard
     ]
     expected += [
-        (at["A start"], None, "edge"),
+        (at["A start"], None, "cut_by_recording"),
         (at["D start"], None, "lost"),
-        (at["J start"], None, "edge"),
+        (at["J start"], None, "cut_by_recording"),
     ]
     assert sorted(rows, key=str) == sorted(expected, key=str)
 
@@ -277,8 +277,10 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     result = run_query(built.connection, load_query("e2e-latency"), {"case": case})
     (row,) = result.to_arrow().to_pylist()
     assert row["path"] == "/talker → /a → /relay → /b → /sink"
-    counts = {name: row[name] for name in ("roots", "reached", "superseded", "lost", "edge")}
-    assert counts == {"roots": 10, "reached": 3, "superseded": 0, "lost": 4, "edge": 3}
+    counts = {
+        name: row[name] for name in ("roots", "reached", "superseded", "lost", "cut_by_recording")
+    }
+    assert counts == {"roots": 10, "reached": 3, "superseded": 0, "lost": 4, "cut_by_recording": 3}
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])
     assert row["median_ns"] == latencies[(len(latencies) - 1) // 2]

@@ -179,7 +179,7 @@ def test_completeness_adds_up(analysis: Analysis, seed: int, deleted: float) -> 
         (path, roots[publisher]) for path, publisher in paths
     )
     for row in result:
-        parts = row["reached"] + row["superseded"] + row["lost"] + row["edge"]
+        parts = row["reached"] + row["superseded"] + row["lost"] + row["cut_by_recording"]
         assert row["roots"] == parts, row
         assert row["pairs"] == row["reached"]
         assert (row["min_ns"] is None) == (row["reached"] == 0)
@@ -208,7 +208,7 @@ def test_random_systems_are_worth_it(analysis: Analysis) -> None:
             "SELECT count(*) FROM callback_instance WHERE end_ns IS NULL"
         )
     assert max(depths) >= 2
-    assert {"reached", "lost", "edge"} <= statuses
+    assert {"reached", "lost", "cut_by_recording"} <= statuses
     assert open_callbacks
 
 

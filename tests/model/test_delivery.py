@@ -80,7 +80,7 @@ def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None
     pair.send(2)
     pair.hear(2)
     assert analyse(pair).rows(REASONS) == [
-        (1, "edge", "before_subscription"),
+        (1, "unconnected", "before_subscription"),
         (2, "delivered", None),
     ]
 
@@ -129,8 +129,8 @@ def test_a_subscription_ends_where_its_handle_is_used_again(pair: Pair, analyse:
     pair.hear(2)
     assert analyse(pair).rows(REASONS) == [
         (1, "delivered", None),
-        (1, "edge", "before_subscription"),
-        (2, "edge", "subscription_ended"),
+        (1, "unconnected", "before_subscription"),
+        (2, "unconnected", "subscription_ended"),
         (2, "delivered", None),
     ]
 

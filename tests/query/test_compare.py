@@ -219,8 +219,8 @@ def test_lost_events_are_told(fresh_database: Path) -> None:
     (row, *_) = comparison.result.to_arrow().to_pylist()
     assert (row["a_loss_affected"], row["b_loss_affected"]) == (0, 5)
     assert (
-        "run B, after (2), lost 30 events: 10 of its callback runs have a gap in their time, others"
-        " may be missing altogether"
+        "run B, after (2), lost 30 events: 10 of its callback instances have a gap in their time,"
+        " others may be missing altogether"
     ) in comparison.result.notes
 
 

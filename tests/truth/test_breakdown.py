@@ -126,6 +126,33 @@ def test_pieces_of_the_critical_path_add_up(
             assert pieces[0][1] == longest
 
 
+@pytest.mark.parametrize("name", ["tracecompass-ros2", "services", "periodic_async_jazzy24"])
+def test_the_critical_path_and_the_breakdown_agree(
+    recordings: Callable[[str], Ingested], name: str
+) -> None:
+    """Of the longest flow: what its executors were busy with, and what is not decided."""
+    con = recordings(name).connection
+    arguments = f"[1], NULL, NULL, 'callback_start', 'callback_end', {WINDOW}"
+    ((take_id, from_piece, certain, doubtful, idle),) = con.execute(
+        "SELECT any_value(take_id), sum(duration_ns), "
+        "sum(CASE WHEN activity IN ('executor_busy', 'blocked') AND is_certain "
+        "THEN duration_ns ELSE 0 END), "
+        "sum(CASE WHEN activity = 'undecided' OR NOT is_certain THEN duration_ns ELSE 0 END), "
+        "sum(CASE WHEN activity = 'network_or_idle' THEN duration_ns ELSE 0 END) "
+        f"FROM critical_path({arguments}) WHERE part IN ('publish_to_take', 'request_to_take')"
+    ).fetchall()
+    ((whole, busy_min, busy_max),) = con.execute(
+        "SELECT sum(duration_ns), sum(coalesce(busy_min_ns, 0)), "
+        "sum(coalesce(busy_max_ns, duration_ns)) "
+        f"FROM end_to_end_part({arguments}, 'longest', sink_take_id := ?) "
+        "LEFT JOIN executor_wait USING (callback_instance_id) "
+        "WHERE part IN ('publish_to_take', 'request_to_take')",
+        [take_id],
+    ).fetchall()
+    assert from_piece == whole == certain + doubtful + idle
+    assert (certain, certain + doubtful) == (busy_min, busy_max)
+
+
 def test_the_wait_for_a_timer_is_shown_as_such(recordings: Callable[[str], Ingested]) -> None:
     """Periods of 8 ms, inputs every 5 and 12: the longest flow waited for the timer."""
     (row,) = (

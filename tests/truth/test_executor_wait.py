@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import pytest
 from ingested import ingest_one
 
+from msgflow.query.catalogue import load_query
+from msgflow.query.run import run_query
 from msgflow.sim import executor_thread, simulate
 from msgflow.sim.callbacks import TimerObject
 from msgflow.sim.transport import Middleware
@@ -41,6 +44,48 @@ ASOF JOIN due AS d
     AND c.callback_handle = d.callback
     AND w.start_ns >= d.called_ns
 WHERE c.kind = 'timer'
+"""
+# What executors of one thread ran between the arrival of a message and its take, by what msgflow
+# says of the two; sums over the flows of each hop of each path.
+_BUSY = """
+WITH part AS (
+    SELECT e.path_id, e.hop, e.flow_id, e.from_ns, e.to_ns, a.arrived_ns, i.thread_id
+    FROM end_to_end_part(
+        [1], NULL, NULL, 'callback_start', 'callback_end', -9223372036854775807,
+        9223372036854775807, 'first'
+    ) AS e
+    JOIN callback_instance AS i USING (callback_instance_id)
+    JOIN take AS t ON i.take_id = t.take_id
+    JOIN subscription AS s ON t.subscription_id = s.subscription_id
+    JOIN process AS p ON i.process_id = p.process_id
+    JOIN host AS h ON p.host_id = h.host_id
+    JOIN executor_thread AS x ON i.thread_id = x.thread_id
+    LEFT JOIN arrival AS a
+        ON h.hostname = a.hostname
+        AND p.pid = a.pid
+        AND s.rmw_handle = a.handle
+        AND t.source_timestamp_ns = a.stamp_ns
+    WHERE e.part = 'publish_to_take'
+        AND x.executor_id IN (
+            SELECT executor_id FROM executor_thread GROUP BY executor_id HAVING count(*) = 1
+        )
+),
+meanwhile AS (
+    SELECT
+        p.path_id, p.hop, p.flow_id,
+        sum(least(r.end_ns, p.to_ns) - greatest(r.start_ns, p.arrived_ns)) AS busy_ns
+    FROM part AS p
+    JOIN callback_instance AS r
+        ON p.thread_id = r.thread_id AND r.start_ns < p.to_ns AND r.end_ns > p.arrived_ns
+    WHERE r.parent_id IS NULL
+    GROUP BY ALL
+)
+SELECT
+    path_id, hop, sum(to_ns - from_ns)::BIGINT, sum(coalesce(busy_ns, 0))::BIGINT,
+    count(*) = count(arrived_ns)
+FROM part
+LEFT JOIN meanwhile USING (path_id, hop, flow_id)
+GROUP BY path_id, hop
 """
 
 
@@ -99,3 +144,33 @@ def test_inputs_arrive_within_their_bounds(
     for earliest, origin, moment, latest in due:
         assert origin is None or (earliest <= origin == moment <= latest)
     assert sum(origin is None for _, origin, _, _ in due) <= 10
+
+
+@pytest.mark.parametrize("name", ["demo", "executors", "overload"])
+def test_the_breakdown_bounds_how_long_executors_were_busy(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What passed up to the takes is the sum of its three parts."""
+    witness = Witness(monkeypatch)
+    simulation = simulate(name, tmp_path / name, factor=_LENGTH)
+    connection = ingest_one(simulation.directory, tmp_path / "run.duckdb").connection
+    connection.execute(
+        "CREATE TEMP TABLE arrival "
+        "(hostname VARCHAR, pid INTEGER, handle UBIGINT, stamp_ns BIGINT, arrived_ns BIGINT)"
+    )
+    connection.executemany("INSERT INTO arrival VALUES (?, ?, ?, ?, ?)", witness.arrivals)
+    true = connection.execute(_BUSY).fetchall()
+    parts: dict[tuple[int, int, str], int] = defaultdict(int)
+    for row in run_query(connection, load_query("path-breakdown"), {}).to_arrow().to_pylist():
+        parts[row["path_id"], row["hop"], row["part"]] += row["total_ns"]
+    connection.close()
+    ever_busy = 0
+    for path, hop, whole, busy, is_known in true:
+        idle, undecided, certain = (
+            parts[path, hop, part] for part in ("network_or_idle", "undecided", "executor_busy")
+        )
+        assert idle + undecided + certain == whole
+        if is_known:
+            assert certain <= busy <= certain + undecided
+            ever_busy += busy
+    assert ever_busy > 0

@@ -81,7 +81,12 @@ def trace(session: Session) -> Iterator[Ingested]:
 def test_the_two_commands(session: Session) -> None:
     """The answer, and not a byte of the trace changes."""
     (row,) = [row for row in session.answer if row["roots"] == 2_031]
-    assert (row["reached"], row["edge"], row["lost"], row["superseded"]) == (1_986, 45, 0, 0)
+    assert (row["reached"], row["cut_by_recording"], row["lost"], row["superseded"]) == (
+        1_986,
+        45,
+        0,
+        0,
+    )
     assert (row["min_ns"], row["median_ns"], row["max_ns"]) == (131_601, 562_411, 45_601_667)
     assert session.after == session.before
 
@@ -171,12 +176,12 @@ def test_flows(trace: Ingested) -> None:
     """2,031 roots: what became of each, and how long those took that arrived."""
     assert trace.rows(
         f"SELECT e.status, count(*) FROM {FLOWS} WHERE {MAIN_PATH} GROUP BY ALL ORDER BY ALL"
-    ) == [("edge", 45), ("reached", 1_986)]
+    ) == [("cut_by_recording", 45), ("reached", 1_986)]
     assert trace.rows(
         f"SELECT count(*) FILTER (e.root_ns < first), count(*) FILTER (e.root_ns > last) "
         f"FROM (SELECT *, min(root_ns) FILTER (status = 'reached') OVER () AS first, "
         f"max(root_ns) FILTER (status = 'reached') OVER () AS last "
-        f"FROM {FLOWS} WHERE {MAIN_PATH}) AS e WHERE e.status = 'edge'"
+        f"FROM {FLOWS} WHERE {MAIN_PATH}) AS e WHERE e.status = 'cut_by_recording'"
     ) == [(5, 40)]
     assert trace.rows(
         "SELECT min(latency_ns), quantile_disc(latency_ns, 0.5), max(latency_ns) "

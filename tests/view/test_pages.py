@@ -46,7 +46,7 @@ def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, r
     page.go("#/paths")
     latency.sort(key=lambda row: -(row["p99_ns"] or 0))
     durations = ("median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns")
-    counts = ("roots", "reached", "superseded", "lost", "edge", "loss_affected")
+    counts = ("roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected")
     wanted = [
         [
             row["path"],

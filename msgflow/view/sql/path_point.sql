@@ -13,7 +13,7 @@
 -- column: latency BIGINT [ns]  Latency; of the slowest in the piece
 -- column: median BIGINT [ns]  Median of the piece; the latency itself where flows are one by one
 -- column: count BIGINT  Flows in the piece
--- column: missing BIGINT  Of these, flows that did not arrive, those at the edge left out
+-- column: missing BIGINT  Of these, flows that did not arrive, those cut by the recording left out
 WITH numbered AS (
     SELECT
         root_at, root_kind, root_id, take_id, latency, status,

@@ -7,7 +7,7 @@ import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 
-const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (transport)" };
+const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (from publication to take)" };
 
 export class ComparePage {
   constructor(app, root) {

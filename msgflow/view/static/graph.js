@@ -37,10 +37,10 @@ export class GraphPage {
       this.said, this.picture,
       h("div", { className: "legend" },
         item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"),
-        h("span", { className: "legend-item" }, h("span", { className: "stroke color-transport" }), "published, received: median · p95 of the transport"),
+        h("span", { className: "legend-item" }, h("span", { className: "stroke color-transport" }), "published, received: median · p95 from publication to take"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link")),
       besides("topics and their publishers as a table", dataTable(rates, { label: "publication rates" }), command(rates.meta.command)),
-      besides("receivers and their latencies as a table", dataTable(transports, { label: "transport latencies" }), notes(transports.meta.notes), command(transports.meta.command)),
+      besides("receivers and their latencies as a table", dataTable(transports, { label: "latencies from publication to take" }), notes(transports.meta.notes), command(transports.meta.command)),
       services.rows ? besides("services as a table", dataTable(services, { label: "services" }), command(services.meta.command)) : null);
     this.draw();
   }

@@ -2,14 +2,14 @@
 
 import { h, svg, clear, color } from "./dom.js";
 import { address, current, replace } from "./state.js";
-import { count, duration, moment, percent, title } from "./words.js";
+import { count, duration, partTitle, percent } from "./words.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 import { pathNumbers } from "./overview.js";
 
-const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "superseded", "lost", "edge", "loss_affected", "lost_reasons"];
-const FATES = [["reached", "reached the end", "good"], ["superseded", "superseded by a newer input", "color-faint"], ["lost", "lost", "error"], ["edge", "cut by recording", "wait"]];
+const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected", "lost_reasons"];
+const FATES = [["reached", "reached the end", "good"], ["superseded", "superseded by a newer input", "color-faint"], ["lost", "lost", "error"], ["cut_by_recording", "cut by the recording", "wait"]];
 
 export class PathsPage {
   constructor(app, root) {
@@ -120,7 +120,7 @@ export class PathsPage {
     const shade = (kind) => PART_COLORS[kind] ?? "faint";
     for (const row of rows) {
       const share = Math.max(breakdown.total_ns[row], 0) / whole;
-      const piece = h("span", { className: `piece${share > 0.06 ? "" : " thin"}`, title: `${breakdown.part[row]} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
+      const piece = h("span", { className: `piece${share > 0.06 ? "" : " thin"}`, title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
         share > 0.06 ? duration(breakdown.mean_ns[row]) : "");
       piece.style.width = `${100 * share}%`;
       piece.style.background = color(shade(breakdown.part[row]));
@@ -129,7 +129,7 @@ export class PathsPage {
     const legend = h("div", { className: "legend" }, kinds.map((kind) => {
       const swatch = h("span", { className: "swatch" });
       swatch.style.background = color(shade(kind));
-      return h("span", { className: "legend-item" }, swatch, title(kind));
+      return h("span", { className: "legend-item" }, swatch, partTitle(kind));
     }));
     return [stack, legend, dataTable(breakdown, { only: (row) => breakdown.path_id[row] === path, label: "breakdown",
       columns: ["hop", "part", "node", "what", "median_ns", "mean_ns", "p95_ns", "max_ns", "share", "flows", "overlaps"] }),
@@ -141,8 +141,8 @@ export class PathsPage {
 }
 
 const PART_COLORS = {
-  callback: "subscription", cache: "indirect", executor: "process", transport: "transport", service: "service", request: "call",
-  response: "call", rclcpp: "publication", rcl: "publication", rmw: "publication", dds: "publication", publish: "publication", take: "take",
+  callback: "subscription", cache: "indirect", take_to_callback: "faint", network_or_idle: "transport", undecided: "wait",
+  executor_busy: "process", service: "service", rclcpp: "publication", rcl: "publication", rmw: "publication", dds: "publication", publish: "publication", take: "take",
 };
 
 function pointSeries(points) {

@@ -17,7 +17,7 @@ export const LINKS = {
 export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent"];
 
 const TITLES = {
-  run_id: "run", edge: "cut by recording", roots: "flows", loss_affected: "touched by losses",
+  run_id: "run", roots: "flows", loss_affected: "touched by losses",
   sink_event: "ends with", lost_reasons: "reasons", is_cut: "search cut", what: "what",
   topic_name: "topic", is_loss_affected: "touched by losses", rate_hz: "rate",
   callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
@@ -26,6 +26,13 @@ const TITLES = {
   a_count: "values of A", b_count: "values of B", share: "share", affected_percent: "affected",
   seen_ns: "seen", executor_kind: "executor",
 };
+
+// Parts of a latency, as path-breakdown names them.
+const PARTS = {
+  network_or_idle: "network, or executor idle", executor_busy: "executor busy with others",
+  undecided: "undecided: network or busy executor", take_to_callback: "take to callback",
+};
+export const partTitle = (name) => PARTS[name] ?? name;
 
 export function title(name) {
   if (name in TITLES) return TITLES[name];
