@@ -437,7 +437,7 @@ CREATE TABLE store.stamp_clock (
     start_ns      BIGINT NOT NULL,               -- Begin of the stretch [epoch ns]
     end_ns        BIGINT NOT NULL,               -- End of the stretch, exclusive [epoch ns]
     difference_ns BIGINT NOT NULL,               -- Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]
-    drift_ppb     BIGINT,                        -- Change of the difference in the stretch [ppb]
+    drift_ppb     BIGINT,                        -- Change of the difference in the stretch; NULL: not known [ppb]
     message_count BIGINT,                        -- Messages that agree with it
     segment       BIGINT                         -- Number of jumps of the clock before it
 );

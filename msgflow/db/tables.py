@@ -673,7 +673,7 @@ stamp_clock = _table(
         "Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]",
         required=True,
     ),
-    _count("drift_ppb", "Change of the difference in the stretch [ppb]"),
+    _count("drift_ppb", "Change of the difference in the stretch; NULL: not known [ppb]"),
     _count("message_count", "Messages that agree with it"),
     _count("segment", "Number of jumps of the clock before it"),
 )

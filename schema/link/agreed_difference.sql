@@ -13,7 +13,7 @@ WITH edge AS (
     UNION ALL
     SELECT clock_id, stretch, greatest_ns, -1 FROM query_table(intervals)
 ),
-level AS (
+level AS MATERIALIZED (
     SELECT
         clock_id, stretch, from_ns,
         lead(from_ns) OVER by_difference AS until_ns,
@@ -21,16 +21,20 @@ level AS (
     FROM edge
     WINDOW by_difference AS (PARTITION BY clock_id, stretch ORDER BY from_ns, step)
 ),
+most AS (
+    SELECT clock_id, stretch, max(vote_count) AS most_count
+    FROM level
+    WHERE until_ns > from_ns
+    GROUP BY clock_id, stretch
+),
 high AS (
-    SELECT clock_id, stretch, from_ns, until_ns, vote_count, most_count
-    FROM (
-        SELECT
-            clock_id, stretch, from_ns, until_ns, vote_count,
-            max(vote_count) OVER (PARTITION BY clock_id, stretch) AS most_count
-        FROM level
-        WHERE until_ns > from_ns
-    )
-    WHERE vote_count >= derive.clock_limit().rival_share * most_count
+    SELECT l.clock_id, l.stretch, l.from_ns, l.until_ns, l.vote_count, m.most_count
+    FROM level AS l
+    JOIN most AS m
+        ON l.clock_id = m.clock_id
+        AND l.stretch = m.stretch
+        AND l.vote_count >= derive.clock_limit().rival_share * m.most_count
+    WHERE l.until_ns > l.from_ns
 ),
 separated AS (
     SELECT

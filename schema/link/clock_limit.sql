@@ -34,6 +34,9 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     'drift_ppb': 200000,
     -- A drift is the same over so many stretches before and behind.
     'steady_stretches': 5,
+    -- So many stretches before and behind vote together, once a vote of fewer has made the drift
+    -- known to a few ppm: more messages leave fewer differences.
+    'sharp_stretches': 3,
     -- A publisher that writes for less of the time has few messages of others within its writes.
     'writing_share': 0.2,
     -- Of the delays of a publisher: twice what nearly all take, four times what half of them take.

@@ -4,9 +4,8 @@
 --     to stretch. Clocks of one machine begin together (even few messages may say so), and go on
 --     as they went: of the differences that a drift can lead to, the one of most messages. Where
 --     none is left the clock has jumped, if two more stretches agree (in the last two nothing is
---     known then), to the least difference that many agree with: a message is taken soon after it
---     was published. Of messages taken on
---     other clocks nothing says which of several differences is right. Where messages taken on
+--     known then), to the least difference that many agree with, of equal ones to the greatest: a
+--     message is taken, and stamped, soon after it was published. Of messages taken on other clocks nothing says which of several differences is right. Where messages taken on
 --     this clock would as well be those of later publications, the clock may have jumped by a
 --     period: nothing is known then.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
@@ -23,7 +22,8 @@ WITH RECURSIVE told AS (
     FROM (
         SELECT
             clock_id, stretch, any_value(wander_ns) AS wander_ns,
-            arg_max(difference_ns, vote_count) AS difference_ns
+            max({'votes': vote_count, 'difference_ns': difference_ns}).difference_ns
+                AS difference_ns
         FROM (
             SELECT
                 clock_id, stretch, difference_ns, vote_count, most_count, is_taken_here,
@@ -65,8 +65,10 @@ ballot AS MATERIALIZED (
                     THEN t.difference_ns
             END
         ) AS jump_ns,
-        -- The last two stretches have no two more that could agree.
-        coalesce(bool_or(t.later_ns IS NOT NULL), false) AS has_later
+        -- The last two stretches have no two more that could agree. In a recording that has no
+        -- others a clock may begin there.
+        coalesce(bool_or(t.later_ns IS NOT NULL), false) AS has_later,
+        count(*) OVER (PARTITION BY r.clock_id) <= 2 AS is_short
     FROM query_table(regions) AS r
     LEFT JOIN told AS t ON r.clock_id = t.clock_id AND r.stretch = t.stretch
     GROUP BY r.clock_id, r.stretch
@@ -96,7 +98,8 @@ followed (
     FROM (
         SELECT
             b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count,
-            CASE WHEN b.has_later OR NOT f.is_begun THEN b.jump_ns END AS jump_ns,
+            CASE WHEN b.has_later OR b.is_short AND NOT f.is_begun THEN b.jump_ns END
+                AS jump_ns,
             f.difference_ns AS previous_ns, f.segment, f.since_stretch, f.is_begun,
             list_max(
                 list_transform(

@@ -5,9 +5,9 @@
 --     a message has one publication and a publication one message, the first. Where a publisher
 --     writes for much of the time, or what the thread did next is not known, the delays that are
 --     usual for it bound the search. A message with a publication of several publishers, or one
---     of two messages that may both be of one publication, has none: that would be a guess. Nor
---     has one where the difference of the clocks is not known, or explains less than half of the
---     messages.
+--     of two messages that may both be of one publication, or one of a burst where no drift of the
+--     clocks is known, has none: that would be a guess. Nor has one where the difference of the
+--     clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock,
@@ -52,11 +52,21 @@ located AS (
         b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.publication_id, b.written_ns,
         b.next_event_ns, c.state, c.before, c.after,
         c.state.difference_ns
-        + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns
+        + round((b.written_ns - c.at_ns)::DOUBLE * coalesce(c.drift_ppb, 0) / 1e9)::BIGINT
+            AS difference_ns,
+        -- Where no drift is known there may be any, also among the messages of the stretch.
+        CASE
+            WHEN c.drift_ppb IS NULL
+                THEN round(
+                    (abs(b.written_ns - c.at_ns) + c.at_ns - c.first_ns)::DOUBLE
+                    * derive.clock_limit().drift_ppb / 1e9
+                )::BIGINT
+            ELSE 0
+        END AS wander_ns
     FROM derive.unstamped_publication(only_run) AS b
     ASOF JOIN (
         SELECT
-            clock_id, at_ns, drift_ppb, state, before, after,
+            clock_id, at_ns, drift_ppb, state, before, after, start_ns AS first_ns,
             CASE WHEN is_first THEN -9223372036854775807 ELSE start_ns END AS start_ns
         FROM course
     ) AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
@@ -76,8 +86,16 @@ published AS MATERIALIZED (
     SELECT
         side, clock_id, topic_name, publisher_id, publication_id, written_ns,
         written_ns + then_ns AS opens_ns,
-        next_event_ns + then_ns AS closes_ns
+        next_event_ns + then_ns AS closes_ns,
+        wander_ns > 0 AND coalesce(
+            least(
+                written_ns - lag(written_ns) OVER on_topic,
+                lead(written_ns) OVER on_topic - written_ns
+            ) <= 2 * wander_ns,
+            false
+        ) AS is_crowded
     FROM sided
+    WINDOW on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id)
 ),
 -- Where the clocks stood in what relation: from one jump to the next.
 segment AS (
@@ -113,7 +131,7 @@ looked_for AS (
 ),
 within AS MATERIALIZED (
     SELECT
-        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.closes_ns,
+        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.closes_ns, p.is_crowded,
         m.source_timestamp_ns - p.opens_ns AS delay_ns,
         row_number() OVER (
             PARTITION BY p.publication_id, p.side ORDER BY m.source_timestamp_ns
@@ -152,7 +170,7 @@ usual AS (
 ),
 plausible AS (
     SELECT
-        w.publisher_id, w.source_timestamp_ns, w.publication_id, w.place,
+        w.publisher_id, w.source_timestamp_ns, w.publication_id, w.place, w.is_crowded,
         w.place = 2 AND w.delay_ns <= u.usual_ns AS is_rival
     FROM within AS w
     LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
@@ -167,7 +185,9 @@ matched AS (
     SELECT
         publisher_id, source_timestamp_ns, publication_id, bool_or(is_rivalled) AS is_rivalled
     FROM (
-        SELECT *, bool_or(is_rival) OVER (PARTITION BY publication_id) AS is_rivalled
+        SELECT
+            *,
+            is_crowded OR bool_or(is_rival) OVER (PARTITION BY publication_id) AS is_rivalled
         FROM plausible
     )
     WHERE place = 1 OR is_rival

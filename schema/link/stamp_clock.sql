@@ -3,11 +3,13 @@
 -- description: How far the clock that stamps messages is from that of the traces, over time:
 --     constant but for jumps and a slow drift. In each stretch of time the difference that most
 --     messages allow is followed from the one before. The drift of what was followed makes the
---     same vote sharp: then it tells messages apart that were published within microseconds.
--- grain: one row per clock and stretch of time with messages, message_count 0 if it is not known
+--     vote sharper, and the vote the drift: then messages are told apart that were published within
+--     microseconds.
+-- grain: one row per clock and stretch of time with messages; message_count is 0 where the
+--     difference is not known, drift_ppb NULL where it is known of one stretch only
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.stamp_pair, derive.clock_drift, derive.agreed_difference,
---     derive.followed_difference, derive.clock_limit
+--     derive.followed_difference, derive.sharp_difference, derive.clock_limit
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (
     FROM derive.stamp_pair(only_run)
@@ -45,7 +47,7 @@ allowed AS (
     LEFT JOIN drift AS d ON p.clock_id = d.clock_id AND p.stretch = d.stretch
 ),
 origin AS (
-    SELECT clock_id, stretch, mode(is_taken_here) AS is_taken_here
+    SELECT clock_id, stretch, avg(is_taken_here::INTEGER) >= 0.5 AS is_taken_here
     FROM pair
     GROUP BY clock_id, stretch
 ),
@@ -60,7 +62,7 @@ region AS MATERIALIZED (
 followed AS MATERIALIZED (
     FROM derive.followed_difference('region')
 ),
-course AS (
+course AS MATERIALIZED (
     SELECT
         f.clock_id, f.segment AS place, f.stretch, f.difference_ns AS offset_ns,
         x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns,
@@ -69,32 +71,22 @@ course AS (
     JOIN extent AS x ON f.clock_id = x.clock_id
     WHERE f.message_count > 0
 ),
-steady AS MATERIALIZED (
-    FROM derive.clock_drift('course')
-),
-sharp AS (
-    SELECT
-        c.clock_id, c.stretch,
-        p.least_ns - round((p.written_ns - c.at_ns) * s.drift_ppb / 1e9)::BIGINT AS least_ns,
-        p.greatest_ns - round((p.written_ns - c.at_ns) * s.drift_ppb / 1e9)::BIGINT
-            AS greatest_ns
+-- What a drift can make of the difference within a stretch.
+close AS MATERIALIZED (
+    SELECT p.clock_id, p.stretch, p.written_ns, p.least_ns, p.greatest_ns
     FROM course AS c
-    JOIN steady AS s ON c.clock_id = s.clock_id AND c.stretch = s.stretch
-    JOIN course AS n
-        ON c.clock_id = n.clock_id
-        AND c.place = n.place
-        AND abs(c.stretch - n.stretch) <= derive.clock_limit().steady_stretches
     JOIN pair AS p
-        ON n.clock_id = p.clock_id
-        AND n.stretch = p.stretch
-        AND p.greatest_ns >= n.offset_ns - n.wander_ns
-        AND p.least_ns <= n.offset_ns + n.wander_ns
+        ON c.clock_id = p.clock_id
+        AND c.stretch = p.stretch
+        AND p.greatest_ns >= c.offset_ns - c.wander_ns
+        AND p.least_ns <= c.offset_ns + c.wander_ns
 ),
-chosen AS (
-    SELECT clock_id, stretch, arg_max(difference_ns, vote_count) AS difference_ns
-    FROM derive.agreed_difference('sharp')
-    WHERE most_count >= derive.clock_limit().quorum
-    GROUP BY clock_id, stretch
+-- Each vote makes the drift better known, so that the next one can be of more stretches.
+beside AS MATERIALIZED (
+    FROM derive.sharp_difference('close', 'course', derive.clock_limit().sharp_stretches // 2)
+),
+sharp AS MATERIALIZED (
+    FROM derive.sharp_difference('close', 'beside', derive.clock_limit().sharp_stretches)
 )
 SELECT
     x.run_id,
@@ -102,11 +94,14 @@ SELECT
     x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns,
     x.start_ns + f.stretch * x.stretch_ns AS start_ns,
     x.start_ns + (f.stretch + 1) * x.stretch_ns AS end_ns,
-    coalesce(c.difference_ns, f.difference_ns) AS difference_ns,
-    coalesce(s.drift_ppb, 0)::BIGINT AS drift_ppb,
+    coalesce(s.offset_ns, f.difference_ns) AS difference_ns,
+    -- One stretch between jumps has no drift that could be seen.
+    CASE
+        WHEN count_if(f.message_count > 0) OVER (PARTITION BY f.clock_id, f.segment) > 1
+            THEN s.drift_ppb::BIGINT
+    END AS drift_ppb,
     f.message_count,
     f.segment
 FROM followed AS f
 JOIN extent AS x ON f.clock_id = x.clock_id
-LEFT JOIN steady AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch
-LEFT JOIN chosen AS c ON f.clock_id = c.clock_id AND f.stretch = c.stretch
+LEFT JOIN sharp AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch

@@ -14,6 +14,7 @@ RULES = (
     "agreed_difference",
     "clock_drift",
     "followed_difference",
+    "sharp_difference",
     "stamp_pair",
     "stamp_clock",
     "nearest_message",

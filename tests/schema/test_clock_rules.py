@@ -129,6 +129,79 @@ def test_a_jump_at_the_end_is_not_confirmed(rules: duckdb.DuckDBPyConnection) ->
     assert followed(rules, [old, new, new]) == [(0, 20, 0), (0, 0, 0), (0, 0, 0)]
 
 
+@pytest.mark.parametrize("before", [0, 1, 2])
+def test_no_clock_begins_in_the_last_two_stretches(
+    rules: duckdb.DuckDBPyConnection, before: int
+) -> None:
+    """But where there are no others."""
+    few, clock = [(5_000, 500, 7)], [(3_000_000, 500, 20)]
+    expected = [(3_000_000, 20, 1)] * 2 if before == 0 else []
+    found = followed(rules, [few] * before + [clock] * 2)
+    assert [row for row in found if row[1]] == expected
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_equal_differences_a_jump_is_to_the_greatest(
+    rules: duckdb.DuckDBPyConnection, order: int
+) -> None:
+    """With any other, all messages would have been stamped later than they may have been."""
+    jump = [(3_000_000, 500, 20), (3_004_000, 500, 20), (3_002_000, 500, 20)][::order]
+    assert followed(rules, [jump] * 3) == [(3_004_000, 20, 1)] * 3
+
+
+def sharp(
+    con: duckdb.DuckDBPyConnection,
+    offsets: Sequence[int],
+    intervals: Sequence[tuple[int, int, int, int]],
+    reach: int,
+) -> list[tuple[int, int]]:
+    """(difference, drift) by stretch, of intervals (stretch, least, greatest, so many)."""
+    drift(con, offsets)
+    con.execute("CREATE OR REPLACE TABLE pair (clock_id BIGINT, stretch BIGINT, written_ns BIGINT, "
+                "least_ns BIGINT, greatest_ns BIGINT)")  # fmt: skip
+    for stretch, least, greatest, count in intervals:
+        con.execute(
+            "INSERT INTO pair SELECT 1, ?, ?, ?, ? FROM range(?)",
+            [stretch, stretch * STRETCH_NS, least, greatest, count],
+        )
+    rows = con.execute(
+        "SELECT offset_ns, drift_ppb::BIGINT FROM derive.sharp_difference('pair', 'course', ?) "
+        "ORDER BY stretch",
+        [reach],
+    )
+    return rows.fetchall()
+
+
+@pytest.mark.parametrize(("reach", "middle"), [(0, 500), (1, 700), (2, 800)])
+def test_stretches_around_make_a_difference_sharper(
+    rules: duckdb.DuckDBPyConnection, reach: int, middle: int
+) -> None:
+    intervals = [(0, 600, 1_000, 20), (1, 400, 1_000, 20), (2, 0, 1_000, 20)]
+    assert sharp(rules, [0] * 3, intervals, reach)[2][0] == middle
+
+
+def test_what_a_drift_brings_along(rules: duckdb.DuckDBPyConnection) -> None:
+    """50 µs in a stretch are 100 ppm."""
+    intervals = [(n, 50_000 * n, 50_000 * n + 1_000, 20) for n in range(3)]
+    expected = [(50_000 * n + 500, 100_000) for n in range(3)]
+    assert sharp(rules, [0, 50_000, 100_000], intervals, 2) == expected
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_equal_differences_the_greatest_is_sharp(
+    rules: duckdb.DuckDBPyConnection, order: int
+) -> None:
+    intervals = [(0, 0, 1_000, 20), (0, 4_000, 5_000, 20), (0, 2_000, 3_000, 20)][::order]
+    assert sharp(rules, [0], intervals, 0) == [(4_500, 0)]
+
+
+@pytest.mark.parametrize(("votes", "expected"), [(8, 1_500), (7, 0)])
+def test_a_sharp_difference_takes_a_quorum(
+    rules: duckdb.DuckDBPyConnection, votes: int, expected: int
+) -> None:
+    assert sharp(rules, [0], [(0, 1_000, 2_000, votes)], 0) == [(expected, 0)]
+
+
 @pytest.mark.parametrize(("step", "segment"), [(190_000, 0), (210_000, 1)])
 def test_what_a_drift_can_lead_to_is_no_jump(
     rules: duckdb.DuckDBPyConnection, step: int, segment: int

@@ -264,3 +264,19 @@ def test_the_difference_drifts_within_a_stretch(
     stamp = written + seconds // 5 * MILLISECOND
     take(rules, stamp)
     assert nearest(rules) == {stamp: (1, 1)}
+
+
+@pytest.mark.parametrize(("apart", "is_told"), [(420, True), (380, False)])
+@pytest.mark.parametrize("first", [1, 2])
+def test_bursts_are_not_told_where_no_drift_is_known(
+    rules: duckdb.DuckDBPyConnection, first: int, apart: int, *, is_told: bool
+) -> None:
+    """In a second, half a second from its middle, 200 ppm are 200 µs, earlier or later."""
+    clock(rules, (0, 100, 0))
+    rules.execute("UPDATE store.stamp_clock SET drift_ppb = NULL")
+    apart *= MICROSECOND
+    publish(rules, first, 0, 10 * MICROSECOND)
+    publish(rules, 3 - first, apart, apart + 10 * MICROSECOND)
+    take(rules, 1, apart + 1)
+    told = {1: (first, 1), apart + 1: (3 - first, 1)}
+    assert nearest(rules) == (told if is_told else dict.fromkeys(told, (None, 1)))

@@ -14,7 +14,13 @@ STRETCH_NS = 498_750_001
 
 
 def record(
-    con: duckdb.DuckDBPyConnection, *, width_ns: int, delay_ns: int, ppm: int, per_burst: int = 1
+    con: duckdb.DuckDBPyConnection,
+    *,
+    width_ns: int,
+    delay_ns: int,
+    ppm: int,
+    count: int = COUNT,
+    per_burst: int = 1,
 ) -> list[tuple[Any, ...]]:
     """Clock of stamps where each write takes `width_ns` and is stamped up to `delay_ns` later."""
     con.execute(
@@ -22,7 +28,7 @@ def record(
         "written_ns + $width FROM (SELECT n, n // $burst * $period + n % $burst * $width "
         "+ CASE WHEN n // $burst IN (0, $count - 1) THEN 0 ELSE hash(n // $burst) % 80000 END "
         "AS written_ns FROM range($count * $burst) AS r(n))",
-        {"width": width_ns, "burst": per_burst, "period": PERIOD_NS, "count": COUNT},
+        {"width": width_ns, "burst": per_burst, "period": PERIOD_NS, "count": count},
     )
     con.execute(
         "INSERT INTO message (source_timestamp_ns, taken_ns) "
@@ -48,3 +54,22 @@ def test_difference_and_drift_of_each_stretch(rules: duckdb.DuckDBPyConnection, 
         assert abs(drift - ppm * 1_000) < 5_000
         assert count >= 24
         assert segment == 0
+
+
+def test_no_drift_of_one_stretch(rules: duckdb.DuckDBPyConnection) -> None:
+    """Twelve messages are one stretch, in which no drift shows; twice as many are two."""
+    rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=12)
+    assert [row[4] for row in rows] == [None]
+    rules.execute("DELETE FROM published; DELETE FROM message")
+    rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=24)
+    assert [row[4] is None for row in rows] == [False, False]
+
+
+@pytest.mark.parametrize("ppm", [0, 190, -190])
+def test_bursts_are_told_at_any_drift(rules: duckdb.DuckDBPyConnection, ppm: int) -> None:
+    """A drift known to 2 ppm only moves a message to the next publication within a second."""
+    rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=ppm, per_burst=6)
+    assert len(rows) == 8
+    for _, at, _, difference, drift, _, _ in rows:
+        assert abs(difference - at * ppm // 1_000_000) < 500
+        assert abs(drift - ppm * 1_000) < 500

@@ -1,0 +1,43 @@
+-- name: derive.sharp_difference
+-- kind: macro
+-- description: The difference of two clocks that most messages of some stretches of time allow,
+--     each brought to the middle of one stretch by the drift. It tells messages apart that were
+--     published within microseconds.
+-- grain: one row per row of the course
+-- param: pairs VARCHAR  Name of rows of clock_id, stretch, written_ns, least_ns, greatest_ns
+-- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
+-- param: reach BIGINT  How many stretches before and behind count too
+-- needs: derive.agreed_difference, derive.clock_drift, derive.clock_limit
+CREATE OR REPLACE MACRO derive.sharp_difference(pairs, course, reach) AS TABLE
+WITH drift AS MATERIALIZED (
+    FROM derive.clock_drift(course)
+),
+allowed AS (
+    SELECT
+        c.clock_id, c.stretch,
+        p.least_ns - round((p.written_ns - c.at_ns) * d.drift_ppb / 1e9)::BIGINT AS least_ns,
+        p.greatest_ns - round((p.written_ns - c.at_ns) * d.drift_ppb / 1e9)::BIGINT
+            AS greatest_ns
+    FROM query_table(course) AS c
+    JOIN drift AS d ON c.clock_id = d.clock_id AND c.stretch = d.stretch
+    JOIN query_table(course) AS n
+        ON c.clock_id = n.clock_id
+        AND c.place = n.place
+        AND n.stretch BETWEEN c.stretch - reach AND c.stretch + reach
+    JOIN query_table(pairs) AS p ON n.clock_id = p.clock_id AND n.stretch = p.stretch
+),
+agreed AS (
+    SELECT
+        clock_id, stretch,
+        max({'votes': vote_count, 'difference_ns': difference_ns}).difference_ns AS difference_ns
+    FROM derive.agreed_difference('allowed')
+    WHERE most_count >= derive.clock_limit().quorum
+    GROUP BY clock_id, stretch
+)
+SELECT
+    c.clock_id, c.place, c.stretch, c.at_ns,
+    coalesce(a.difference_ns, c.offset_ns) AS offset_ns,
+    d.drift_ppb
+FROM query_table(course) AS c
+JOIN drift AS d ON c.clock_id = d.clock_id AND c.stretch = d.stretch
+LEFT JOIN agreed AS a ON c.clock_id = a.clock_id AND c.stretch = a.stretch
