@@ -437,9 +437,10 @@ CREATE TABLE store.stamp_clock (
     start_ns      BIGINT NOT NULL,               -- Begin of the stretch [epoch ns]
     end_ns        BIGINT NOT NULL,               -- End of the stretch, exclusive [epoch ns]
     difference_ns BIGINT NOT NULL,               -- Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]
-    drift_ppb     BIGINT,                        -- Change of the difference in the stretch; NULL: not known [ppb]
+    drift_ppb     BIGINT,                        -- Change of the difference in the stretch [ppb]
     message_count BIGINT,                        -- Messages that agree with it
-    segment       BIGINT                         -- Number of jumps of the clock before it
+    segment       BIGINT,                        -- Number of jumps of the clock before it
+    is_sharp      BOOLEAN                        -- The drift is known: publications microseconds apart are told apart; NULL: yes
 );
 
 -- One row per message whose publication was found, or could not be told, by time.

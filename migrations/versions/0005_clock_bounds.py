@@ -93,6 +93,15 @@ def upgrade() -> None:
         ),
         schema="store",
     )
+    op.add_column(
+        "stamp_clock",
+        sa.Column(
+            "is_sharp",
+            sa.Boolean(),
+            comment="The drift is known: publications microseconds apart are told apart; NULL: yes",
+        ),
+        schema="store",
+    )
     for thing, _, new in WORDS:
         op.execute(f"COMMENT ON {thing} IS '{new}'")
 
@@ -101,6 +110,7 @@ def downgrade() -> None:
     """Drop the columns and the table."""
     for thing, old, _ in WORDS:
         op.execute(f"COMMENT ON {thing} IS '{old}'")
+    op.drop_column("stamp_clock", "is_sharp", schema="store")
     op.drop_column("stamp_clock", "segment", schema="store")
     op.drop_column("link_transport", "is_copy", schema="store")
     op.drop_table("clock_uncertainty", schema="store")

@@ -673,9 +673,14 @@ stamp_clock = _table(
         "Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]",
         required=True,
     ),
-    _count("drift_ppb", "Change of the difference in the stretch; NULL: not known [ppb]"),
+    _count("drift_ppb", "Change of the difference in the stretch [ppb]"),
     _count("message_count", "Messages that agree with it"),
     _count("segment", "Number of jumps of the clock before it"),
+    _column(
+        "is_sharp",
+        Boolean,
+        "The drift is known: publications microseconds apart are told apart; NULL: yes",
+    ),
 )
 
 nearest_message = _table(

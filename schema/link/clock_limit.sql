@@ -27,6 +27,9 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     'quorum': 8,
     -- A difference that this share of the best one's messages agrees with may be the right one.
     'rival_share': 0.9,
+    -- Where the drift is right, of differences within a burst one has far more messages than the
+    -- others; where it is not, many have about as many, each of its own stretches.
+    'sharp_share': 0.95,
     -- Differences less apart than this are within a burst: there the best one is right. Others are
     -- periods apart.
     'burst_ns': 500000,

@@ -5,8 +5,8 @@
 --     a message has one publication and a publication one message, the first. Where a publisher
 --     writes for much of the time, or what the thread did next is not known, the delays that are
 --     usual for it bound the search. A message with a publication of several publishers, or one
---     of two messages that may both be of one publication, or one of a burst where no drift of the
---     clocks is known, has none: that would be a guess. Nor has one where the difference of the
+--     of two messages that may both be of one publication, or one of a burst where the clock is
+--     not known sharply, has none: that would be a guess. Nor has one where the difference of the
 --     clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
@@ -16,7 +16,7 @@ CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
 -- No clock jumps there and back within a stretch: where only one tells nothing it went on.
 WITH observed AS (
     SELECT
-        clock_id, at_ns, start_ns, difference_ns, drift_ppb, message_count, segment,
+        clock_id, at_ns, start_ns, difference_ns, drift_ppb, message_count, segment, is_sharp,
         (lag(difference_ns) OVER on_clock + lead(difference_ns) OVER on_clock) // 2 AS between_ns,
         (lag(drift_ppb) OVER on_clock + lead(drift_ppb) OVER on_clock) // 2 AS between_ppb,
         message_count = 0 AND coalesce(
@@ -41,6 +41,7 @@ course AS (
             struct_pack(
                 difference_ns := CASE WHEN is_between THEN between_ns ELSE difference_ns END,
                 segment := segment,
+                is_sharp := coalesce(is_sharp, true),
                 is_known := message_count > 0 OR is_between
             ) AS state
         FROM observed
@@ -52,11 +53,10 @@ located AS (
         b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.publication_id, b.written_ns,
         b.next_event_ns, c.state, c.before, c.after,
         c.state.difference_ns
-        + round((b.written_ns - c.at_ns)::DOUBLE * coalesce(c.drift_ppb, 0) / 1e9)::BIGINT
-            AS difference_ns,
-        -- Where no drift is known there may be any, also among the messages of the stretch.
+        + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns,
+        -- Where the drift is not known there may be any, also among the messages that vote.
         CASE
-            WHEN c.drift_ppb IS NULL
+            WHEN NOT c.state.is_sharp
                 THEN round(
                     (abs(b.written_ns - c.at_ns) + c.at_ns - c.first_ns)::DOUBLE
                     * derive.clock_limit().drift_ppb / 1e9

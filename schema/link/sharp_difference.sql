@@ -2,7 +2,7 @@
 -- kind: macro
 -- description: The difference of two clocks that most messages of some stretches of time allow,
 --     each brought to the middle of one stretch by the drift. It tells messages apart that were
---     published within microseconds.
+--     published within microseconds, unless nearly as many allow another one.
 -- grain: one row per row of the course
 -- param: pairs VARCHAR  Name of rows of clock_id, stretch, written_ns, least_ns, greatest_ns
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
@@ -29,7 +29,8 @@ allowed AS (
 agreed AS (
     SELECT
         clock_id, stretch,
-        max({'votes': vote_count, 'difference_ns': difference_ns}).difference_ns AS difference_ns
+        max({'votes': vote_count, 'difference_ns': difference_ns}).difference_ns AS difference_ns,
+        max(vote_count, 2) AS votes
     FROM derive.agreed_difference('allowed')
     WHERE most_count >= derive.clock_limit().quorum
     GROUP BY clock_id, stretch
@@ -37,7 +38,10 @@ agreed AS (
 SELECT
     c.clock_id, c.place, c.stretch, c.at_ns,
     coalesce(a.difference_ns, c.offset_ns) AS offset_ns,
-    d.drift_ppb
+    d.drift_ppb,
+    coalesce(
+        coalesce(a.votes[2], 0) < derive.clock_limit().sharp_share * a.votes[1], false
+    ) AS is_sharp
 FROM query_table(course) AS c
 JOIN drift AS d ON c.clock_id = d.clock_id AND c.stretch = d.stretch
 LEFT JOIN agreed AS a ON c.clock_id = a.clock_id AND c.stretch = a.stretch

@@ -6,7 +6,7 @@
 --     vote sharper, and the vote the drift: then messages are told apart that were published within
 --     microseconds.
 -- grain: one row per clock and stretch of time with messages; message_count is 0 where the
---     difference is not known, drift_ppb NULL where it is known of one stretch only
+--     difference is not known
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.stamp_pair, derive.clock_drift, derive.agreed_difference,
 --     derive.followed_difference, derive.sharp_difference, derive.clock_limit
@@ -95,13 +95,19 @@ SELECT
     x.start_ns + f.stretch * x.stretch_ns AS start_ns,
     x.start_ns + (f.stretch + 1) * x.stretch_ns AS end_ns,
     coalesce(s.offset_ns, f.difference_ns) AS difference_ns,
-    -- One stretch between jumps has no drift that could be seen.
-    CASE
-        WHEN count_if(f.message_count > 0) OVER (PARTITION BY f.clock_id, f.segment) > 1
-            THEN s.drift_ppb::BIGINT
-    END AS drift_ppb,
+    coalesce(s.drift_ppb, 0)::BIGINT AS drift_ppb,
     f.message_count,
-    f.segment
+    f.segment,
+    -- A drift shows in two stretches. One that is not right spoils what is nearby.
+    coalesce(
+        min(s.is_sharp) OVER nearby AND count_if(f.message_count > 0) OVER nearby > 1, false
+    ) AS is_sharp
 FROM followed AS f
 JOIN extent AS x ON f.clock_id = x.clock_id
 LEFT JOIN sharp AS s ON f.clock_id = s.clock_id AND f.stretch = s.stretch
+WINDOW nearby AS (
+    PARTITION BY f.clock_id, f.segment
+    ORDER BY f.stretch
+    RANGE BETWEEN derive.clock_limit().sharp_stretches PRECEDING
+        AND derive.clock_limit().sharp_stretches FOLLOWING
+)

@@ -30,7 +30,7 @@ CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, clock_id BIGINT DEFAULT 1, taken_ns BIGINT);
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
-    message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0);
+    message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);
 CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHERE run_id = only_run;
 CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
 """

@@ -195,6 +195,16 @@ def test_of_equal_differences_the_greatest_is_sharp(
     assert sharp(rules, [0], intervals, 0) == [(4_500, 0)]
 
 
+@pytest.mark.parametrize(("votes", "is_sharp"), [(94, True), (95, False)])
+def test_nineteen_twentieths_for_another_make_it_blurred(
+    rules: duckdb.DuckDBPyConnection, votes: int, *, is_sharp: bool
+) -> None:
+    found = sharp(rules, [0], [(0, 0, 1_000, 100), (0, 4_000, 5_000, votes)], 0)
+    assert found == [(500, 0)]
+    blurred = rules.execute("SELECT is_sharp FROM derive.sharp_difference('pair', 'course', 0)")
+    assert blurred.fetchall() == [(is_sharp,)]
+
+
 @pytest.mark.parametrize(("votes", "expected"), [(8, 1_500), (7, 0)])
 def test_a_sharp_difference_takes_a_quorum(
     rules: duckdb.DuckDBPyConnection, votes: int, expected: int

@@ -273,7 +273,7 @@ def test_bursts_are_not_told_where_no_drift_is_known(
 ) -> None:
     """In a second, half a second from its middle, 200 ppm are 200 µs, earlier or later."""
     clock(rules, (0, 100, 0))
-    rules.execute("UPDATE store.stamp_clock SET drift_ppb = NULL")
+    rules.execute("UPDATE store.stamp_clock SET is_sharp = false")
     apart *= MICROSECOND
     publish(rules, first, 0, 10 * MICROSECOND)
     publish(rules, 3 - first, apart, apart + 10 * MICROSECOND)

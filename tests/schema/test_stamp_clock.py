@@ -37,7 +37,8 @@ def record(
         {"ppm": ppm, "delay": delay_ns},
     )
     return con.execute(
-        "SELECT start_ns, at_ns, end_ns, difference_ns, drift_ppb, message_count, segment "
+        "SELECT start_ns, at_ns, end_ns, difference_ns, drift_ppb, message_count, segment, "
+        "is_sharp "
         "FROM derive.stamp_clock(1) ORDER BY start_ns"
     ).fetchall()
 
@@ -47,7 +48,7 @@ def test_difference_and_drift_of_each_stretch(rules: duckdb.DuckDBPyConnection, 
     """The messages of a stretch agree only once its drift is known."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=ppm)
     assert len(rows) == 8
-    for n, (start, at, end, difference, drift, count, segment) in enumerate(rows):
+    for n, (start, at, end, difference, drift, count, segment, _) in enumerate(rows):
         assert (start, end) == (n * STRETCH_NS, (n + 1) * STRETCH_NS)
         assert at == start + STRETCH_NS // 2
         assert abs(difference - at * ppm // 1_000_000) < 1_500
@@ -59,10 +60,10 @@ def test_difference_and_drift_of_each_stretch(rules: duckdb.DuckDBPyConnection, 
 def test_no_drift_of_one_stretch(rules: duckdb.DuckDBPyConnection) -> None:
     """Twelve messages are one stretch, in which no drift shows; twice as many are two."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=12)
-    assert [row[4] for row in rows] == [None]
+    assert [row[7] for row in rows] == [False]
     rules.execute("DELETE FROM published; DELETE FROM message")
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=24)
-    assert [row[4] is None for row in rows] == [False, False]
+    assert [row[7] for row in rows] == [True, True]
 
 
 @pytest.mark.parametrize("ppm", [0, 190, -190])
@@ -70,6 +71,7 @@ def test_bursts_are_told_at_any_drift(rules: duckdb.DuckDBPyConnection, ppm: int
     """A drift known to 2 ppm only moves a message to the next publication within a second."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=ppm, per_burst=6)
     assert len(rows) == 8
-    for _, at, _, difference, drift, _, _ in rows:
+    for _, at, _, difference, drift, _, _, is_sharp in rows:
         assert abs(difference - at * ppm // 1_000_000) < 500
         assert abs(drift - ppm * 1_000) < 500
+        assert is_sharp
