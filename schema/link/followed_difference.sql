@@ -98,8 +98,7 @@ followed (
     FROM (
         SELECT
             b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count,
-            CASE WHEN b.has_later OR b.is_short AND NOT f.is_begun THEN b.jump_ns END
-                AS jump_ns,
+            CASE WHEN b.has_later OR b.is_short AND NOT f.is_begun THEN b.jump_ns END AS jump_ns,
             f.difference_ns AS previous_ns, f.segment, f.since_stretch, f.is_begun,
             list_max(
                 list_transform(
