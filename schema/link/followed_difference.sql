@@ -5,9 +5,10 @@
 --     as they went: of the differences that a drift can lead to, the one of most messages. Where
 --     none is left the clock has jumped, if two more stretches agree (in the last two nothing is
 --     known then), to the least difference that many agree with, of equal ones to the greatest: a
---     message is taken, and stamped, soon after it was published. Of messages taken on other clocks nothing says which of several differences is right. Where messages taken on
---     this clock would as well be those of later publications, the clock may have jumped by a
---     period: nothing is known then.
+--     message is taken, and stamped, soon after it was published. Of messages taken on other
+--     clocks nothing says which of several differences is right. Where messages taken on this
+--     clock would as well be those of later publications, the clock may have jumped by a period:
+--     nothing is known then.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
 -- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns
 -- needs: derive.clock_limit
