@@ -27,8 +27,9 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     'quorum': 8,
     -- A difference that this share of the best one's messages agrees with may be the right one.
     'rival_share': 0.9,
-    -- Where the drift is right, of differences within a burst one has far more messages than the
-    -- others; where it is not, many have about as many, each of its own stretches.
+    -- Where the drift is right, nearly all messages agree; or, if some are of publishers that are
+    -- not traced, far more than on another difference within a burst. Where it is not, each
+    -- stretch has its own.
     'sharp_share': 0.95,
     -- Differences less apart than this are within a burst: there the best one is right. Others are
     -- periods apart.

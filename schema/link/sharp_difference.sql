@@ -1,8 +1,9 @@
 -- name: derive.sharp_difference
 -- kind: macro
 -- description: The difference of two clocks that most messages of some stretches of time allow,
---     each brought to the middle of one stretch by the drift. It tells messages apart that were
---     published within microseconds, unless nearly as many allow another one.
+--     each brought to the middle of one stretch by the drift. It is sharp, and tells messages
+--     apart that were published within microseconds, unless some do not allow it while nearly as
+--     many allow another one.
 -- grain: one row per row of the course
 -- param: pairs VARCHAR  Name of rows of clock_id, stretch, written_ns, least_ns, greatest_ns
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
@@ -26,6 +27,22 @@ allowed AS (
         AND n.stretch BETWEEN c.stretch - reach AND c.stretch + reach
     JOIN query_table(pairs) AS p ON n.clock_id = p.clock_id AND n.stretch = p.stretch
 ),
+-- A stamp is a message; of two publishers it has pairs of both.
+message AS (
+    SELECT clock_id, stretch, count(DISTINCT written_ns + greatest_ns) AS message_count
+    FROM query_table(pairs)
+    GROUP BY clock_id, stretch
+),
+heard AS (
+    SELECT c.clock_id, c.stretch, sum(m.message_count) AS message_count
+    FROM query_table(course) AS c
+    JOIN query_table(course) AS n
+        ON c.clock_id = n.clock_id
+        AND c.place = n.place
+        AND n.stretch BETWEEN c.stretch - reach AND c.stretch + reach
+    JOIN message AS m ON n.clock_id = m.clock_id AND n.stretch = m.stretch
+    GROUP BY c.clock_id, c.stretch
+),
 agreed AS (
     SELECT
         clock_id, stretch,
@@ -40,8 +57,11 @@ SELECT
     coalesce(a.difference_ns, c.offset_ns) AS offset_ns,
     d.drift_ppb,
     coalesce(
-        coalesce(a.votes[2], 0) < derive.clock_limit().sharp_share * a.votes[1], false
+        a.votes[1] >= derive.clock_limit().sharp_share * h.message_count
+        OR coalesce(a.votes[2], 0) < derive.clock_limit().sharp_share * a.votes[1],
+        false
     ) AS is_sharp
 FROM query_table(course) AS c
 JOIN drift AS d ON c.clock_id = d.clock_id AND c.stretch = d.stretch
+LEFT JOIN heard AS h ON c.clock_id = h.clock_id AND c.stretch = h.stretch
 LEFT JOIN agreed AS a ON c.clock_id = a.clock_id AND c.stretch = a.stretch

@@ -195,14 +195,39 @@ def test_of_equal_differences_the_greatest_is_sharp(
     assert sharp(rules, [0], intervals, 0) == [(4_500, 0)]
 
 
-@pytest.mark.parametrize(("votes", "is_sharp"), [(94, True), (95, False)])
-def test_nineteen_twentieths_for_another_make_it_blurred(
-    rules: duckdb.DuckDBPyConnection, votes: int, *, is_sharp: bool
+def is_sharp(con: duckdb.DuckDBPyConnection, both: int, one: int, other: int) -> bool:
+    """Of messages that allow two differences, only the first, and only the second."""
+    drift(con, [0])
+    con.execute("CREATE OR REPLACE TABLE pair (clock_id BIGINT, stretch BIGINT, written_ns BIGINT, "
+                "least_ns BIGINT, greatest_ns BIGINT)")  # fmt: skip
+    shared = [(n, 1_000) for n in range(both)] + [(n - 4_000, 5_000) for n in range(both)]
+    first = [(1_000 + n, 1_000) for n in range(one)]
+    second = [(2_000 + n - 4_000, 5_000) for n in range(other)]
+    con.executemany(
+        "INSERT INTO pair VALUES (1, 0, ?, ? - 1000, ?)",
+        [(written, greatest, greatest) for written, greatest in shared + first + second],
+    )
+    found = con.execute(
+        "SELECT offset_ns, is_sharp FROM derive.sharp_difference('pair', 'course', 0)"
+    ).fetchall()
+    assert found[0][0] == 500
+    return bool(found[0][1])
+
+
+@pytest.mark.parametrize(("other", "expected"), [(20, True), (21, False)])
+def test_a_difference_is_sharp_that_nineteen_twentieths_allow(
+    rules: duckdb.DuckDBPyConnection, other: int, *, expected: bool
 ) -> None:
-    found = sharp(rules, [0], [(0, 0, 1_000, 100), (0, 4_000, 5_000, votes)], 0)
-    assert found == [(500, 0)]
-    blurred = rules.execute("SELECT is_sharp FROM derive.sharp_difference('pair', 'course', 0)")
-    assert blurred.fetchall() == [(is_sharp,)]
+    """380 of 400 messages, or of 401."""
+    assert is_sharp(rules, 350, 30, other) is expected
+
+
+@pytest.mark.parametrize(("other", "expected"), [(14, True), (15, False)])
+def test_or_where_less_than_that_allow_another_one(
+    rules: duckdb.DuckDBPyConnection, other: int, *, expected: bool
+) -> None:
+    """100 allow the one, 94 or 95 the other."""
+    assert is_sharp(rules, 80, 20, other) is expected
 
 
 @pytest.mark.parametrize(("votes", "expected"), [(8, 1_500), (7, 0)])
