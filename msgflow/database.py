@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from msgflow.db.check import CheckResult
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
+    from msgflow.export.graph import Graph
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links import AppliedLinks
@@ -320,6 +321,72 @@ class Database:
             )
 
         return self._ask(read)
+
+    def flow_page(self, flow: Flow, path: str | Path) -> int:
+        """Write the timeline of a flow into one file that any browser opens; return its bytes.
+
+        It is drawn whole in the direction of the flow, up to its limit of vertices, whatever the
+        depth; ROS's own topics included.
+
+        Args:
+            flow: as `flow` returned it.
+            path: the file; one that exists is replaced.
+
+        Raises:
+            UsageError: the file cannot be written.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.view.flow_page import write_flow_page
+
+        connection = self.connection
+        return interruptible(
+            connection,
+            lambda: write_flow_page(
+                connection,
+                Path(path),
+                flow.run,
+                *flow.start_key,
+                direction=flow.direction,
+                limit=flow.limit,
+            ),
+        )
+
+    def graph(
+        self,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+        internal: bool = False,
+    ) -> Graph:
+        """Return who sends what to whom, to be written as DOT, Mermaid, SVG or JSON.
+
+        Args:
+            run: a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+            internal: show ROS's own topics and services too.
+
+        Raises:
+            UsageError: not exactly one run, or a time that cannot be read.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.graph import Graph
+
+        result = self.query(
+            "graph", run=run, start=start, end=end, skip_first=skip_first, internal=internal
+        )
+        if len(result.runs) != 1:
+            raise UsageError(
+                "a graph is of one run" if result.runs else "the database holds no run yet",
+                "choose one with --run" if result.runs else "msgflow ingest TRACE",
+            )
+        return Graph(result.runs[0], result, result.notes)
 
     def compare(
         self,

@@ -16,6 +16,7 @@ from msgflow.cli import (
     events,
     export,
     flow,
+    graph,
     info,
     ingest,
     links,
@@ -42,6 +43,7 @@ app = typer.Typer(
 app.command("ingest")(ingest.command)
 app.add_typer(query.app, name="query")
 app.command("flow")(flow.command)
+app.command("graph")(graph.command)
 app.command("ui")(ui.command)
 app.command("report")(report.command)
 app.command("compare")(compare.command)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,6 +17,7 @@ from msgflow.cli.options import (
     OutputOption,
     RunOption,
 )
+from msgflow.errors import UsageError
 
 _START = "Which message"
 
@@ -125,6 +127,15 @@ def command(
         ),
     ] = None,
     output: OutputOption = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            "--html",
+            metavar="FILE.html",
+            help="Write its timeline into one file that any browser opens, and print nothing",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Print the flow of one message: what it was caused by, and what it caused.
@@ -134,9 +145,13 @@ def command(
 
     Times count from the first line. NA is what the trace does not show.
     """
-    from msgflow.cli.output import print_note, print_runs, print_text
+    from msgflow.cli.output import print_note, print_runs, print_status, print_text
     from msgflow.database import Database
 
+    if html is not None and html.suffix.lower() not in (".html", ".htm"):
+        raise UsageError(f"a page has a name that ends with .html — {html}", "--html FILE.html")
+    if html is not None and (output is not None or form is not None):
+        raise UsageError("--html goes without --format and -o", "ask twice")
     with Database(database) as opened:
         flow = opened.flow(
             topic,
@@ -152,7 +167,11 @@ def command(
             limit=limit,
             internal=internal,
         )
+        size = None if html is None else opened.flow_page(flow, html)
     print_runs([flow.run])
+    if size is not None:
+        print_status(f"{size:,} bytes written to {html}: open it in a browser")
+        return
     is_json = form is FlowFormat.JSON or (
         form is None and output is not None and output.suffix.lower() == ".json"
     )

@@ -26,8 +26,8 @@ _LEAKED = (
     ("Input should be ", "it has to be "),
 )
 COMMANDS = (
-    "ingest", "query", "flow", "ui", "report", "compare", "sql", "info", "check", "events", "links",
-    "clocks", "export", "db", "simulate",
+    "ingest", "query", "flow", "graph", "ui", "report", "compare", "sql", "info", "check", "events",
+    "links", "clocks", "export", "db", "simulate",
 )  # fmt: skip
 
 

@@ -6,10 +6,8 @@ around the slowest flows of each path, with the whole run in bins beside them.
 
 from __future__ import annotations
 
-import base64
 import gzip
-import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -19,10 +17,10 @@ from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.query.run import read_runs
 from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs, time_window
-from msgflow.view import assets
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
+from msgflow.view.single_page import Parts, single_page
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,10 +36,6 @@ MOST_PATHS = 200
 _BYTES_PER_BAR = 16
 _LEVEL_SHARE = 0.25
 _STRETCHES = 12
-_POLICY = (
-    "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data:;"
-    " base-uri 'none'; form-action 'none'"
-)
 
 
 @dataclass(frozen=True)
@@ -59,21 +53,6 @@ class Report:
     size: int
     run: Run
     notes: tuple[str, ...] = ()
-
-
-@dataclass
-class _Parts:
-    keys: list[dict[str, Any]] = field(default_factory=list)
-    buffers: list[bytes] = field(default_factory=list)
-
-    def add(self, key: str, content: bytes) -> None:
-        self.keys.append({"key": key, "length": len(content)})
-        self.buffers.append(content)
-
-    def pack(self, head: dict[str, Any]) -> bytes:
-        text = json.dumps(head | {"parts": self.keys}, ensure_ascii=False).encode()
-        content = b"".join([len(text).to_bytes(4, "little"), text, *self.buffers])
-        return gzip.compress(content, compresslevel=6, mtime=0)
 
 
 def write_report(
@@ -141,7 +120,7 @@ class _Maker:
         self.max_size = max_size
         self.progress = progress
         self.notes: list[str] = []
-        self.parts = _Parts()
+        self.parts = Parts()
 
     def answer(self, name: str, /, **params: Any) -> bytes:
         return self.pages.answer(self.connection, name, self.params | params)
@@ -179,7 +158,7 @@ class _Maker:
             self.compared(compare)
         self.progress("timeline")
         head = self.timeline((begin, end), chosen)
-        return self.page(head), self.notes
+        return single_page(self.parts, head), self.notes
 
     def runs(self, compare: str | None) -> None:
         table = run_page_query(self.connection, "run", {})
@@ -264,7 +243,7 @@ class _Maker:
         rows = self.rows_on(paths) if self.through is not None else None
         (count,) = run_page_query(self.connection, "segment_count", values)["count"].to_pylist()
         head["count"] = count
-        used = len(self.page(head | {"notes": self.notes}).encode())
+        used = len(single_page(self.parts, head | {"notes": self.notes}).encode())
         room = self.max_size - used
         if room < 0:
             raise UsageError(
@@ -379,21 +358,3 @@ class _Maker:
         worst = self.pages.ask("path_slowest", {"run": self.extent.run.run_id, "limit": 1})
         order = worst.sort_by([("latency", "descending")])
         return [int(at) for at in order["root_at"].to_pylist()]
-
-    def page(self, head: dict[str, Any]) -> str:
-        packed = base64.b64encode(self.parts.pack(head)).decode()
-        scripts = [*(assets.vendored(name) for name in assets.SCRIPTS), assets.joined()]
-        styles = [*(assets.vendored(name) for name in assets.SHEETS), assets.text("style.css")]
-        policy = _POLICY.format(
-            scripts=" ".join(map(assets.source_hash, scripts)),
-            styles=" ".join(map(assets.source_hash, styles)),
-        )
-        # The browser runs scripts at the end of the page, behind the data.
-        body = [f'<script type="application/octet-stream" id="msgflow-data">{packed}</script>']
-        body += [f"<script>{script}</script>" for script in scripts[:-1]]
-        body.append(f'<script type="module">{scripts[-1]}</script>')
-        return assets.page(
-            head="\n".join(f"<style>{style}</style>" for style in styles),
-            body="\n".join(body),
-            policy=policy,
-        )

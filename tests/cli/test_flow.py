@@ -59,6 +59,8 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("--topic", "/chatter", "--at", "2s"), "at or after that time — 2s"),
         (("--publication", "1", "--limit", "0"), "--limit"),
         (("--publication", "1", "--direction", "up"), "--direction"),
+        (("--publication", "1", "--html", "a.txt"), ".html"),
+        (("--publication", "1", "--html", "a.html", "--format", "json"), "--html"),
     ],
 )
 def test_mistakes_have_code_2(
@@ -69,6 +71,15 @@ def test_mistakes_have_code_2(
     assert result.stdout == ""
     assert message in result.stderr
     assert "\n\nhint: " in result.stderr
+
+
+def test_a_page_is_written_in_place_of_the_tree(
+    msgflow: Msgflow, small_database: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "flow.html"
+    result = msgflow("flow", "--publication", 1, "--html", target, "--db", small_database)
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert f"{target.stat().st_size:,} bytes written to {target}" in result.stderr
 
 
 def test_the_options_are_those_of_the_library(msgflow: Msgflow) -> None:

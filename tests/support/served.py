@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import duckdb
+
 from msgflow.view.server import running
 
 
@@ -72,3 +74,37 @@ class Page:
         rows.first.wait_for(timeout=30_000)
         found = rows.evaluate_all("rows => rows.map(row => [row.dataset.kind, row.dataset.id])")
         return {(kind, int(number)) for kind, number in found}
+
+
+def flow_of(connection: duckdb.DuckDBPyConnection, kind: str, number: int) -> set[tuple[str, int]]:
+    return set(
+        connection.execute("SELECT kind, id FROM flow_both(?, ?)", [kind, number]).fetchall()
+    )
+
+
+def a_publication(connection: duckdb.DuckDBPyConnection, run: int) -> int:
+    ((number,),) = connection.execute(
+        "SELECT min(publication_id) FROM link_causal AS c JOIN link_transport AS t"
+        " USING (publication_id) WHERE c.run_id = ? AND c.kind <> 'direct'",
+        [run],
+    ).fetchall()
+    if number is None:
+        ((number,),) = connection.execute(
+            "SELECT quantile_disc(publication_id, 0.5) FROM link_transport WHERE run_id = ?", [run]
+        ).fetchall()
+    return int(number)
+
+
+def colors(page: Page) -> int:
+    """Return how many colours the canvas has: a blank one has few."""
+    found: int = page.page.locator("canvas.timeline").evaluate(
+        """canvas => {
+            const { width, height } = canvas;
+            const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+            const seen = new Set();
+            for (let at = 0; at < data.length; at += 4)
+                seen.add((data[at] << 16) | (data[at + 1] << 8) | data[at + 2]);
+            return seen.size;
+        }"""
+    )
+    return found

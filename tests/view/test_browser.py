@@ -8,7 +8,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from served import Page, Served
+from served import Page, Served, a_publication, colors, flow_of
 
 from msgflow.database import open_db
 
@@ -17,43 +17,9 @@ Report = Callable[..., str]
 Serve = Callable[[Path], Served]
 
 
-def flow_of(connection: duckdb.DuckDBPyConnection, kind: str, number: int) -> set[tuple[str, int]]:
-    return set(
-        connection.execute("SELECT kind, id FROM flow_both(?, ?)", [kind, number]).fetchall()
-    )
-
-
-def a_publication(connection: duckdb.DuckDBPyConnection, run: int) -> int:
-    ((number,),) = connection.execute(
-        "SELECT min(publication_id) FROM link_causal AS c JOIN link_transport AS t"
-        " USING (publication_id) WHERE c.run_id = ? AND c.kind <> 'direct'",
-        [run],
-    ).fetchall()
-    if number is None:
-        ((number,),) = connection.execute(
-            "SELECT quantile_disc(publication_id, 0.5) FROM link_transport WHERE run_id = ?", [run]
-        ).fetchall()
-    return int(number)
-
-
 def picked(kind: str, number: int) -> str:
     """Return how the row of a picked thing is found."""
     return f".steps tr[data-kind={kind}][data-id='{number}'][aria-selected=true]"
-
-
-def colors(page: Page) -> int:
-    """Return how many colours the canvas has: a blank one has few."""
-    found: int = page.page.locator("canvas.timeline").evaluate(
-        """canvas => {
-            const { width, height } = canvas;
-            const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
-            const seen = new Set();
-            for (let at = 0; at < data.length; at += 4)
-                seen.add((data[at] << 16) | (data[at + 1] << 8) | data[at + 2]);
-            return seen.size;
-        }"""
-    )
-    return found
 
 
 def pick_on_canvas(page: Page, kind: int) -> tuple[str, int]:

@@ -31,6 +31,8 @@ class App {
   async start() {
     const runs = await this.source.fetch("run");
     this.runs = records(runs);
+    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => !this.source.pages || this.source.pages.includes(page)));
+    if (!location.hash && this.source.address) history.replaceState(null, "", this.source.address);
     this.main = document.querySelector("main");
     this.nav = document.querySelector("nav");
     this.header();
@@ -56,7 +58,7 @@ class App {
       ? h("select", { "aria-label": "run", on: { change: (event) => go({ page: current().page, run: event.target.value, from: null, to: null, flow: null, path: null, hide: null }) } },
         this.runs.map((run) => h("option", { value: String(run.run_id), selected: run === this.run }, run.name)))
       : h("span", { className: "run-name" }, this.run?.name ?? "no run");
-    this.tabs = Object.entries(PAGES).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));
+    this.tabs = Object.entries(this.pages).map(([page, [title]]) => ({ page, link: h("a", {}, title) }));
     const theme = h("button", { type: "button", className: "theme", title: "light or dark", "aria-label": "light or dark", on: { click: () => this.theme() } }, "◐");
     clear(this.nav, h("span", { className: "brand" }, "msgflow"), runs, h("span", { className: "tabs" }, this.tabs.map(({ link }) => link)), theme);
     const said = document.querySelector(".said");
@@ -80,8 +82,8 @@ class App {
 
   async show() {
     const asked = current();
-    const [title, Page] = PAGES[asked.page] ?? PAGES.overview;
-    if (!PAGES[asked.page]) { go({ page: "overview" }); return; }
+    const [title, Page] = this.pages[asked.page] ?? [];
+    if (!Page) { go({ page: Object.keys(this.pages)[0] }); return; }
     this.linksMoved();
     document.title = `${title} – ${this.run?.name ?? "msgflow"}`;
     this.page?.leave?.();

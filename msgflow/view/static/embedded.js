@@ -42,6 +42,9 @@ export class EmbeddedSource {
     this.head = head;
     this.tables = tables;
     this.notes = head.notes;
+    // Of one flow alone: the pages there are, and what is on the first one.
+    this.pages = head.pages;
+    this.address = head.address;
     this.decoded = new Map();
   }
 

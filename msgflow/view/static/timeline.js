@@ -60,7 +60,8 @@ export class TimelinePage {
     this.relayout();
     await this.load();
     if (asked.flow) await this.pickText(asked.flow, !asked.from);
-    this.slowest();
+    // Where only one flow is at hand there is no other one to go to.
+    if (this.app.source.pages) this.worst.hidden = true; else this.slowest();
   }
 
   tools() {

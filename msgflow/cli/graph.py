@@ -1,0 +1,61 @@
+"""`msgflow graph`: who sends what to whom, for other programs to draw, or as a picture."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    OUTPUT,
+    DatabaseOption,
+    EndOption,
+    InternalOption,
+    OutputOption,
+    RunOption,
+    SkipFirstOption,
+    StartOption,
+)
+from msgflow.export.graph import GraphFormat
+
+
+def command(
+    run: RunOption = None,
+    start: StartOption = None,
+    end: EndOption = None,
+    skip_first: SkipFirstOption = None,
+    internal: InternalOption = False,
+    form: Annotated[
+        GraphFormat | None,
+        typer.Option(
+            "--format",
+            help="A language, or a picture",
+            show_default="by the suffix of FILE, else dot",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write the graph of nodes, topics and services, with rates and latencies.
+
+    Topics have their rate, arrows to receivers median and p95 from publication to take, arrows to
+    services those of the round trip. Dashed (periodic_async) and dotted (partial_sync) is what an
+    indirect link leads to; nodes of one executor stand together.
+    """
+    from msgflow.cli.output import print_note, print_runs, print_text
+    from msgflow.database import Database
+    from msgflow.export.graph import graph_format
+
+    form = form or graph_format(output)
+    with Database(database) as opened:
+        graph = opened.graph(
+            run=run, start=start, end=end, skip_first=skip_first, internal=internal
+        )
+    print_runs([graph.run])
+    print_text(lambda width, color: graph.to(form), output)
+    if not graph.rows:
+        print_note("nothing was sent or received")
+    for note in graph.notes:
+        print_note(note)

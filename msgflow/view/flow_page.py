@@ -1,0 +1,98 @@
+"""`msgflow flow --html`: the timeline of one message in one file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
+from pyarrow import compute
+
+from msgflow.atomic import replacing
+from msgflow.view.columns import encode
+from msgflow.view.page_query import run_page_query
+from msgflow.view.pages import Pages
+from msgflow.view.single_page import Parts, single_page
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.query.window import Run
+
+_BAR = ["row_key", "kind", "id", "start_at", "length", "flags"]
+_WANTED = {"forward": "is_effect", "backward": "is_cause"}
+
+
+def write_flow_page(
+    connection: duckdb.DuckDBPyConnection,
+    path: Path,
+    run: Run,
+    kind: str,
+    number: int,
+    *,
+    direction: str,
+    limit: int,
+) -> int:
+    """Write the timeline of everything that a thing led to and came from; return its bytes.
+
+    Args:
+        connection: to a database with the public views.
+        path: the file; one that exists is replaced.
+        run: the run that the thing belongs to.
+        kind: 'publication', 'take', 'callback_instance', 'request' or 'response'.
+        number: its identity.
+        direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
+        limit: most vertices, those nearest in time; the page says how many there are beyond.
+    """
+    pages = Pages()
+    params: dict[str, Any] = {"run": str(run.run_id)}
+    extent = pages.extent(connection, params)
+    frame = {"run": run.run_id, "origin_ns": extent.origin_ns}
+    flow = run_page_query(connection, "flow", frame | {"kind": kind, "id": number, "limit": limit})
+    if direction in _WANTED:
+        flow = flow.filter(flow[_WANTED[direction]])
+    count = int(flow["vertex_count"][0].as_py()) if flow.num_rows else 0
+    bars = flow.group_by(_BAR, use_threads=False).aggregate([])
+    bars = bars.sort_by([(name, "ascending") for name in ("row_key", "start_at", "kind", "id")])
+    begin = compute.min(bars["start_at"]).as_py() or 0
+    end = compute.max(compute.add(bars["start_at"], bars["length"])).as_py() or 0
+    known = compute.is_valid(flow["from_id"])
+    edges = flow.filter(known).select(["kind", "id", "from_kind", "from_id", "link_kind"])
+    window = (extent.origin_ns + begin - 1, extent.origin_ns + end + 1)
+    values = pages.recorded(connection, extent, window)
+    rows = run_page_query(connection, "row", frame)
+    links = run_page_query(connection, "links", values | {"limit": 2**40})
+    notes = []
+    if direction == "both" and count > bars.num_rows:
+        notes.append(f"{bars.num_rows:,} of {count:,} vertices of the flow are here (--limit).")
+    parts = Parts()
+    runs = run_page_query(connection, "run", {})
+    parts.add("run", encode(runs.filter(compute.equal(runs["run_id"], run.run_id))))
+    parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], bars["row_key"]))))
+    parts.add("gap?", pages.answer(connection, "gap", params))
+    parts.add("detail?place=0", encode(bars))
+    parts.add("links?place=0", encode(_between(links, bars)))
+    parts.add("edge?", encode(edges.rename_columns(["to_kind", "to_id", *edges.column_names[2:]])))
+    pages.close()
+    head = {
+        "start": begin,
+        "end": end,
+        "stretches": [{"start": begin, "end": end, "whole": True}],
+        "count": bars.num_rows,
+        "notes": notes,
+        "pages": ["timeline"],
+        "address": f"#/timeline?flow={kind}:{number}",
+    }
+    with replacing(path) as temporary:
+        temporary.write_text(single_page(parts, head), encoding="utf-8")
+    return path.stat().st_size
+
+
+def _between(links: pa.Table, bars: pa.Table) -> pa.Table:
+    """Return the arrows that lead to a bar of the flow, from a row of it."""
+    ends = bars.select(["row_key", "start_at"]).group_by(["row_key", "start_at"]).aggregate([])
+    inside = links.filter(compute.is_in(links["from_row"], bars["row_key"]))
+    return inside.join(
+        ends, keys=["to_row", "to_at"], right_keys=["row_key", "start_at"], join_type="left semi"
+    )

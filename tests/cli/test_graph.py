@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from typer.testing import Result
+
+from msgflow import Database
+
+Msgflow = Callable[..., Result]
+
+
+def test_the_suffix_or_the_option_chooses_the_format(
+    msgflow: Msgflow, small_database: Path, tmp_path: Path
+) -> None:
+    with Database(small_database) as database:
+        graph = database.graph()
+    result = msgflow("graph", "--db", small_database)
+    assert (result.exit_code, result.stdout) == (0, f"{graph.to_dot()}\n")
+    assert result.stderr.startswith("run: noon (2)\n")
+    for name, text in (
+        ("a.svg", graph.to_svg()),
+        ("a.mmd", graph.to_mermaid()),
+        ("a.gv", graph.to_dot()),
+    ):
+        result = msgflow("graph", "-o", tmp_path / name, "--db", small_database)
+        assert (result.exit_code, result.stdout) == (0, "")
+        assert (tmp_path / name).read_text(encoding="utf-8") == f"{text}\n"
+    result = msgflow("graph", "--format", "json", "--run", "noon", "--db", small_database)
+    assert json.loads(result.stdout)["run"] == "noon"
+
+
+def test_mistakes_have_code_2(msgflow: Msgflow, small_database: Path, tmp_path: Path) -> None:
+    for options, message in (
+        (("-o", tmp_path / "a.png"), "a.png"),
+        (("--run", "all"), "one run"),
+        (("--format", "png"), "--format"),
+    ):
+        result = msgflow("graph", *options, "--db", small_database)
+        assert result.exit_code == 2
+        assert message in result.stderr
+        assert "\n\nhint: " in result.stderr
+    assert not (tmp_path / "a.png").exists()

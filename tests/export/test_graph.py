@@ -1,0 +1,176 @@
+"""The graph of nodes and topics in each of its formats. Its rows have golden cases."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import duckdb
+import pytest
+from golden import fill
+
+from msgflow import Database, UsageError
+from msgflow.export.graph import GraphFormat, graph_format
+
+CASES = Path(__file__).resolve().parents[1] / "query" / "cases" / "path-breakdown"
+# Each would be more than text where a name is not made inert.
+HOSTILE = [
+    '</text></svg><script>document.title = "owned"</script>',
+    '" onload="document.title = 1" x="',
+    'a"]; click v0 "javascript:alert(1)"; x["b',
+    'x", URL="javascript:alert(1)", label="\\N\\G',
+    "line\nend\n  v9 --> v0\r\n}\tdigraph { a -> b",
+    "\x1b]0;owned\x07\x00\u202e`#quot;&lt;%%{init: {}}%%",
+    "]]><![CDATA[ <!-- -->",
+    "/" + "long" * 2_500,
+]
+SVG = "{http://www.w3.org/2000/svg}"
+DOT_TEXT = r'"(?:[^"\\\n]|\\["\\n])*"'
+DOT_LINE = re.compile(
+    rf"digraph msgflow \{{|  rankdir=LR;|  (?:node|edge) \[fontname=sans, fontsize=\d+\];"
+    rf"|  subgraph cluster_\d+ \{{|    label={DOT_TEXT}; fontname=sans; fontsize=9; style=rounded;"
+    rf"| +v\d+ \[label={DOT_TEXT}, shape=\w+(?:, style=rounded)?\];"
+    rf"|  v\d+ -> v\d+ \[(?:label={DOT_TEXT}, )?tooltip={DOT_TEXT}"
+    r'(?:, style=\w+, color="#\w+"|, arrowhead=empty, color=gray40)?\];|  \}|\}'
+)
+MERMAID_TEXT = r'"(?:[A-Za-z0-9 /_.,:\-·%()→+*]|#\d+;|<br/>)*"'
+MERMAID_LINE = re.compile(
+    rf"flowchart LR|  subgraph g\d+\[{MERMAID_TEXT}\]|  end"
+    rf"|  v\d+(?:\[{MERMAID_TEXT}\]|\(\[{MERMAID_TEXT}\]\)|\{{\{{{MERMAID_TEXT}\}}\}})"
+    rf"|  v\d+ (?:-->|==>|-\.->)(?:\|{MERMAID_TEXT}\|)? v\d+"
+)
+
+
+def database_of(case: str, empty_database: Path, directory: Path) -> Database:
+    path = directory / f"{case}.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
+        fill(connection, CASES / case / "input")
+    return Database(path)
+
+
+@pytest.fixture
+def hostile(empty_database: Path, tmp_path: Path) -> Iterator[Database]:
+    """Nodes, topics, process and executor with names that nobody should have."""
+    with database_of("every_part", empty_database, tmp_path) as database:
+        with duckdb.connect(str(database.path)) as connection:
+            for table, column in (
+                ("node", "full_name"),
+                ("publisher", "topic_name"),
+                ("subscription", "topic_name"),
+            ):
+                connection.execute(
+                    f"UPDATE store.{table} SET {column} = "
+                    f"$names[1 + ({table}_id - 1) % len($names)] || '{table[0]}'",
+                    {"names": HOSTILE},
+                )
+            connection.execute("UPDATE store.publisher SET topic_name = $n", {"n": HOSTILE[7]})
+            connection.execute("UPDATE store.process SET name = $n", {"n": HOSTILE[5]})
+            connection.execute("UPDATE store.host SET hostname = $n", {"n": HOSTILE[0]})
+        yield database
+
+
+def test_the_formats_hold_the_same_graph(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("every_part", empty_database, tmp_path) as database:
+        graph = database.graph()
+    content = json.loads(graph.to_json())
+    names = {vertex["id"]: vertex["name"] for vertex in content["vertices"]}
+    edges = {
+        (names[edge["source"]], names[edge["target"]], edge["kind"], edge["indirect"])
+        for edge in content["edges"]
+    }
+    assert edges == {
+        ("/source", "/a", "publish", None),
+        ("/a", "/fusion", "receive", None),
+        ("/fusion", "/c", "publish", "periodic_async"),
+        ("/c", "/sink", "receive", None),
+    }
+    latencies = {edge["median_ns"] for edge in content["edges"]}
+    assert latencies == {None, 276, -5}
+    assert {vertex["executor"] for vertex in content["vertices"]} == {None, 1, 2, 3}
+    picture = ElementTree.fromstring(graph.to_svg())
+    assert len(picture.findall(f".//{SVG}rect[@class='lane']")) == 3
+    assert [line.get("class") for line in picture.findall(f".//{SVG}path[@marker-end]")].count(
+        "edge publish periodic_async"
+    ) == 1
+    for text in (graph.to_dot(), graph.to_mermaid()):
+        assert len(re.findall(r"^  v\d+ .*>", text, re.MULTILINE)) == 4
+        assert all(name in text for name in names.values())
+        assert "276 ns · 276 ns" in text
+    assert "style=dashed" in graph.to_dot()
+    assert graph.to_mermaid().count("-.->") == 1
+    assert str(graph) == "graph of run case: 3 nodes, 2 topics, 0 services"
+
+
+def test_services_are_drawn_differently(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("services", empty_database, tmp_path) as database:
+        graph = database.graph()
+    assert graph.to_dot().count("shape=hexagon") == 2
+    assert graph.to_dot().count("arrowhead=empty") == 4
+    assert graph.to_mermaid().count("{{") == 2
+    assert graph.to_mermaid().count(" ==> ") == 4
+    assert graph.to_svg().count('class="service"') == 2
+
+
+def test_loops_and_nothing_at_all_are_drawn(empty_database: Path, tmp_path: Path) -> None:
+    with database_of("every_part", empty_database, tmp_path) as database:
+        with duckdb.connect(str(database.path)) as connection:
+            connection.execute("UPDATE store.subscription SET topic_name = '/c'")
+        graph = database.graph()
+        assert {("/c", "receive"), ("/c", "publish")} <= {
+            (row["name"], row["kind"]) for row in graph.rows if row["node"] == "/fusion"
+        }
+        ElementTree.fromstring(graph.to_svg())
+        nothing = database.graph(start=10**15)
+        assert not nothing.rows
+        ElementTree.fromstring(nothing.to_svg())
+        assert nothing.to_mermaid() == "flowchart LR"
+
+
+def test_hostile_names_are_inert_in_dot(hostile: Database) -> None:
+    text = hostile.graph().to_dot()
+    assert all(DOT_LINE.fullmatch(line) for line in text.splitlines())
+    assert not re.search(r"\\[^\"\\n]", re.sub(r"\\\\", "", text))
+    program = shutil.which("dot")
+    if program:
+        subprocess.run([program, "-Tsvg"], input=text.encode(), check=True, capture_output=True)
+
+
+def test_hostile_names_are_inert_in_mermaid(hostile: Database) -> None:
+    text = hostile.graph().to_mermaid()
+    assert all(MERMAID_LINE.fullmatch(line) for line in text.splitlines())
+
+
+def test_hostile_names_are_inert_in_svg(hostile: Database) -> None:
+    text = hostile.graph().to_svg()
+    picture = ElementTree.fromstring(text)
+    known = {"svg", "title", "style", "defs", "marker", "path", "g", "rect", "text"}
+    assert {element.tag.removeprefix(SVG) for element in picture.iter()} == known
+    allowed = {
+        "width", "height", "viewBox", "role", "id", "refX", "refY", "markerWidth", "markerHeight",
+        "orient", "d", "fill", "class", "x", "y", "rx", "marker-end", "text-anchor",
+    }  # fmt: skip
+    assert {name for element in picture.iter() for name in element.attrib} <= allowed
+    shown = [element.text for element in picture.iter(f"{SVG}text")]
+    assert all(len(line or "") <= 160 for line in shown)
+    assert any("onload" in (element.text or "") for element in picture.iter(f"{SVG}title"))
+
+
+def test_the_suffix_chooses_the_format() -> None:
+    assert graph_format(None) is GraphFormat.DOT
+    assert graph_format(Path("a.GV")) is GraphFormat.DOT
+    assert graph_format(Path("a.mmd")) is GraphFormat.MERMAID
+    assert graph_format(Path("a.svg")) is GraphFormat.SVG
+    assert graph_format(Path("a.json")) is GraphFormat.JSON
+    with pytest.raises(UsageError, match=r"a\.png"):
+        graph_format(Path("a.png"))
+
+
+def test_a_graph_is_of_one_run(empty_database: Path) -> None:
+    with Database(empty_database) as database, pytest.raises(UsageError, match="no run yet"):
+        database.graph()

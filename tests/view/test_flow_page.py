@@ -1,0 +1,74 @@
+"""One flow, and the graph, as files of their own: in a real browser, also with hostile names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from hostile import HOSTILE, renamed
+from served import Page, a_publication, colors, flow_of
+
+from msgflow.database import open_db
+
+Read = Callable[[Path], duckdb.DuckDBPyConnection]
+
+
+@pytest.mark.parametrize("direction", ["both", "forward", "backward"])
+def test_the_file_has_exactly_the_flow(
+    direction: str, systems: Path, read: Read, tmp_path: Path, page: Page
+) -> None:
+    connection = read(systems)
+    number = a_publication(connection, 3)
+    target = tmp_path / "flow.html"
+    with open_db(systems) as opened:
+        flow = opened.flow(publication_id=number, direction=direction)
+        assert opened.flow_page(flow, target) == target.stat().st_size < 600_000
+    page.open(target.as_uri())
+    wanted = set(
+        connection.execute(
+            f"SELECT kind, id FROM flow_{direction}('publication', ?)", [number]
+        ).fetchall()
+    )
+    assert len(wanted) > 1
+    assert page.flow() == wanted
+    assert f"flow=publication%3A{number}" in page.page.url
+    assert page.page.locator("nav .tabs a").all_text_contents() == ["Timeline"]
+    assert colors(page) > 8
+    # Arrows are there also where nothing is picked: those of the flow alone.
+    page.page.keyboard.press("Escape")
+    arrows = page.page.evaluate("msgflow.page.renderer.links.rows")
+    assert 0 < arrows <= len(wanted)
+
+
+def test_what_the_limit_leaves_out_is_said(
+    systems: Path, read: Read, tmp_path: Path, page: Page
+) -> None:
+    number = a_publication(read(systems), 3)
+    count = len(flow_of(read(systems), "publication", number))
+    target = tmp_path / "flow.html"
+    with open_db(systems) as opened:
+        opened.flow_page(opened.flow(publication_id=number, limit=5), target)
+    page.open(target.as_uri())
+    assert len(page.flow()) == 5
+    assert f"5 of {count} vertices" in page.page.locator(".said").inner_text()
+
+
+def test_hostile_names_are_inert(systems: Path, tmp_path: Path, page: Page) -> None:
+    path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
+    target, picture = tmp_path / "flow.html", tmp_path / "graph.svg"
+    with open_db(path) as opened:
+        ((number,),) = opened.connection.execute(
+            "SELECT min(publication_id) FROM publication WHERE run_id = 3"
+        ).fetchall()
+        opened.flow_page(opened.flow(publication_id=number), target)
+        picture.write_text(opened.graph(run=3).to_svg(), encoding="utf-8")
+    page.open(target.as_uri())
+    assert page.flow()
+    assert page.page.evaluate("typeof hacked") == "undefined"
+    page.page.goto(picture.as_uri())
+    assert page.page.evaluate("typeof hacked") == "undefined"
+    assert page.page.evaluate("document.documentElement.tagName") == "svg"
+    assert page.page.locator("text").count() > 20
+    assert page.page.locator("script, image, a, foreignObject").count() == 0
