@@ -28,8 +28,8 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- A difference that this share of the best one's messages agrees with may be the right one.
     'rival_share': 0.9,
     -- Where the drift is right, nearly all messages agree; or, if some are of publishers that are
-    -- not traced, far more than on another difference within a burst. Where it is not, each
-    -- stretch has its own.
+    -- not traced, no other difference has a share as of rivals. Where it is not, each stretch has
+    -- its own.
     'sharp_share': 0.95,
     -- Differences less apart than this are within a burst: there the best one is right. Others are
     -- periods apart.

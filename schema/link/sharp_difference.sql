@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: The difference of two clocks that most messages of some stretches of time allow,
 --     each brought to the middle of one stretch by the drift. It is sharp, and tells messages
---     apart that were published within microseconds, unless some do not allow it while nearly as
---     many allow another one.
+--     apart that were published within microseconds, unless some do not allow it while nine
+--     tenths as many allow another one.
 -- grain: one row per row of the course
 -- param: pairs VARCHAR  Name of rows of clock_id, stretch, written_ns, least_ns, greatest_ns
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
@@ -47,7 +47,8 @@ agreed AS (
     SELECT
         clock_id, stretch,
         max({'votes': vote_count, 'difference_ns': difference_ns}).difference_ns AS difference_ns,
-        max(vote_count, 2) AS votes
+        max(vote_count) AS vote_count,
+        count(*) AS region_count
     FROM derive.agreed_difference('allowed')
     WHERE most_count >= derive.clock_limit().quorum
     GROUP BY clock_id, stretch
@@ -57,8 +58,8 @@ SELECT
     coalesce(a.difference_ns, c.offset_ns) AS offset_ns,
     d.drift_ppb,
     coalesce(
-        a.votes[1] >= derive.clock_limit().sharp_share * h.message_count
-        OR coalesce(a.votes[2], 0) < derive.clock_limit().sharp_share * a.votes[1],
+        a.vote_count >= derive.clock_limit().sharp_share * h.message_count
+        OR a.region_count = 1,
         false
     ) AS is_sharp
 FROM query_table(course) AS c
