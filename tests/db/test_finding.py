@@ -176,15 +176,15 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     ),
     "unbalanced_callbacks": (
         {
-            # the second is explained by a gap, the last may still be running; another callback is
+            # the third is explained by a gap, the last may still be running; another callback is
             # cut while others run in it, then comes again
             "callback_instance": "callback_instance_id,callback_id,start_ns,end_ns,"
             "is_loss_affected\n"
-            "1,1,10,,false\n2,1,20,,true\n3,1,30,35,false\n4,1,60,,false\n"
+            "1,1,10,,false\n7,1,12,,false\n2,1,20,,true\n3,1,30,35,false\n4,1,60,,false\n"
             "5,2,38,,false\n6,2,50,55,false\n",
             "thread_break": "thread_id,resumed_ns\n1,45\n",
         },
-        [("process 1 on host", 1, "1 run of 1 callback")],
+        [("process 1 on host", 2, "2 runs of 1 callback")],
     ),
     "clocks_apart": (
         {
@@ -198,24 +198,26 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     "clocks_not_together": (
         {
             **TWO_HOSTS,
-            "publication": PUBLISHED + "1,1,1,5000,6000,7\n2,2,2,5000,6000,8\n",
-            "take": TAKEN + "1,1,2,6000,7,rmw\n2,1,1,5999,8,rmw\n",
-            "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
+            "publication": PUBLISHED
+            + "1,1,1,0,1000000,7\n2,2,2,0,1000000,8\n3,1,1,0,4000000,9\n",
+            "take": TAKEN + "1,1,2,1500000,7,rmw\n2,1,1,999999,8,rmw\n3,1,2,7250000,9,rmw\n",
+            "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n3,3,exact\n",
         },
         # The other way they are shown to be apart.
-        [("alpha → beta", 1, "1 message, from 0.000 ms to 0.000 ms as recorded")],
+        [("alpha → beta", 2, "2 messages, from 0.500 ms to 3.250 ms as recorded")],
     ),
     "latency_uncertain": (
         {
             **TWO_HOSTS,
             "clock": "clock_id,method,reference_clock_id,uncertainty_ns\n1,none,1,0\n"
             "2,messages,1,5\n",
-            "clock_uncertainty": "clock_id,at_ns,uncertainty_ns\n2,0,1000\n2,10000,2000\n",
+            "clock_uncertainty": "clock_id,at_ns,uncertainty_ns\n2,0,1000000\n"
+            "2,10000000,2000000\n",
             "publication": PUBLISHED
             + "1,1,1,0,0,1\n2,1,1,0,0,2\n3,1,1,0,0,3\n4,2,2,0,0,4\n5,2,2,0,0,5\n",
             # Two of three one way, one of two the other.
-            "take": TAKEN + "1,1,2,1000,1,rmw\n2,1,2,1100,2,rmw\n3,1,2,5000,3,rmw\n"
-            "4,1,1,999,4,rmw\n5,1,1,1000,5,rmw\n",
+            "take": TAKEN + "1,1,2,1000000,1,rmw\n2,1,2,1100000,2,rmw\n3,1,2,5000000,3,rmw\n"
+            "4,1,1,999999,4,rmw\n5,1,1,1000000,5,rmw\n",
             "link_transport": "publication_id,take_id,method\n"
             "1,1,exact\n2,2,exact\n3,3,exact\n4,4,exact\n5,5,exact\n",
         },
@@ -223,8 +225,8 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             (
                 "alpha → beta",
                 2,
-                "2 of 3 messages took less than the bound of its error, which is up to 0.002 ms; "
-                "the median took 0.001 ms",
+                "2 of 3 messages took less than the bound of its error, which is up to 1.500 ms; "
+                "the median took 1.100 ms",
             )
         ],
     ),
@@ -312,6 +314,42 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_pat
     )
     derive(database, 1)
     assert find(database, [1]) == []
+
+
+@pytest.mark.parametrize(("step_ms", "is_jump"), [(99, False), (101, True)])
+def test_a_jump_is_more_than_a_tenth_of_a_second(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path, step_ms: int, *, is_jump: bool
+) -> None:
+    stamp = 12_000_000_000 + step_ms * 1_000_000
+    fill(
+        database,
+        tmp_path,
+        {
+            **SOUND,
+            "publication": PUBLISHED + "1,1,1,1000,1000,1000\n2,1,1,12000000000,12000000000,9\n",
+            "take": TAKEN + f"1,1,1,2000,1000,rmw\n2,1,1,12000000500,{stamp},rmw\n",
+            "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
+        },
+    )
+    assert ("clock_jumps" in {f.name for f in find(database, [1])}) is is_jump
+
+
+@pytest.mark.parametrize(("early_ms", "is_early"), [(490, False), (510, True)])
+def test_a_stream_ends_early_that_ends_half_a_second_before_another(
+    database: duckdb.DuckDBPyConnection, tmp_path: Path, early_ms: int, *, is_early: bool
+) -> None:
+    """However long the recording is."""
+    hour = 3_600 * 10**9
+    fill(
+        database,
+        tmp_path,
+        {
+            **SOUND,
+            "packet": "cpu_id,stream_instance_id,begin_ns,end_ns\n"
+            f"0,0,0,{hour}\n1,1,0,{hour - early_ms * 10**6}\n",
+        },
+    )
+    assert [f.name for f in find(database, [1])] == ["stream_ends_early"] * is_early
 
 
 def test_the_chunks_of_a_recording_are_one(
