@@ -131,6 +131,36 @@ def test_an_interval_of_a_mean_is_as_wide_as_theory_says(fresh_database: Path) -
     assert 0.98 * expected <= sum(widths) / len(widths) <= 1.18 * expected
 
 
+def test_each_statistic_is_of_the_values_and_in_its_interval(fresh_database: Path) -> None:
+    """All durations from 1 to 1000 us in no order, and others that are nearly equal."""
+    count = 1_000
+    _fill(fresh_database, shift_ns=0, callbacks=1, values=count)
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute(
+            "UPDATE store.callback_instance SET end_ns = start_ns + CASE run_id "
+            "WHEN 1 THEN ((start_ns // 10000000) * 7919 % $count + 1) * 1000 "
+            "ELSE 10000000 + (start_ns // 10000000) * 7919 % 10 END",
+            {"count": count},
+        )
+    with msgflow.open_db(fresh_database) as database:
+        rows = {row["statistic"]: row for row in _rows(database, "after", resamples=200)}
+    values = {name: row["a_ns"] for name, row in rows.items()}
+    assert values == {
+        "median": 500_000, "mean": 500_500, "p95": 950_000, "p99": 990_000, "max": 1_000_000,
+    }  # fmt: skip
+    for name in ("median", "mean", "p95", "p99"):
+        row = rows[name]
+        assert row["b_ns"] == pytest.approx(10_000_004, abs=6)
+        # B has no spread to speak of. Values as quantiles vary in A: in so many resamples they do
+        # to either side, and by less than four standard deviations.
+        share = {"median": 0.5, "p95": 0.95, "p99": 0.99}.get(name)
+        deviation = 0.289 if share is None else (share * (1 - share)) ** 0.5
+        spread = 4 * deviation * 1_000_000 / count**0.5
+        assert row["difference_ns"] - spread < row["low_ns"] < row["difference_ns"], name
+        assert row["difference_ns"] < row["high_ns"] < row["difference_ns"] + spread, name
+    assert rows["max"]["low_ns"] is None
+
+
 def test_values_that_are_held_count_once(fresh_database: Path) -> None:
     """Of 1280 durations, 64 are independent, whose means differ by more than those of 1280."""
     _fill(fresh_database, shift_ns=0, callbacks=16, values=1_280, held=20)
