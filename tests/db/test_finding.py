@@ -198,8 +198,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     "clocks_not_together": (
         {
             **TWO_HOSTS,
-            "publication": PUBLISHED
-            + "1,1,1,0,1000000,7\n2,2,2,0,1000000,8\n3,1,1,0,4000000,9\n",
+            "publication": PUBLISHED + "1,1,1,0,1000000,7\n2,2,2,0,1000000,8\n3,1,1,0,4000000,9\n",
             "take": TAKEN + "1,1,2,1500000,7,rmw\n2,1,1,999999,8,rmw\n3,1,2,7250000,9,rmw\n",
             "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n3,3,exact\n",
         },
@@ -211,8 +210,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             **TWO_HOSTS,
             "clock": "clock_id,method,reference_clock_id,uncertainty_ns\n1,none,1,0\n"
             "2,messages,1,5\n",
-            "clock_uncertainty": "clock_id,at_ns,uncertainty_ns\n2,0,1000000\n"
-            "2,10000000,2000000\n",
+            "clock_uncertainty": "clock_id,at_ns,uncertainty_ns\n2,0,1000000\n2,10000000,2000000\n",
             "publication": PUBLISHED
             + "1,1,1,0,0,1\n2,1,1,0,0,2\n3,1,1,0,0,3\n4,2,2,0,0,4\n5,2,2,0,0,5\n",
             # Two of three one way, one of two the other.
