@@ -1,8 +1,8 @@
 -- name: finding.stream_ends_early
 -- title: Streams end before their trace
--- description: The last packet of a CPU's stream, in whichever chunk or snapshot that is, ends half a
---     second or more before the last one of other CPUs: events of that CPU may be missing from then
---     on.
+-- description: The last packet of a CPU's stream, in whichever chunk or snapshot that is, ends more
+--     than half a second before the last one of other CPUs: events of that CPU may be missing from
+--     then on.
 -- cause: Files are cut off (no space, power lost, copied while written), or the last buffers were
 --     not written.
 -- cure: Stop the session before copying; check free space; compare the sizes of the files with the
