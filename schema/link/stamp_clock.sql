@@ -9,7 +9,8 @@
 --     difference is not known
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.stamp_pair, derive.clock_drift, derive.agreed_difference,
---     derive.followed_difference, derive.sharp_difference, derive.clock_limit
+--     derive.followed_difference, derive.close_pair, derive.sharp_difference,
+--     derive.clock_limit
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (
     FROM derive.stamp_pair(only_run)
@@ -65,21 +66,13 @@ followed AS MATERIALIZED (
 course AS MATERIALIZED (
     SELECT
         f.clock_id, f.segment AS place, f.stretch, f.difference_ns AS offset_ns,
-        x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns,
-        x.stretch_ns::DOUBLE * derive.clock_limit().drift_ppb / 1e9 AS wander_ns
+        x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns, x.stretch_ns
     FROM followed AS f
     JOIN extent AS x ON f.clock_id = x.clock_id
     WHERE f.message_count > 0
 ),
--- What a drift can make of the difference within a stretch.
 close AS MATERIALIZED (
-    SELECT p.clock_id, p.stretch, p.written_ns, p.least_ns, p.greatest_ns
-    FROM course AS c
-    JOIN pair AS p
-        ON c.clock_id = p.clock_id
-        AND c.stretch = p.stretch
-        AND p.greatest_ns >= c.offset_ns - c.wander_ns
-        AND p.least_ns <= c.offset_ns + c.wander_ns
+    FROM derive.close_pair('pair', 'course')
 ),
 -- Each vote makes the drift better known, so that the next one can be of more stretches.
 beside AS MATERIALIZED (

@@ -14,6 +14,7 @@ RULES = (
     "agreed_difference",
     "clock_drift",
     "followed_difference",
+    "close_pair",
     "sharp_difference",
     "stamp_pair",
     "stamp_clock",

@@ -149,6 +149,27 @@ def test_of_equal_differences_a_jump_is_to_the_greatest(
     assert followed(rules, [jump] * 3) == [(3_004_000, 20, 1)] * 3
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("away", "is_close"), [(99_000, True), (101_000, False)])
+def test_a_pair_is_close_if_a_drift_may_bring_it_there(
+    rules: duckdb.DuckDBPyConnection, away: int, side: int, *, is_close: bool
+) -> None:
+    """200 ppm of half a second are 100 µs."""
+    rules.execute(
+        "CREATE TABLE course AS SELECT 1 AS clock_id, 0 AS stretch, ? AS stretch_ns, "
+        "7000000 AS offset_ns",
+        [STRETCH_NS],
+    )
+    near = 7_000_000 + side * away
+    rules.execute(
+        "CREATE TABLE pair AS SELECT 1 AS clock_id, 0 AS stretch, 0 AS written_ns, "
+        "least(n, f) AS least_ns, greatest(n, f) AS greatest_ns FROM (SELECT ? AS n, ? AS f)",
+        [near, near + side * 1_000],
+    )
+    found = rules.execute("SELECT count(*) FROM derive.close_pair('pair', 'course')").fetchall()
+    assert found == [(is_close,)]
+
+
 def sharp(
     con: duckdb.DuckDBPyConnection,
     offsets: Sequence[int],

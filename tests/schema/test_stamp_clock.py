@@ -75,3 +75,34 @@ def test_bursts_are_told_at_any_drift(rules: duckdb.DuckDBPyConnection, ppm: int
         assert abs(difference - at * ppm // 1_000_000) < 500
         assert abs(drift - ppm * 1_000) < 500
         assert is_sharp
+
+
+def test_three_stretches_on_either_side_vote_together(rules: duckdb.DuckDBPyConnection) -> None:
+    """Threads that go on late say little; the first stretch has others."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    rules.execute(
+        "UPDATE published SET next_event_ns = written_ns + 1000000 WHERE written_ns >= ?",
+        [STRETCH_NS],
+    )
+    rows = rules.execute("SELECT difference_ns FROM derive.stamp_clock(1) ORDER BY start_ns")
+    assert [abs(value) < 1_000 for (value,) in rows.fetchall()] == [True] * 4 + [False] * 4
+
+
+@pytest.mark.parametrize(("here", "is_known"), [(10, True), (7, True), (3, False), (0, False)])
+def test_messages_of_a_stretch_are_taken_where_half_of_them_are(
+    rules: duckdb.DuckDBPyConnection, here: int, *, is_known: bool
+) -> None:
+    """Of a timer that is never late only the clock that they were taken on tells the period."""
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) "
+        "SELECT n, n * $period, n * $period + 2000 FROM range($count) AS r(n)",
+        {"period": PERIOD_NS, "count": COUNT},
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns, clock_id) "
+        "SELECT written_ns + 3000500, written_ns + 200000, "
+        "CASE WHEN publication_id % 10 < $here THEN 1 ELSE 2 END FROM published",
+        {"here": here},
+    )
+    rows = rules.execute("SELECT message_count > 0 FROM derive.stamp_clock(1)").fetchall()
+    assert {known for (known,) in rows} == {is_known}
