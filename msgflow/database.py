@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
     from msgflow.export.graph import Graph
+    from msgflow.export.perfetto import PerfettoTrace
     from msgflow.export.views import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links import AppliedLinks
@@ -589,6 +590,47 @@ class Database:
                 connection, views, run=run, start=start, end=end, skip_first=skip_first
             )
             return export_parquet(connection, Path(directory), selection, force=force)
+
+        return self._ask(export)
+
+    def export_perfetto(
+        self,
+        path: str | Path,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+    ) -> PerfettoTrace:
+        """Write a run as a trace for the Perfetto UI.
+
+        Args:
+            path: the file; one that exists is replaced.
+            run: a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time. What begins in the window is written.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+
+        Raises:
+            UsageError: not exactly one run, a time that cannot be read, a file that cannot be
+                written, or the package perfetto is not installed.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.perfetto import write_perfetto
+        from msgflow.query.window import choose_runs, time_window
+
+        connection = self.connection
+
+        def export() -> PerfettoTrace:
+            runs = choose_runs(read_runs(connection), run)
+            if len(runs) != 1:
+                raise UsageError(
+                    "a trace is of one run" if runs else "the database holds no run yet",
+                    "choose one with --run" if runs else "msgflow ingest TRACE",
+                )
+            window = time_window(runs, start, end, skip_first)
+            return write_perfetto(connection, Path(path), runs[0], window)
 
         return self._ask(export)
 

@@ -9,9 +9,11 @@ import typer
 
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
+    OUTPUT,
     SELECTION,
     DatabaseOption,
     EndOption,
+    RunOption,
     SkipFirstOption,
     StartOption,
 )
@@ -102,6 +104,44 @@ def csv(
             force=force,
         )
     _report(exported, directory)
+
+
+@app.command("perfetto")
+def perfetto(
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="File to write or replace",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = Path("msgflow.pftrace"),
+    run: RunOption = None,
+    start: StartOption = None,
+    end: EndOption = None,
+    skip_first: SkipFirstOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, which reads it in the browser).
+
+    Callbacks, publications, takes, requests and responses on the tracks of their threads, states
+    of executors, arrows for all links, counters for rates and for messages not yet taken.
+
+    It needs the package perfetto: msgflow's extra of that name.
+    """
+    from msgflow.cli.output import count, print_runs, print_status
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        trace = opened.export_perfetto(output, run=run, start=start, end=end, skip_first=skip_first)
+    print_runs([trace.run])
+    print_status(
+        f"{count(trace.slices, 'slice')}, {count(trace.arrows, 'arrow')},"
+        f" {count(trace.values, 'value')} of counters written to {output}:"
+        " open it at ui.perfetto.dev"
+    )
 
 
 def _report(exported: Sequence[ExportedView], directory: Path) -> None:

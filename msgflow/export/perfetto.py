@@ -1,0 +1,207 @@
+"""A run as a trace for the Perfetto UI, written event by event."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.atomic import replacing
+from msgflow.errors import UsageError
+from msgflow.export import perfetto_rows as rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.query.window import Run
+
+_AT_ONCE = 20_000
+_SEQUENCE = 1
+# Identities of things, by the code of the slice.
+_IDENTITIES = (
+    "callback_instance_id",
+    "publication_id",
+    "take_id",
+    "request_id",
+    "request_id",
+    "response_id",
+    "response_id",
+    "executor_id",
+)
+_SYMBOL = len(_IDENTITIES) + 1
+_CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
+
+
+@dataclass(frozen=True)
+class PerfettoTrace:
+    """A trace that was written.
+
+    Attributes:
+        path: the file.
+        run: what it is of.
+        slices: callbacks, publications, takes, requests, responses and states of executors in it.
+        arrows: links between them.
+        values: values of counters.
+    """
+
+    path: Path
+    run: Run
+    slices: int
+    arrows: int
+    values: int
+
+
+def write_perfetto(
+    connection: duckdb.DuckDBPyConnection, path: Path, run: Run, window: tuple[int, int]
+) -> PerfettoTrace:
+    """Write a run as a Perfetto trace; it never lies in memory as a whole.
+
+    Args:
+        connection: to a database with the public views.
+        path: the file; one that exists is replaced.
+        run: the run.
+        window: (begin, end) in epoch ns; what begins in it is written.
+
+    Raises:
+        UsageError: the package perfetto is not installed, or the file cannot be written.
+    """
+    try:
+        from perfetto.trace_builder.proto_builder import StreamingTraceProtoBuilder
+    except ImportError:
+        raise UsageError(
+            "the package that writes Perfetto traces is not installed — perfetto",
+            "pip install perfetto, or install msgflow with its extra: msgflow[perfetto]",
+        ) from None
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
+        writer.describe()
+        slices, arrows = writer.slices(rows.SLICES)
+        slices += writer.slices(rows.STATES)[0]
+        values = writer.values()
+    return PerfettoTrace(path, run, slices, arrows, values)
+
+
+class _Writer:
+    def __init__(
+        self,
+        builder: Any,
+        connection: duckdb.DuckDBPyConnection,
+        run: Run,
+        window: tuple[int, int],
+    ) -> None:
+        from perfetto.protos.perfetto.trace import perfetto_trace_pb2
+
+        self.builder = builder
+        self.connection = connection
+        self.run = run
+        self.bindings = {"run": run.run_id, "start_ns": window[0], "end_ns": window[1]}
+        self.packets = perfetto_trace_pb2
+
+    def rows(self, sql: str) -> Iterator[Mapping[str, Any]]:
+        used = self.connection.extract_statements(sql)[0].named_parameters
+        relation = self.connection.sql(sql, params={name: self.bindings[name] for name in used})
+        with relation.to_arrow_reader(_AT_ONCE) as reader:
+            for batch in reader:
+                yield from batch.to_pylist()
+
+    def describe(self) -> None:
+        """Write clocks, tracks, and the names that slices refer to."""
+        start_ns = self.run.start_ns or 0
+        packet = self.builder.create_packet()
+        # Timestamps are by the former; that it is the latter lets the UI show points in time.
+        for clock in ("BUILTIN_CLOCK_BOOTTIME", "BUILTIN_CLOCK_REALTIME"):
+            number = self.packets.BuiltinClock.Value(clock)
+            packet.clock_snapshot.clocks.add(clock_id=number, timestamp=start_ns)
+        packet.trusted_packet_sequence_id = _SEQUENCE
+        self.builder.write_packet(packet)
+        for row in self.rows(rows.PROCESSES):
+            track = self.track(row["track"])
+            track.track_descriptor.process.pid = row["pid"]
+            track.track_descriptor.process.process_name = row["name"]
+            self.builder.write_packet(track)
+        for row in self.rows(rows.THREADS):
+            track = self.track(row["track"], row["parent"])
+            track.track_descriptor.thread.pid = row["pid"]
+            track.track_descriptor.thread.tid = row["tid"]
+            track.track_descriptor.thread.thread_name = row["name"]
+            self.builder.write_packet(track)
+            if row["has_states"]:
+                track = self.track(row["state_track"], row["track"])
+                track.track_descriptor.name = "executor"
+                self.builder.write_packet(track)
+        for row in self.rows(rows.COUNTERS):
+            track = self.track(row["track"], row["parent"])
+            track.track_descriptor.name = row["name"]
+            track.track_descriptor.counter.unit_name = row["unit"]
+            self.builder.write_packet(track)
+        self.names()
+
+    def track(self, number: int, parent: int | None = None) -> Any:
+        packet = self.builder.create_packet()
+        packet.trusted_packet_sequence_id = _SEQUENCE
+        packet.track_descriptor.uuid = number
+        if parent is not None:
+            packet.track_descriptor.parent_uuid = parent
+        return packet
+
+    def names(self) -> None:
+        packet = self.builder.create_packet()
+        packet.trusted_packet_sequence_id = _SEQUENCE
+        packet.sequence_flags = self.packets.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED
+        for number, name in enumerate((*_IDENTITIES, "symbol"), start=1):
+            packet.interned_data.debug_annotation_names.add(iid=number, name=name)
+        for number, name in enumerate(_CATEGORIES, start=1):
+            packet.interned_data.event_categories.add(iid=number, name=name)
+        for row in self.rows(rows.NAMES):
+            packet.interned_data.event_names.add(
+                iid=row["id"] * 8 + row["code"] + 1, name=row["name"]
+            )
+        for row in self.rows(rows.SYMBOLS):
+            packet.interned_data.debug_annotation_string_values.add(
+                iid=row["id"], str=row["name"].encode()
+            )
+        self.builder.write_packet(packet)
+
+    def event(self, row: Mapping[str, Any], kind: int) -> Any:
+        packet = self.builder.create_packet()
+        packet.timestamp = row["at_ns"]
+        packet.trusted_packet_sequence_id = _SEQUENCE
+        packet.sequence_flags = self.packets.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
+        packet.track_event.type = kind
+        packet.track_event.track_uuid = row["track"]
+        return packet
+
+    def slices(self, sql: str) -> tuple[int, int]:
+        """Write slices; return how many, and how many arrows begin at them."""
+        kind = self.packets.TrackEvent
+        kinds = (kind.TYPE_SLICE_END, kind.TYPE_SLICE_BEGIN, kind.TYPE_INSTANT)
+        slices = arrows = 0
+        for row in self.rows(sql):
+            packet = self.event(row, kinds[row["rank"]])
+            if row["rank"]:
+                slices += 1
+                event = packet.track_event
+                event.name_iid = row["name"]
+                event.category_iids.append(row["code"] + 1)
+                event.debug_annotations.add(name_iid=row["code"] + 1, int_value=row["id"])
+                if row["symbol_id"] is not None:
+                    event.debug_annotations.add(name_iid=_SYMBOL, string_value_iid=row["symbol_id"])
+                if row["outgoing"]:
+                    event.flow_ids.extend(row["outgoing"])
+                    arrows += len(row["outgoing"])
+                if row["incoming"]:
+                    event.terminating_flow_ids.extend(row["incoming"])
+            self.builder.write_packet(packet)
+        return slices, arrows
+
+    def values(self) -> int:
+        """Write what counters show; return how many values."""
+        count = 0
+        for row in self.rows(rows.VALUES):
+            packet = self.event(row, self.packets.TrackEvent.TYPE_COUNTER)
+            packet.track_event.double_counter_value = row["value"]
+            self.builder.write_packet(packet)
+            count += 1
+        return count

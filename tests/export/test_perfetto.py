@@ -1,0 +1,285 @@
+"""Perfetto traces, decoded again: every packet is read as the Perfetto UI reads it."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+
+from msgflow import Database, UsageError
+from msgflow.clocks import apply_clocks, read_clock_sync
+from msgflow.database import open_db
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
+
+IDENTITIES = (
+    "callback_instance_id", "publication_id", "take_id", "request_id", "response_id", "executor_id",
+)  # fmt: skip
+
+
+@dataclass
+class Slice:
+    track: int
+    name: str
+    begin: int
+    end: int
+    notes: dict[str, Any]
+    depth: int
+
+
+@dataclass
+class Decoded:
+    """What a trace says: slices with names and notes, arrows, tracks, values of counters."""
+
+    tracks: dict[int, Any] = field(default_factory=dict)
+    slices: list[Slice] = field(default_factory=list)
+    arrows: set[tuple[int, int]] = field(default_factory=set)
+    values: dict[int, list[tuple[int, float]]] = field(default_factory=lambda: defaultdict(list))
+
+
+def decode(path: Path) -> Decoded:
+    protos = pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    trace = protos.Trace()
+    trace.ParseFromString(path.read_bytes())
+    decoded = Decoded()
+    names: dict[int, str] = {}
+    notes: dict[int, str] = {}
+    texts: dict[int, str] = {}
+    open_slices: dict[int, list[Slice]] = defaultdict(list)
+    begun: dict[int, int] = {}
+    ended: dict[int, int] = {}
+    last: dict[int, int] = {}
+    for packet in trace.packet:
+        for table, entries in (
+            (names, packet.interned_data.event_names),
+            (notes, packet.interned_data.debug_annotation_names),
+        ):
+            table.update({entry.iid: entry.name for entry in entries})
+        for entry in packet.interned_data.debug_annotation_string_values:
+            texts[entry.iid] = entry.str.decode()
+        if packet.HasField("track_descriptor"):
+            assert packet.track_descriptor.uuid not in decoded.tracks
+            decoded.tracks[packet.track_descriptor.uuid] = packet.track_descriptor
+        if not packet.HasField("track_event"):
+            continue
+        event = packet.track_event
+        assert event.track_uuid in decoded.tracks
+        assert packet.timestamp >= last.get(event.track_uuid, 0)
+        last[event.track_uuid] = packet.timestamp
+        if event.type == event.TYPE_COUNTER:
+            value = (packet.timestamp, event.double_counter_value)
+            decoded.values[event.track_uuid].append(value)
+        elif event.type == event.TYPE_SLICE_END:
+            open_slices[event.track_uuid].pop().end = packet.timestamp
+        else:
+            said = {
+                notes[note.name_iid]: texts[note.string_value_iid]
+                if note.string_value_iid
+                else note.int_value
+                for note in event.debug_annotations
+            }
+            stack = open_slices[event.track_uuid]
+            one = Slice(
+                event.track_uuid, names[event.name_iid], packet.timestamp, packet.timestamp, said,
+                len(stack),
+            )  # fmt: skip
+            for flow in event.flow_ids:
+                assert flow not in begun
+                begun[flow] = len(decoded.slices)
+            for flow in event.terminating_flow_ids:
+                assert flow not in ended
+                ended[flow] = len(decoded.slices)
+            decoded.slices.append(one)
+            if event.type == event.TYPE_SLICE_BEGIN:
+                stack.append(one)
+    assert not any(open_slices.values())
+    assert set(begun) == set(ended)
+    decoded.arrows = {(begun[flow], ended[flow]) for flow in begun}
+    return decoded
+
+
+@pytest.fixture(scope="module", params=["demo", "services", "nested", "partial_sync"])
+def exported(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[duckdb.DuckDBPyConnection, Decoded]:
+    """A simulated system, its database and its Perfetto trace."""
+    pytest.importorskip("perfetto.trace_builder.proto_builder")
+    directory = tmp_path_factory.mktemp(request.param)
+    simulate(request.param, directory / "trace", factor=0.1)
+    path = directory / "run.duckdb"
+    ingest([directory / "trace"], path)
+    if request.param == "demo":
+        apply_clocks(path, read_clock_sync("messages"), run=None)
+    with open_db(path) as database:
+        written = database.export_perfetto(directory / "run.pftrace")
+    decoded = decode(written.path)
+    counted = len(decoded.slices), len(decoded.arrows), sum(map(len, decoded.values.values()))
+    assert counted == (written.slices, written.arrows, written.values)
+    return duckdb.connect(str(path), read_only=True), decoded
+
+
+Exported = tuple[duckdb.DuckDBPyConnection, Decoded]
+
+
+def identity(one: Slice) -> tuple[str, int]:
+    ((kind, number),) = [(kind, one.notes[kind]) for kind in IDENTITIES if kind in one.notes]
+    return kind.removesuffix("_id"), number
+
+
+def test_callbacks_and_publications_are_slices_of_their_threads(exported: Exported) -> None:
+    connection, decoded = exported
+    found = {
+        (*identity(one), one.track, one.begin, one.end, one.name, one.notes.get("symbol"))
+        for one in decoded.slices
+        if identity(one)[0] in ("callback_instance", "publication", "take")
+    }
+    expected = connection.execute(
+        "SELECT 'callback_instance', callback_instance_id, thread_id * 8 + 2, start_ns,"
+        " coalesce(end_ns, start_ns), node || ' ' || label, symbol"
+        " FROM callback_instance JOIN callback USING (callback_id)"
+        " JOIN callback_label USING (callback_id)"
+        " UNION ALL SELECT 'publication', publication_id, thread_id * 8 + 2, start_ns, end_ns,"
+        " 'publish ' || coalesce(topic_name, '?'), NULL"
+        " FROM publication AS b LEFT JOIN publisher USING (publisher_id)"
+        " UNION ALL SELECT 'take', take_id, thread_id * 8 + 2, taken_ns, taken_ns,"
+        " 'take ' || coalesce(topic_name, '?'), NULL"
+        " FROM take AS t LEFT JOIN subscription USING (subscription_id)"
+    ).fetchall()
+    assert len(expected) > 50
+    assert found == set(expected)
+
+
+def test_slices_are_nested_as_callbacks_are(exported: Exported) -> None:
+    connection, decoded = exported
+    depths = {
+        identity(one)[1]: one.depth for one in decoded.slices if "callback_instance_id" in one.notes
+    }
+    assert depths == dict(
+        connection.execute(
+            "SELECT callback_instance_id, depth - 1 FROM store.callback_instance"
+            " WHERE end_ns > start_ns"
+        ).fetchall()
+    )
+
+
+def test_every_link_is_an_arrow(exported: Exported) -> None:
+    """Besides, an arrow leads from the sending of each request and response to its taking."""
+    connection, decoded = exported
+    found: Counter[tuple[Any, ...]] = Counter()
+    for begin, end in decoded.arrows:
+        found[*identity(decoded.slices[begin]), *identity(decoded.slices[end])] += 1
+    expected = Counter(
+        connection.execute(
+            "SELECT from_kind, from_id, to_kind, to_id FROM flow_edge"
+            " UNION ALL SELECT 'request', request_id, 'request', request_id FROM request"
+            " WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL"
+            " UNION ALL SELECT 'response', response_id, 'response', response_id FROM response"
+            " WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL"
+        ).fetchall()
+    )
+    assert found == expected
+    assert len(found) > 50
+
+
+def test_states_of_executors_have_a_track_each(exported: Exported) -> None:
+    connection, decoded = exported
+    found = Counter(
+        (one.track, one.name, one.begin, one.end) for one in decoded.slices if one.track % 8 == 3
+    )
+    expected = Counter(
+        connection.execute(
+            "SELECT thread_id * 8 + 3, state, start_ns, coalesce(end_ns, start_ns)"
+            " FROM executor_state"
+        ).fetchall()
+    )
+    assert found == expected
+    for track in {track for track, *_ in found}:
+        assert decoded.tracks[track].parent_uuid == track - 1
+
+
+def test_tracks_belong_to_processes_that_are_told_apart(exported: Exported) -> None:
+    connection, decoded = exported
+    processes = [one for one in decoded.tracks.values() if one.HasField("process")]
+    threads = [one for one in decoded.tracks.values() if one.HasField("thread")]
+    assert len({one.process.pid for one in processes}) == len(processes)
+    assert len({one.thread.tid for one in threads}) == len(threads)
+    pids = {one.uuid: one.process.pid for one in processes}
+    assert all(pids[one.parent_uuid] == one.thread.pid for one in threads)
+    named = connection.execute(
+        "SELECT process_id * 8 + 1, p.name || ' ' || pid || ' on ' || hostname"
+        " FROM process AS p JOIN host USING (host_id)"
+    ).fetchall()
+    assert {one.uuid: one.process.process_name for one in processes} == dict(named)
+
+
+def test_counters_have_rates_and_queues(exported: Exported) -> None:
+    connection, decoded = exported
+    for (publisher,) in connection.execute("SELECT publisher_id FROM publisher").fetchall():
+        times = [
+            time
+            for (time,) in connection.execute(
+                "SELECT start_ns FROM publication WHERE publisher_id = ? ORDER BY 1", [publisher]
+            ).fetchall()
+        ]
+        expected = [
+            (time, pytest.approx(1e9 / (time - before)))
+            for before, time in pairwise(times)
+            if time > before
+        ]
+        assert decoded.values.get(publisher * 8 + 4, []) == expected
+    waiting = [
+        value for track, values in decoded.values.items() if track % 8 == 5 for _, value in values
+    ]
+    assert min(waiting) == 0
+    assert max(waiting) >= 1
+    for track, values in decoded.values.items():
+        if track % 8 == 5:
+            ((there,),) = connection.execute(
+                "SELECT count(*) FROM link_transport AS l"
+                " JOIN publication AS b ON l.publication_id = b.publication_id"
+                " JOIN take AS t ON l.take_id = t.take_id"
+                " WHERE t.subscription_id = $id AND t.taken_ns >= b.end_ns"
+                " AND b.end_ns <= $at AND t.taken_ns > $at",
+                {"id": track // 8, "at": values[len(values) // 2][0]},
+            ).fetchall()
+            at = values[len(values) // 2][0]
+            assert [value for time, value in values if time == at][-1] == there
+
+
+def test_a_window_has_what_begins_in_it(tmp_path: Path) -> None:
+    pytest.importorskip("perfetto.trace_builder.proto_builder")
+    simulate("pipeline", tmp_path / "trace", factor=0.1)
+    ingest([tmp_path / "trace"], tmp_path / "run.duckdb")
+    with open_db(tmp_path / "run.duckdb") as database:
+        ((start, middle),) = database.connection.execute(
+            "SELECT start_ns, (start_ns + end_ns) // 2 FROM run"
+        ).fetchall()
+        half = database.export_perfetto(tmp_path / "half.pftrace", end=middle)
+        database.export_perfetto(tmp_path / "whole.pftrace")
+    decoded, whole = decode(half.path), decode(tmp_path / "whole.pftrace")
+    assert len(decoded.slices) == sum(one.begin < middle for one in whole.slices)
+    assert all(start <= one.begin < middle for one in decoded.slices)
+    assert 0 < len(decoded.arrows) < len(whole.arrows)
+
+
+def test_without_the_package_it_is_said(
+    small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "perfetto"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "perfetto", None)
+    with Database(small_database) as database, pytest.raises(UsageError, match="perfetto") as error:
+        database.export_perfetto(tmp_path / "a.pftrace")
+    assert "msgflow[perfetto]" in str(error.value.hint)
+    assert not (tmp_path / "a.pftrace").exists()
+
+
+def test_a_trace_is_of_one_run(small_database: Path, tmp_path: Path) -> None:
+    with Database(small_database) as database, pytest.raises(UsageError, match="one run"):
+        database.export_perfetto(tmp_path / "a.pftrace", run="all")
