@@ -105,7 +105,11 @@ periodic AS (
             '%s, while %s led nowhere',
             string_agg(t.evidence, ', ' ORDER BY t.timer_id),
             any_value(d.evidence)
-        ) AS evidence
+        ) AS evidence,
+        CASE
+            WHEN count(*) > 1 AND len(any_value(d.inputs)) > 1
+                THEN 'each of its timers may use only some of the inputs'
+        END AS doubt
     FROM publishing_timer AS t
     JOIN dead_end AS d ON t.node_id = d.node_id
     GROUP BY t.node_id
@@ -122,14 +126,15 @@ fired AS (
 ),
 firing AS (
     SELECT
-        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, start_ns,
-        lag(published_ns) OVER (PARTITION BY publisher_id ORDER BY start_ns, callback_instance_id)
-            AS emptied_ns
+        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, published_ns,
+        lag(published_ns) OVER (
+            PARTITION BY publisher_id ORDER BY published_ns, callback_instance_id
+        ) AS emptied_ns
     FROM fired
 ),
 firing_input AS (
     SELECT
-        f.publisher_id, f.output_topic, f.node_id, f.callback_instance_id, f.start_ns,
+        f.publisher_id, f.output_topic, f.node_id, f.callback_instance_id, f.published_ns,
         f.emptied_ns, i.subscription_id,
         f.subscription_id = i.subscription_id AS is_own
     FROM firing AS f
@@ -150,7 +155,7 @@ met AS (
         ) AS met_count
     FROM firing_input AS f
     ASOF LEFT JOIN input_run AS r
-        ON f.subscription_id = r.subscription_id AND f.start_ns >= r.end_ns
+        ON f.subscription_id = r.subscription_id AND f.published_ns >= r.start_ns
     LEFT JOIN fired AS own
         ON f.publisher_id = own.publisher_id
         AND r.callback_instance_id = own.callback_instance_id
@@ -167,8 +172,9 @@ synchronous AS (
             ),
             ', ' ORDER BY i.topic_name, i.subscription_id
         ) AS evidence,
+        -- An output that waits for a message is published by the run that gets it.
         string_agg(i.topic_name, ' and ' ORDER BY i.topic_name, i.subscription_id)
-            FILTER (WHERE m.own_count >= i.run_count) AS always_publishing,
+            FILTER (WHERE m.own_count = 0) AS unproven,
         min(m.met_count) AS met_count
     FROM met AS m
     JOIN input AS i ON m.subscription_id = i.subscription_id
@@ -186,20 +192,15 @@ partial AS (
         list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
         printf(
             '%d of %d publications on %s came after a message of each input since the one before;'
-            || ' %s%s',
+            || ' %s',
             min(met_count),
             min(firing_count),
             string_agg(DISTINCT output_topic, ' and ' ORDER BY output_topic),
-            min(evidence),
-            coalesce(
-                printf(
-                    '. Weak: each message on %s published, whether or not it had to wait for'
-                    || ' others, which may only be more frequent',
-                    min(always_publishing)
-                ),
-                ''
-            )
-        ) AS evidence
+            min(evidence)
+        ) AS evidence,
+        printf(
+            'no output waited for %s, which may only be more frequent', min(unproven)
+        ) AS doubt
     FROM synchronous
     GROUP BY node_id, inputs
 ),
@@ -209,9 +210,9 @@ received AS (
     GROUP BY node_id
 ),
 candidate AS (
-    SELECT node_id, kind, inputs, outputs, evidence FROM periodic
+    SELECT node_id, kind, inputs, outputs, evidence, doubt FROM periodic
     UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence FROM partial
+    SELECT node_id, kind, inputs, outputs, evidence, doubt FROM partial
 )
 SELECT
     n.run_id,
@@ -223,6 +224,7 @@ SELECT
     nullif(
         concat_ws(
             '; ',
+            c.doubt,
             CASE
                 WHEN count(*) OVER (PARTITION BY c.node_id) > 1 THEN
                     'the node has several candidates, which may share inputs, or be one'
@@ -238,10 +240,6 @@ SELECT
                             ', '
                         )
                     )
-            END,
-            CASE
-                WHEN c.kind = 'partial_sync' AND len(c.inputs) >= 4 THEN
-                    'of so many inputs some may belong to another set, or only be more frequent'
             END
         ),
         ''

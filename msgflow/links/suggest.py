@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 _HEAD = (
     "Candidates for indirect links, found in what was traced. Only the author of a node knows what"
     " it does with messages that it keeps: review every entry, delete what is wrong, then run the"
-    " command below. Not everything is found: nodes whose callbacks overlap on several threads,"
-    " and merges within a node that share inputs, may be missing or incomplete."
+    " command below. Not everything is found: messages that also lead elsewhere, such as those"
+    " that two links of a node share, may be missing."
 )
 _PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
 _WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}

@@ -1,0 +1,155 @@
+"""How many of the declared indirect links does `msgflow links suggest` find without them?
+
+    python benchmarks/suggestions.py [SYSTEM…] [--factor 0.5] [--traces DIR]
+
+Simulates annotated systems, ingests them without what their nodes declare, and compares the query
+`link-suggestions` with that: for each node its links as (kind, input, output). Those of a candidate
+with a doubt count as doubtful beside being right or wrong. With `--traces` recordings are read as
+well whose nodes declare their links.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from msgflow import open_db
+from msgflow.sim import simulate
+from msgflow.sim.entity import (
+    MILLISECOND,
+    SECOND,
+    MessageLink,
+    Publisher,
+    Subscription,
+    Timer,
+    Work,
+)
+from msgflow.sim.system import Host, Node, Process, Scenario
+
+SYSTEMS = ("periodic_async", "partial_sync", "reentrant", "autoware", "merges")
+_PERIODS = {"/a": 7, "/b": 11, "/c": 16, "/d": 23}
+Link = tuple[str, str, str, str]
+
+_DECLARED = """
+SELECT DISTINCT a.kind, n.full_name, s.topic_name, p.topic_name
+FROM annotation AS a
+JOIN annotation_input AS i ON a.annotation_id = i.annotation_id
+JOIN annotation_output AS o ON a.annotation_id = o.annotation_id
+JOIN subscription AS s ON i.subscription_id = s.subscription_id
+JOIN publisher AS p ON o.publisher_id = p.publisher_id
+JOIN node AS n ON s.node_id = n.node_id
+"""
+
+
+def merges() -> Scenario:
+    """Return nodes with several links, shared subscriptions, and four inputs."""
+    nodes = (
+        _merge("four", (("/a", "/b", "/c", "/d"), ("/four/0",))),
+        _merge("four_to_four", (("/a", "/b", "/c", "/d"), tuple(f"/n_to_m/{n}" for n in range(4)))),
+        _merge("two_pairs", (("/a", "/c"), ("/pairs/0",)), (("/b", "/d"), ("/pairs/1",))),
+        _merge("shared", (("/a", "/b"), ("/shared/0",)), (("/b", "/c"), ("/shared/1",))),
+        _merge("inside", (("/a", "/b", "/c"), ("/inside/0",)), (("/b", "/c"), ("/inside/1",))),
+        Node(
+            "kept",
+            publishers=(Publisher("/kept/0"), Publisher("/kept/1")),
+            subscriptions=tuple(Subscription(topic) for topic in _PERIODS),
+            timers=(
+                Timer(13 * MILLISECOND, ("/kept/0",)),
+                Timer(29 * MILLISECOND, ("/kept/1",)),
+            ),
+            links=(
+                MessageLink("periodic_async", ("/a", "/b"), ("/kept/0",)),
+                MessageLink("periodic_async", ("/c", "/d"), ("/kept/1",)),
+            ),
+        ),
+    )
+    sources = tuple(
+        Node(
+            f"source{topic.replace('/', '_')}",
+            publishers=(Publisher(topic),),
+            timers=(Timer(period * MILLISECOND, (topic,)),),
+        )
+        for topic, period in _PERIODS.items()
+    )
+    return Scenario(
+        name="merges",
+        description="Nodes with several indirect links.",
+        hosts=(Host("alpha", cpu_count=8),),
+        processes=tuple(
+            Process(node.name, "alpha", 1101 + 100 * number, (node,))
+            for number, node in enumerate((*sources, *nodes))
+        ),
+        duration_ns=4 * SECOND,
+        layout="rolling",
+    )
+
+
+def _merge(name: str, *links: tuple[tuple[str, ...], tuple[str, ...]]) -> Node:
+    inputs = sorted({topic for topics, _ in links for topic in topics})
+    return Node(
+        name,
+        publishers=tuple(Publisher(topic) for _, outputs in links for topic in outputs),
+        subscriptions=tuple(
+            Subscription(
+                topic,
+                tuple(each for topics, outputs in links if topic in topics for each in outputs),
+                Work(MILLISECOND),
+            )
+            for topic in inputs
+        ),
+        links=tuple(MessageLink("partial_sync", topics, outputs) for topics, outputs in links),
+    )
+
+
+def compare(trace: Path, directory: Path) -> dict[str, tuple[set[Link], set[Link], set[Link]]]:
+    """Return for each node its declared links, those suggested, and those of them in doubt."""
+    with open_db(directory / "declared.duckdb") as database:
+        database.ingest(trace)
+        declared = {tuple(row.values()) for row in database.sql(_DECLARED).to_arrow().to_pylist()}
+    suggested, doubtful = set(), set()
+    with open_db(directory / "plain.duckdb") as database:
+        database.ingest(trace, ignore=["ros2:message_link_*"])
+        for row in database.query("link-suggestions").to_arrow().to_pylist():
+            links = {
+                (row["kind"], row["node"], each, output)
+                for each in row["inputs"]
+                for output in row["outputs"]
+            }
+            suggested |= links
+            doubtful |= links if row["doubt"] else set()
+    return {
+        node: tuple({link for link in links if link[1] == node}
+                    for links in (declared, suggested, doubtful))
+        for node in sorted({link[1] for link in declared | suggested})
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("systems", nargs="*", metavar="SYSTEM")
+    parser.add_argument("--factor", type=float, default=0.5, help="length of the recordings")
+    parser.add_argument("--traces", type=Path, action="append", default=[])
+    given = parser.parse_args()
+    print("| system | node | declared | right | wrong | in doubt |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for system in given.systems or SYSTEMS:
+        with tempfile.TemporaryDirectory() as directory:
+            scenario = merges() if system == "merges" else system
+            trace = simulate(scenario, Path(directory) / "trace", factor=given.factor)
+            show(system, trace.directory, Path(directory))
+    for path in given.traces:
+        with tempfile.TemporaryDirectory() as directory:
+            show(path.name, path, Path(directory))
+
+
+def show(name: str, trace: Path, directory: Path) -> None:
+    """Print the rows of a system."""
+    for node, (declared, suggested, doubtful) in compare(trace, directory).items():
+        counts = map(len, (declared, declared & suggested, suggested - declared, doubtful))
+        print(f"| {name} | {node} | {' | '.join(map(str, counts))} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
