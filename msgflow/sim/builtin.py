@@ -37,6 +37,7 @@ def scenarios() -> Mapping[str, Scenario]:
         _pipeline(),
         _fan_out(),
         _two_hosts(),
+        _quiet(),
         demo(),
         executors.multi_threaded(),
         executors.executors(),
@@ -103,6 +104,24 @@ def _two_hosts() -> Scenario:
             Process("source", "alpha", 1101, (_SOURCE,)),
             Process("relay", "beta", 1101, (_RELAY,), start_ns=3 * MILLISECOND),
             Process("sink", "alpha", 1301, (_SINK,), start_ns=7 * MILLISECOND),
+        ),
+    )
+
+
+def _quiet() -> Scenario:
+    source = Node(
+        "source",
+        publishers=(Publisher("/topic_a"),),
+        timers=(Timer(300 * MILLISECOND, publishes=("/topic_a",)),),
+    )
+    sink = Node("sink", subscriptions=(Subscription("/topic_a"),))
+    return Scenario(
+        name="quiet",
+        description="A source with a timer of 300 ms and a sink: nothing else happens.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("source", "alpha", 1101, (source,)),
+            Process("sink", "alpha", 1201, (sink,), start_ns=3 * MILLISECOND),
         ),
     )
 

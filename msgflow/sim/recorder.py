@@ -100,6 +100,7 @@ class Recorder:
         self._recording = recording
         self._truth = truth
         self._clock = clock
+        self._end = stop
         self._stop = clock.elapsed(stop)
         self._losses = tuple(
             (clock.elapsed(begin), clock.elapsed(end)) for begin, end in recording.losses
@@ -267,6 +268,13 @@ class Recorder:
         for time in times:
             if not any(begin < time < end for begin, end in recording.pauses):
                 yield time, time, True
+        if recording.flush_ns:
+            for time in range(recording.start_ns, self._end, recording.flush_ns):
+                stopped = chain(recording.pauses, ((other, other) for other in times))
+                if time > recording.start_ns and not any(
+                    begin <= time <= end for begin, end in stopped
+                ):
+                    yield time, time, False
 
     def _trace(
         self,

@@ -31,6 +31,8 @@ class Recording:
         is_last_snapshot_only: the others were recorded too, but are not there.
         missing_chunk: which chunk is not there, counted from 1 behind the first; 0: all are.
         buffers: one trace per user, or one per process.
+        flush_ns: a timer of the tracer ends packets that are not empty, at this distance; 0: none
+            does.
         handover_ns: the tracer tells one process after the other that recording starts or stops;
             within this time after each start they join it, before each stop they leave it.
         losses: all CPUs lose what happens between these times, and count it.
@@ -59,6 +61,7 @@ class Recording:
     is_last_snapshot_only: bool = False
     missing_chunk: int = 0
     buffers: Buffers = Buffers.PER_USER
+    flush_ns: int = 0
     handover_ns: int = 0
     losses: tuple[tuple[int, int], ...] = ()
     clock_error_ns: int = 0
@@ -82,7 +85,7 @@ class Recording:
                 f"no clock runs {self.slew_ppm} ppm too fast", "give less than 1000 ppm"
             )
         amounts = (self.start_ns, self.cut_streams, self.unfinished_streams, self.clock_error_ns)
-        if min(*amounts, self.handover_ns) < 0:
+        if min(*amounts, self.handover_ns, self.flush_ns) < 0:
             raise UsageError("a negative time or count makes no sense", "give 0 or more")
         if not 0 <= self.missing_chunk <= len(self.rotations):
             raise UsageError(

@@ -6,17 +6,26 @@
 --     between the packets around them, in whichever chunks of the recording these are; before the
 --     first packet of a stream, as its number tells; and behind the last, where others have later
 --     events: stopping flushes a packet into every stream. Where all streams of a recording are
---     silent at once between packets, tracing was paused, or packets were ended for another reason
---     (a rotation, a snapshot) and the next ones begin with their first events. It was a pause if
---     at least a millisecond passed, and the recording is nowhere else silent for as long, within
---     four times that or a second before and after. Nor is it one where the numbers of all streams
---     skip packets meanwhile: those are lost. What comes after the last packet with events is no
---     pause. Kernel traces are left out: what they lost is missing from no process.
+--     silent at once between packets, something ended these: stopping, a rotation, a snapshot, or
+--     a timer of the tracer; the next ones begin with their first events. It was a stop, and the
+--     silence a pause, where it can be nothing else: packets of one trace ended before they were
+--     full, not at equal distances, and no snapshot is recorded, whose buffers keep what earlier
+--     ones did to them. Else it was one if at least a millisecond passed, and the recording is
+--     nowhere else silent for as long, within four times that or a second before and after. Nor is
+--     it one where the numbers of all streams skip packets meanwhile: those are lost. What comes
+--     after the last packet with events is no pause. Kernel traces are left out: what they lost is
+--     missing from no process.
 -- grain: one row per gap in a recording
--- needs: staging.packet, staging.recording, staging.source, staging.event
+-- needs: staging.packet, staging.recording, staging.source, staging.event,
+--     staging.pause_limit
 WITH packet AS (
     SELECT
-        p.*, r.recording_index, coalesce(p.end_ns, p.last_event_ns, p.begin_ns) AS known_end_ns
+        p.*,
+        r.recording_index,
+        coalesce(p.end_ns, p.last_event_ns, p.begin_ns) AS known_end_ns,
+        -- One that is filled to the last byte ends with its last event, one that opens a chunk when
+        -- it begins.
+        coalesce(p.end_ns > greatest(p.last_event_ns, p.begin_ns), false) AS is_ended_early
     FROM staging.packet AS p
     JOIN staging.recording AS r ON p.trace_index = r.trace_index
     JOIN staging.source AS s ON p.trace_index = s.trace_index
@@ -113,26 +122,95 @@ covered AS (
         begin_ns,
         max(CASE WHEN event_count > 0 THEN begin_ns END) OVER (PARTITION BY recording_index)
             AS last_begin_ns,
-        max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) OVER (
+        max(greatest(coalesce(end_ns, begin_ns), coalesce(last_event_ns, begin_ns))) OVER earlier
+            AS covered_until_ns,
+        max(CASE WHEN is_ended_early THEN end_ns END) OVER earlier AS ended_early_ns,
+        lag(trace_id) OVER earlier_of_recording AS previous_trace_id
+    FROM packet
+    WINDOW
+        earlier_of_recording AS (
+            PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
+        ),
+        earlier AS (
             PARTITION BY recording_index ORDER BY begin_ns, trace_index, stream_index, position
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-        ) AS covered_until_ns
+        )
+),
+-- When packets were ended before they were full.
+ending AS (
+    SELECT recording_index, end_ns
     FROM packet
+    WHERE is_ended_early
+    GROUP BY recording_index, end_ns
+),
+-- One for all streams, which are ended one after the other.
+flush AS (
+    SELECT
+        recording_index, end_ns,
+        row_number() OVER (PARTITION BY recording_index ORDER BY end_ns) AS number
+    FROM (
+        SELECT
+            *, lead(end_ns) OVER (PARTITION BY recording_index ORDER BY end_ns) - end_ns AS until_ns
+        FROM ending
+    )
+    WHERE coalesce(until_ns >= staging.pause_limit().least_ns, true)
+),
+-- A timer of the tracer ends packets at equal distances: any two others are as far apart.
+regular AS (
+    SELECT DISTINCT p.recording_index, p.end_ns
+    FROM (
+        SELECT
+            a.recording_index, a.end_ns,
+            least(staging.pause_limit().timer_ns, abs(b.end_ns - a.end_ns) // 4) AS slack_ns,
+            unnest([2 * b.end_ns - a.end_ns, 2 * a.end_ns - b.end_ns]) AS expected_ns
+        FROM flush AS a
+        JOIN flush AS b
+            ON a.recording_index = b.recording_index
+            AND b.number <> a.number
+            AND b.number BETWEEN a.number - staging.pause_limit().reach
+                AND a.number + staging.pause_limit().reach
+    ) AS p
+    ASOF JOIN flush AS c
+        ON p.recording_index = c.recording_index AND p.expected_ns + p.slack_ns >= c.end_ns
+    WHERE c.end_ns >= p.expected_ns - p.slack_ns
+),
+-- Buffers of which only what was in them at some time is recorded.
+snapshot AS (
+    SELECT recording_index
+    FROM stream_packet
+    GROUP BY recording_index
+    HAVING bool_or(previous_end_ns IS NULL AND lost_packet_count IS DISTINCT FROM 0)
+    UNION
+    SELECT r.recording_index
+    FROM staging.source AS s
+    JOIN staging.recording AS r ON s.trace_index = r.trace_index
+    WHERE regexp_matches(s.path, '(^|/)snapshot-\d+-[^/]*(/|$)')
 ),
 silence AS (
     SELECT
-        trace_id, recording_index, covered_until_ns AS start_ns, begin_ns AS end_ns,
-        greatest(4 * (begin_ns - covered_until_ns), 1_000_000_000) AS around_ns
-    FROM covered
-    WHERE begin_ns - covered_until_ns >= 1_000_000 AND begin_ns <= last_begin_ns
+        c.trace_id, c.recording_index, c.covered_until_ns AS start_ns, c.begin_ns AS end_ns,
+        greatest(
+            staging.pause_limit().usual_factor * (c.begin_ns - c.covered_until_ns),
+            staging.pause_limit().usual_ns
+        ) AS around_ns,
+        coalesce(c.ended_early_ns = c.covered_until_ns, false)
+        AND coalesce(c.previous_trace_id = c.trace_id, false)
+        AND s.recording_index IS NULL
+        AND r.recording_index IS NULL AS is_certain
+    FROM covered AS c
+    LEFT JOIN snapshot AS s ON c.recording_index = s.recording_index
+    LEFT JOIN regular AS r
+        ON c.recording_index = r.recording_index AND c.covered_until_ns = r.end_ns
+    WHERE c.begin_ns - c.covered_until_ns >= staging.pause_limit().least_ns
+        AND c.begin_ns <= c.last_begin_ns
 ),
 -- Silences within packets as well, from millisecond to millisecond.
 heard AS (
     SELECT r.recording_index, min(e.ts_ns) AS first_ns, max(e.ts_ns) AS last_ns
     FROM staging.event AS e
     JOIN staging.recording AS r ON e.trace_index = r.trace_index
-    WHERE r.recording_index IN (SELECT recording_index FROM silence)
-    GROUP BY r.recording_index, e.ts_ns // 1_000_000
+    WHERE r.recording_index IN (SELECT recording_index FROM silence WHERE NOT is_certain)
+    GROUP BY r.recording_index, e.ts_ns // staging.pause_limit().least_ns
 ),
 quiet AS (
     SELECT
@@ -140,7 +218,7 @@ quiet AS (
         lag(last_ns) OVER (PARTITION BY recording_index ORDER BY first_ns) AS start_ns,
         first_ns AS end_ns
     FROM heard
-    QUALIFY end_ns - start_ns >= 1_000_000
+    QUALIFY end_ns - start_ns >= staging.pause_limit().least_ns
 ),
 usual AS (
     SELECT
@@ -164,6 +242,7 @@ explained AS (
                 )
             ) AS second
         FROM silence
+        WHERE NOT is_certain
     ) AS s
     JOIN usual AS u
         ON s.recording_index = u.recording_index

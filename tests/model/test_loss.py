@@ -212,6 +212,117 @@ def test_long_silences_are_compared_with_what_is_farther_away(
     assert analyse(system).rows(GAPS) == expected
 
 
+def silent_at(system: RosSystem, *flushes: int, since: int = 1, **first: int | None) -> None:
+    """A system that is silent for 300 ms again and again, and packets that were ended meanwhile.
+
+    Each ends `since` after its last event, and the next begins with its first one. An event of the
+    last packet is at its end; `first` is said of the first packets.
+    """
+    events_at(system, *range(0, 6_001 * MS, 300 * MS))
+    for cpu in (0, 1):
+        begin, said = 0, first
+        for end in flushes:
+            system.add_packet(begin, end, last_event=end - since, cpu=cpu, **said)
+            begin, said = end // (300 * MS) * 300 * MS + 300 * MS, {}
+        system.add_packet(begin, 6_000 * MS, cpu=cpu)
+
+
+STOPPED = [("pause", None, 2_050 * MS, 2_100 * MS, None)]
+
+
+def test_who_stops_in_a_quiet_system_pauses(system: RosSystem, analyse: Analyse) -> None:
+    """Nothing but stopping ends packets in the middle of a trace before they are full."""
+    silent_at(system, 2_050 * MS)
+    assert analyse(system).rows(GAPS) == STOPPED
+
+
+def test_a_packet_that_is_full_was_not_ended(system: RosSystem, analyse: Analyse) -> None:
+    silent_at(system, 2_050 * MS, since=0)
+    assert analyse(system).rows(GAPS) == []
+
+
+@pytest.mark.parametrize(("late", "expected"), [(5 * MS, []), (5 * MS + 1, STOPPED)])
+@pytest.mark.parametrize("others", [(1_050, 50), (1_050, 3_050), (3_050, 4_050)])
+def test_a_timer_of_the_tracer_ends_packets_at_equal_distances(
+    system: RosSystem,
+    analyse: Analyse,
+    others: tuple[int, int],
+    late: int,
+    expected: list[tuple[str, None, int, int, None]],
+) -> None:
+    """Within 5 ms; two others are before, around or behind, the outer one late."""
+    inner, outer = others
+    silent_at(system, *sorted((inner * MS, 2_050 * MS, outer * MS + late)))
+    assert [row for row in analyse(system).rows(GAPS) if row[2] == 2_050 * MS] == expected
+
+
+@pytest.mark.parametrize(("between", "expected"), [(3, []), (4, STOPPED)])
+def test_others_end_packets_between_those_of_a_timer(
+    system: RosSystem,
+    analyse: Analyse,
+    between: int,
+    expected: list[tuple[str, None, int, int, None]],
+) -> None:
+    """Of those next to it, four on either side are compared; here at no equal distances."""
+    before, after = (1_690, 1_130, 870, 460), (2_510, 2_930, 3_380, 3_710)
+    others = (50, *before[:between], 2_050, *after[:between], 4_050)
+    silent_at(system, *(at * MS for at in sorted(others)))
+    assert [row for row in analyse(system).rows(GAPS) if row[2] == 2_050 * MS] == expected
+
+
+def test_streams_are_ended_one_after_the_other(system: RosSystem, analyse: Analyse) -> None:
+    """Within a millisecond: equal distances of these say nothing."""
+    silent_at(system, 2_050 * MS)
+    system.add_packet(0, 2_050 * MS - 200, last_event=5, cpu=2)
+    system.add_packet(2_100 * MS, 6_000 * MS, cpu=2)
+    system.add_packet(0, 2_050 * MS - 400, last_event=5, cpu=3)
+    system.add_packet(2_100 * MS, 6_000 * MS, cpu=3)
+    assert analyse(system).rows(GAPS) == STOPPED
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("/t/snapshot-1-20260101-120000-3/ust/uid/0/64-bit", []),
+        ("snapshot-2-1", []),
+        ("/t/my-snapshot-1/ust", STOPPED),
+        ("/t/snapshot/ust", STOPPED),
+    ],
+)
+def test_earlier_snapshots_ended_packets_of_a_snapshot(
+    system: RosSystem,
+    analyse: Analyse,
+    path: str,
+    expected: list[tuple[str, None, int, int, None]],
+) -> None:
+    system.add_source(0, "alpha", "boot", path=path)
+    silent_at(system, 2_050 * MS)
+    assert analyse(system).rows(GAPS) == expected
+
+
+@pytest.mark.parametrize("lost", [3, None])
+def test_buffers_that_wrapped_are_a_snapshot(
+    system: RosSystem, analyse: Analyse, lost: int | None
+) -> None:
+    """As packets before the first one are missing, or, without numbers, may be."""
+    silent_at(system, 2_050 * MS, lost_packets=lost)
+    assert analyse(system).rows("SELECT * FROM loss_interval WHERE kind = 'pause'") == []
+
+
+def test_a_rotation_ends_packets_too(system: RosSystem, analyse: Analyse) -> None:
+    """The silence lies between packets of two traces, and then behind what opens the chunk."""
+    for chunk in (0, 1):
+        system.add_source(chunk, "alpha", "boot", "recording")
+    events_at(system, *range(0, 2_100 * MS, 300 * MS))
+    for at in range(2_100 * MS, 6_001 * MS, 300 * MS):
+        system.add("ros2:rclcpp_executor_wait_for_work", Thread(100, trace=1), ts=at, timeout=-1)
+    for cpu in (0, 1):
+        system.add_packet(0, 2_000 * MS, last_event=1_800 * MS, cpu=cpu)
+        system.add_packet(2_050 * MS, 2_050 * MS, count=0, cpu=cpu, trace=1)
+        system.add_packet(2_100 * MS, 6_000 * MS, cpu=cpu, trace=1)
+    assert analyse(system).rows(GAPS) == []
+
+
 def test_a_pause_is_no_usual_silence(system: RosSystem, analyse: Analyse) -> None:
     """Stopped twice for as long."""
     for cpu in (0, 1):

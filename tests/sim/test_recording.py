@@ -331,3 +331,17 @@ def test_half_an_hour_is_cheap_and_drifts_apart(tmp_path):
     half = len(rows) // 2
     first, second = (sum(d for _, d in part) / half for part in (rows[:half], rows[-half:]))
     assert second - first == pytest.approx(360_000, rel=0.3)
+
+
+def test_a_timer_ends_packets_that_are_not_empty(tmp_path):
+    """And nothing else: as many as there are seconds with an event on the CPU."""
+    plain = simulate("quiet", tmp_path / "plain", factor=0.5)
+    ended = simulate("quiet", tmp_path / "ended", factor=0.5, recording=Recording(flush_ns=SECOND))
+
+    def packets(simulation):
+        files = simulation.directory.glob("**/index/*.idx")
+        return sum((file.stat().st_size - 16) // 72 for file in files)
+
+    assert packets(plain) + 4 <= packets(ended) <= packets(plain) * 5
+    hosts = [json.loads(one.meta.read_text())["hosts"] for one in (plain, ended)]
+    assert hosts[0]["alpha"]["events"] == hosts[1]["alpha"]["events"]

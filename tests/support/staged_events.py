@@ -49,11 +49,12 @@ class Thread:
 
 @dataclass(frozen=True)
 class Source:
-    """A trace: of which host, by which clock, and (unless it is one alone) of which recording."""
+    """A trace: of which host, by which clock, unless alone of which recording; where it lies."""
 
     hostname: str = "alpha"
     clock: str = "boot"
     recording: str | None = None
+    path: str | None = None
 
 
 class StagedEvents:
@@ -103,10 +104,15 @@ class StagedEvents:
         self._now += duration_ns
 
     def add_source(
-        self, trace: int, hostname: str, clock: str, recording: str | None = None
+        self,
+        trace: int,
+        hostname: str,
+        clock: str,
+        recording: str | None = None,
+        path: str | None = None,
     ) -> None:
         """Add a trace, or change the one there is."""
-        self.sources[trace] = Source(hostname, clock, recording)
+        self.sources[trace] = Source(hostname, clock, recording, path)
 
     def add_packet(
         self,
@@ -116,7 +122,7 @@ class StagedEvents:
         last_event: int | None = None,
         count: int = 1,
         discarded: int = 0,
-        lost_packets: int = 0,
+        lost_packets: int | None = 0,
         numbered: bool = True,
         cpu: int = 0,
         trace: int = 0,
@@ -160,7 +166,7 @@ class StagedEvents:
                 "VALUES (?, ?, ?, 'ust', ?, 'lttng-ust 2.13.9', ?, ?, NULL, NULL, 0)",
                 [
                     index,
-                    f"trace-{index}",
+                    source.path or f"trace-{index}",
                     source.recording or f"uuid-{index}",
                     source.hostname,
                     source.clock,

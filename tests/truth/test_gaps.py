@@ -54,3 +54,42 @@ def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
     with duckdb.connect(str(database), read_only=True) as connection:
         rows = connection.execute("SELECT DISTINCT kind FROM loss_interval").fetchall()
     assert {kind for (kind,) in rows} == gaps
+
+
+MS = 1_000_000
+PAUSE = (2_120 * MS, 2_270 * MS)
+# Recordings of a system that is silent for 300 ms again and again, and where they were stopped.
+QUIET: dict[str, tuple[Recording, list[int]]] = {
+    "stopped": (Recording(pauses=(PAUSE,)), [2_120]),
+    "ended_by_a_timer": (Recording(flush_ns=SECOND), []),
+    "stopped_between_ticks": (Recording(pauses=(PAUSE,), flush_ns=SECOND), [2_120]),
+    "rotated": (Recording(rotations=(2_120 * MS, 3_160 * MS)), []),
+    "stopped_in_a_chunk": (Recording(rotations=(SECOND,), pauses=(PAUSE,)), [2_120]),
+    "last_snapshot": (
+        Recording(
+            snapshots=(2_120 * MS, 3_160 * MS, 4_000 * MS),
+            kept_packets=1_000,
+            is_last_snapshot_only=True,
+        ),
+        [],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", QUIET)
+def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -> None:
+    """Though nothing is lost, and it is as silent everywhere else."""
+    recording, pauses = QUIET[name]
+    simulation = simulate("quiet", tmp_path / "trace", factor=0.5, recording=recording)
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    with duckdb.connect(str(database), read_only=True) as connection:
+        rows = connection.execute(
+            "SELECT kind, round((l.start_ns - r.start_ns) / 1e6)::BIGINT "
+            "FROM loss_interval AS l CROSS JOIN run AS r WHERE kind = 'pause'"
+        ).fetchall()
+    assert rows == [("pause", at) for at in pauses]
+    scores, drops = compare_simulated(database, simulation.truth)
+    assert [score for score in scores if score.wrong] == []
+    assert drops is not None
+    assert [drop for drop in drops if not drop.is_right and not drop.undecided] == []

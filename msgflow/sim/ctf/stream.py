@@ -33,8 +33,9 @@ _ROTATION_NS = 10_000
 class Break:
     """Packets end at `begin`, the next ones begin at `end`; what happens between is not recorded.
 
-    With a `directory`, files are continued there; if that `is_missing`, to be deleted. Where
-    packets are only kept in memory, those that are there are written to the directory instead.
+    One that takes no time ends only packets with events. With a `directory`, files are continued
+    there; if that `is_missing`, to be deleted. Where packets are only kept in memory, those that
+    are there are written to the directory instead.
     """
 
     begin: int
@@ -219,7 +220,11 @@ class StreamWriter:
         """Do what is due at `time` or before it."""
         while self._breaks and self._breaks[0].begin <= time:
             due = self._breaks.popleft()
-            if due.directory is None:
+            if due.directory is None and due.end == due.begin:
+                if not self._records:
+                    continue
+                self._end_packet(due.begin)
+            elif due.directory is None:
                 self._end_packet(due.begin)
             elif self._memory is not None:
                 self._flush(due.begin)
