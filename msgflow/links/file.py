@@ -16,11 +16,12 @@ from msgflow.errors import UsageError
 from msgflow.text_file import read_text
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 KINDS = ("periodic_async", "partial_sync")
 _REQUIRED = ("kind", "node", "inputs", "outputs")
-_OPTIONAL = ("process", "host")
+_OPTIONAL = ("inputs_of", "process", "host")
 _EXAMPLE = "links: [{kind: periodic_async, node: /fusion, inputs: [/lidar], outputs: [/objects]}]"
 
 
@@ -40,6 +41,7 @@ class DeclaredLink:
         kind: 'periodic_async' or 'partial_sync'.
         node: full name of a node, or a pattern.
         inputs: topics that the node receives, or patterns.
+        inputs_of: name or pattern of another node of its process that receives them for it.
         outputs: topics that it publishes, or patterns.
         process: name or pid of its process, where the name of the node occurs twice.
         host: its host, likewise.
@@ -50,6 +52,7 @@ class DeclaredLink:
     node: Text
     inputs: tuple[Text, ...]
     outputs: tuple[Text, ...]
+    inputs_of: Text | None
     process: Text | None
     host: Text | None
     line: int
@@ -133,8 +136,9 @@ class _Reader:
             self._text(fields["node"], "node"),
             self._texts(fields["inputs"], "inputs"),
             self._texts(fields["outputs"], "outputs"),
-            self._text(fields["process"], "process") if "process" in fields else None,
-            self._text(fields["host"], "host") if "host" in fields else None,
+            self._optional(fields, "inputs_of"),
+            self._optional(fields, "process"),
+            self._optional(fields, "host"),
             _line(node),
         )
 
@@ -165,6 +169,9 @@ class _Reader:
         if not node.value:
             self._file.fail(_line(node), f"{what} is empty", _EXAMPLE)
         return tuple(self._text(item, what) for item in node.value)
+
+    def _optional(self, fields: Mapping[str, Any], name: str) -> Text | None:
+        return self._text(fields[name], name) if name in fields else None
 
     def _text(self, node: Any, what: str) -> Text:
         if node.id != "scalar" or _is_null(node) or not str(node.value).strip():

@@ -120,17 +120,18 @@ def _read_endpoints(
 
 def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterator[MatchedLink]:
     chosen = _choose(file, link, nodes)
+    received = {node: _received(file, link, node, nodes) for node in chosen}
     # A name or pattern may mean several nodes: those without these topics are not meant.
     fitting = [
         (node, inputs, outputs)
         for node in chosen
-        if (inputs := _endpoints(link.inputs, node.subscriptions))
+        if (inputs := _endpoints(link.inputs, received[node]))
         and (outputs := _endpoints(link.outputs, node.publishers))
     ]
     if not fitting:
         if not _is_pattern(link.node.value):
             _refuse_repeated(file, link, chosen)
-        _fail_on_topic(file, link, chosen)
+        _fail_on_topic(file, link, chosen, received)
     _refuse_repeated(file, link, [node for node, _, _ in fitting])
     for node, inputs, outputs in fitting:
         both = {e.topic for e in inputs} & {e.topic for e in outputs}
@@ -181,6 +182,24 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
     return placed
 
 
+def _received(
+    file: LinksFile, link: DeclaredLink, node: Node, nodes: Sequence[Node]
+) -> tuple[Endpoint, ...]:
+    """Return what a node receives, or others of its process that do so for it."""
+    if link.inputs_of is None:
+        return node.subscriptions
+    wanted = link.inputs_of
+    beside = [other for other in nodes if other.process_id == node.process_id and other != node]
+    others = [other for other in beside if _matches(other.name, wanted.value)]
+    if not others and not _is_pattern(link.node.value):
+        file.fail(
+            wanted.line,
+            f"no such node in the process of {node.name} — {wanted.value}",
+            _known("other nodes there", wanted, [other.name for other in beside]),
+        )
+    return tuple(endpoint for other in others for endpoint in other.subscriptions)
+
+
 def _refuse_repeated(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> None:
     """Raise where a name means several nodes, and it was not said which."""
     for node in nodes:
@@ -211,12 +230,17 @@ def _means(text: Text, endpoint: Endpoint) -> bool:
     )
 
 
-def _fail_on_topic(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> NoReturn:
+def _fail_on_topic(
+    file: LinksFile,
+    link: DeclaredLink,
+    nodes: Sequence[Node],
+    received: Mapping[Node, tuple[Endpoint, ...]],
+) -> NoReturn:
     """Raise for the first topic that none of the nodes has, or as none has all of them."""
     lacking: dict[str, str] = {}
     for texts, is_input in ((link.inputs, True), (link.outputs, False)):
         for text in texts:
-            there = [(n, n.subscriptions if is_input else n.publishers) for n in nodes]
+            there = [(n, received[n] if is_input else n.publishers) for n in nodes]
             without = [n for n, endpoints in there if not any(_means(text, e) for e in endpoints)]
             for node in without:
                 lacking.setdefault(node.name, text.value)

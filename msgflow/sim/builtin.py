@@ -19,6 +19,7 @@ from msgflow.sim.scenario import (
     lives,
     nested,
     reentrant,
+    rtabmap,
     services,
     stamps,
     starvation,
@@ -65,6 +66,7 @@ def scenarios() -> Mapping[str, Scenario]:
         reentrant.reentrant(),
         autoware.autoware(),
         autoware.autoware_two_threads(),
+        rtabmap.rtabmap(),
     )
     return MappingProxyType({scenario.name: scenario for scenario in built_in})
 

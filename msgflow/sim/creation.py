@@ -26,7 +26,7 @@ from msgflow.sim.user_code import UserCode
 from msgflow.sim.write import entity_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from msgflow.sim import system
     from msgflow.sim.discovery import Discovery
@@ -51,14 +51,20 @@ class NodeContext:
     rosout: PublisherObject | None = None
 
     @classmethod
-    def of(cls, node: system.Node, handle: int, executors: Sequence[Executor]) -> NodeContext:
-        """A node without objects."""
+    def of(
+        cls,
+        node: system.Node,
+        handle: int,
+        executors: Sequence[Executor],
+        links: Iterable[LinkObject],
+    ) -> NodeContext:
+        """A node without objects, with those of the links of its process that it has part in."""
         groups = {"": (CallbackGroup(), executors[node.executor])}
         for group in node.groups:
             number = node.executor if group.executor is None else group.executor
             groups[group.name] = (CallbackGroup(group.is_reentrant), executors[number])
-        links = tuple(LinkObject(link) for link in node.links)
-        return cls(node, handle, groups, NodeObjects(executors), links)
+        own = tuple(link for link in links if node.full_name in {link.filled_by, link.used_by})
+        return cls(node, handle, groups, NodeObjects(executors), own)
 
 
 class Creator:
@@ -272,13 +278,14 @@ class Creator:
         name = node.description.full_name
         executor.timers.append(TimerObject(name, handle, callback, period, code, group, due))
 
-    def links(self, node: NodeContext) -> None:
+    def links(self, node: NodeContext, created: Mapping[str, NodeContext]) -> None:
         """What user code says about its messages, once its objects are there."""
         for link in node.description.links:
             self.work(5 * MICROSECOND)
+            filled_by = created[link.inputs_of] if link.inputs_of else node
             self.emit(
                 f"message_link_{link.kind}",
-                tuple(node.objects.polled[topic].handle for topic in link.inputs),
+                tuple(filled_by.objects.polled[topic].handle for topic in link.inputs),
                 tuple(node.publishers[topic].handle for topic in link.outputs),
             )
 
@@ -366,8 +373,13 @@ def _links(
     node: NodeContext, description: entity.Subscription | entity.Timer | entity.Service
 ) -> CallbackLinks | None:
     topic = description.topic if isinstance(description, entity.Subscription) else None
-    inputs = tuple(link for link in node.links if topic in link.description.inputs)
+    name = node.description.full_name
+    inputs = tuple(
+        link for link in node.links if link.filled_by == name and topic in link.description.inputs
+    )
     outputs = tuple(
-        link for link in node.links if {*description.publishes} & {*link.description.outputs}
+        link
+        for link in node.links
+        if link.used_by == name and {*description.publishes} & {*link.description.outputs}
     )
     return CallbackLinks(topic, inputs, outputs) if inputs or outputs else None

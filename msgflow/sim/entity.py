@@ -147,16 +147,19 @@ class MessageLink:
         kind: 'periodic_async': each input is kept until a newer one comes, and what is published
             is made of what is kept; 'partial_sync': callbacks of inputs publish only once there is
             a message of every input, and use each up.
-        inputs: topics of subscriptions of the node.
+        inputs: topics of subscriptions of the node, or of the one that `inputs_of` names.
         outputs: topics of its publishers.
         is_late: a callback puts its message into the cache, and looks at the others, only when it
             has computed; a timer when it publishes. Else both do when they begin.
+        inputs_of: full name of another node of the process, created before: its callbacks fill the
+            caches (periodic_async only), as those of a transform listener do.
     """
 
     kind: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     is_late: bool = False
+    inputs_of: str = ""
 
     def __post_init__(self) -> None:
         if self.kind not in {"periodic_async", "partial_sync"}:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from msgflow.sim.entity import MessageLink
+    from msgflow.sim.system import Node
 
 # More callbacks than this cannot end while another one is being run.
 _KEPT = 64
@@ -23,12 +24,16 @@ class LinkObject:
 
     Attributes:
         description: what the scenario says about it.
+        filled_by: full name of the node whose callbacks fill its caches.
+        used_by: full name of the node that publishes what is made of them.
         ended: for each input the runs of its callback that have ended, each with its end.
         waiting: for each input the run whose message is there to be used (partial_sync).
         used: runs whose messages have been used.
     """
 
     description: MessageLink
+    filled_by: str
+    used_by: str
     ended: dict[str, deque[tuple[int, CallbackInstance]]] = field(default_factory=dict)
     waiting: dict[str, CallbackInstance] = field(default_factory=dict)
     used: set[int | None] = field(default_factory=set)
@@ -55,6 +60,15 @@ class LinkObject:
             before = [entry for entry in self.ended.get(topic, ()) if entry[0] <= cut]
             if before:
                 yield max(before, key=lambda entry: entry[0])[1]
+
+
+def link_objects(nodes: Iterable[Node]) -> tuple[LinkObject, ...]:
+    """Return the links of the nodes of a process, with empty caches."""
+    return tuple(
+        LinkObject(link, link.inputs_of or node.full_name, node.full_name)
+        for node in nodes
+        for link in node.links
+    )
 
 
 @dataclass(slots=True, eq=False)

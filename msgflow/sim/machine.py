@@ -99,7 +99,7 @@ class RunningProcess:
         self._participant = (
             bytes((1, 15))
             + machine.hostname.encode()[-2:].rjust(2, b"\x2a")
-            + description.pid.to_bytes(2, "little")
+            + (description.pid & 0xFFFF).to_bytes(2, "little")
             + bytes((random[0] ^ life, random[1]))
             + bytes((1, 0, 0, 0))
         )

@@ -13,6 +13,7 @@ from msgflow.sim.discovery import Discovery, DiscoveryListener
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import Executor
 from msgflow.sim.executor_thread import ExecutorThread
+from msgflow.sim.links import link_objects
 from msgflow.sim.publish import publish
 from msgflow.sim.user_thread import UserThread
 
@@ -53,6 +54,8 @@ class Startup:
         self._creator = Creator(self.thread, middleware, discovery, network)
         self._user_thread = UserThread(process, self._creator)
         self._listener: DiscoveryListener | None = None
+        self._links = link_objects(process.description.nodes)
+        self._created: dict[str, NodeContext] = {}
         self._steps = self._sequence()
 
     def begin(self, time: int, _: None = None) -> None:
@@ -112,7 +115,8 @@ class Startup:
 
     def _create_node(self, node: system.Node) -> Iterator[bool]:
         creator, memory = self._creator, self._process.memory
-        context = NodeContext.of(node, memory.allocate(), self._executors)
+        context = NodeContext.of(node, memory.allocate(), self._executors, self._links)
+        self._created[node.full_name] = context
         creator.work(300 * MICROSECOND)
         creator.announce()
         described = (context.handle, memory.allocate(), node.name, node.namespace)
@@ -184,7 +188,7 @@ class Startup:
             creator.timer(node, timer)
             yield True
         if description.links:
-            creator.links(node)
+            creator.links(node, self._created)
             yield True
 
     def _publish(self, publisher: PublisherObject) -> None:

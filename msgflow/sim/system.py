@@ -191,7 +191,7 @@ class Scenario:
                 raise UsageError(f"unknown host {process.hostname} — process {process.name}")
             for node in process.nodes:
                 _check_topics(node)
-                _check_links(node)
+                _check_links(node, process)
             _check_executors(process)
         _check_ids(self)
 
@@ -222,12 +222,18 @@ def _check_executors(process: Process) -> None:
         raise UsageError(f"a process has 1 to 8 threads of executors — process {process.name}")
 
 
-def _check_links(node: Node) -> None:
-    subscriptions = {subscription.topic: subscription for subscription in node.subscriptions}
+def _check_links(node: Node, process: Process) -> None:
     publishers = {publisher.topic for publisher in node.publishers}
+    created = {each.full_name: each for each in process.nodes[: process.nodes.index(node)]}
     for link in node.links:
+        source = created.get(link.inputs_of) if link.inputs_of else node
+        if source is None or (link.inputs_of and link.kind != "periodic_async"):
+            raise UsageError(
+                f"no node before {node.full_name} that fills its caches — {link.inputs_of}"
+            )
+        subscriptions = {each.topic: each for each in source.subscriptions}
         if missing := sorted({*link.inputs} - {*subscriptions}):
-            raise UsageError(f"no subscription of {missing[0]} — node {node.full_name}")
+            raise UsageError(f"no subscription of {missing[0]} — node {source.full_name}")
         if missing := sorted({*link.outputs} - publishers):
             raise UsageError(f"no publisher of {missing[0]} — node {node.full_name}")
         if link.kind == "periodic_async":

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import contents
+from ingested import contents, ingest_one
 
 from msgflow import Database
 from msgflow.errors import UsageError
+from msgflow.sim import scenarios, simulate
 
 BOTH = """
 links:
@@ -246,3 +248,65 @@ def test_an_ingest_whose_links_do_not_fit_leaves_nothing(
         database.ingest(shared_traces / "sync_1_1", links=file)
     assert "no such node — /fusion" in caught.value.message
     assert not database.path.exists()
+
+
+LISTENER = """
+links:
+  - kind: periodic_async
+    node: /rtabmap
+    inputs: [/tf]
+    inputs_of: {}
+    outputs: [/mapGraph]
+"""
+KEPT = (
+    "SELECT DISTINCT n.full_name, u.topic_name FROM link_causal AS l "
+    "JOIN callback_instance AS i ON l.callback_instance_id = i.callback_instance_id "
+    "JOIN callback AS c ON i.callback_id = c.callback_id JOIN node AS n ON c.node_id = n.node_id "
+    "JOIN publication AS p ON l.publication_id = p.publication_id "
+    "JOIN publisher AS u ON p.publisher_id = u.publisher_id WHERE l.kind = 'periodic_async'"
+)
+
+
+@pytest.fixture(scope="module")
+def slam(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot that says nothing about what its transforms lead to."""
+    directory = tmp_path_factory.mktemp("slam")
+    scenario = scenarios()["rtabmap"]
+    silent = replace(
+        scenario,
+        processes=tuple(
+            replace(process, nodes=tuple(replace(node, links=()) for node in process.nodes))
+            for process in scenario.processes
+        ),
+    )
+    simulation = simulate(silent, directory / "trace", factor=0.1)
+    path = directory / "silent.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    assert rows(path, KINDS) == [("direct", 109)]
+    return path
+
+
+@pytest.mark.parametrize(
+    "listener", ["/transform_listener_impl_5566a1b0", '"/transform_listener_*"']
+)
+def test_messages_that_another_node_of_the_process_keeps(slam: Path, listener: str) -> None:
+    with Database(slam) as opened:
+        opened.apply_links(write(slam, LISTENER.format(listener)))
+    assert rows(slam, KINDS) == [("direct", 109), ("periodic_async", 16)]
+    assert rows(slam, KEPT) == [("/transform_listener_impl_5566a1b0", "/mapGraph")]
+
+
+@pytest.mark.parametrize(
+    ("listener", "message"),
+    [
+        ("/transform_listener_impl_55d01c40", "no such node in the process of /rtabmap"),
+        ("/rtabmap", "no such node in the process of /rtabmap"),
+    ],
+)
+def test_it_is_of_the_same_process(slam: Path, listener: str, message: str) -> None:
+    before = contents(slam)
+    with Database(slam) as opened, pytest.raises(UsageError) as caught:
+        opened.apply_links(write(slam, LISTENER.format(listener)))
+    assert f"line 6: {message} — {listener}" in caught.value.message
+    assert "/transform_listener_impl_5566a1b0" in (caught.value.hint or "")
+    assert contents(slam) == before

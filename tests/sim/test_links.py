@@ -125,6 +125,26 @@ def _node(link, **subscriptions):
     )
 
 
+def test_a_map_is_made_of_the_latest_transform_that_a_listener_heard(recordings):
+    recording = recordings["rtabmap"]
+    ((count, right),) = recording.truth(
+        """
+        SELECT count(*), count(*) FILTER (WHERE used.pid = p.pid
+            AND used.node LIKE '/transform_listener_impl_%' AND used.end_ns = (
+            SELECT max(each.end_ns) FROM callback_instance AS each
+            WHERE each.callback_handle = used.callback_handle AND each.pid = used.pid
+                AND each.host = used.host AND each.end_ns <= run.start_ns
+        ))
+        FROM causal AS c
+        JOIN callback_instance AS used ON c.callback_instance_id = used.callback_instance_id
+        JOIN publication AS p ON c.publication_id = p.publication_id
+        JOIN callback_instance AS run ON p.callback_instance_id = run.callback_instance_id
+        WHERE c.kind = 'periodic_async' AND p.topic_name = '/mapGraph'
+        """
+    )
+    assert count == right > 10
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -135,6 +155,10 @@ def _node(link, **subscriptions):
         (
             lambda: _node(MessageLink("partial_sync", ("/a", "/b"), ("/out",)), a=("/out",), b=()),
             "whatever input comes last",
+        ),
+        (
+            lambda: _node(MessageLink("periodic_async", ("/a",), ("/out",), inputs_of="/b"), a=()),
+            "no node before /node that fills its caches — /b",
         ),
     ],
 )

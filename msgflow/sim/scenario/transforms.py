@@ -6,7 +6,7 @@ from msgflow.sim.entity import MILLISECOND, SECOND, Publisher, Subscription, Tim
 from msgflow.sim.system import Executor, Host, Node, Process, Scenario
 
 
-def _listener(number: int) -> Node:
+def listener(number: int) -> Node:
     """What a TransformListener creates: a node that a thread of its own spins."""
     return Node(
         f"transform_listener_impl_{number:x}",
@@ -53,11 +53,11 @@ def transforms() -> Scenario:
         processes=(
             Process("state_publisher", "alpha", 1101, (state_publisher,)),
             Process(
-                "odometry", "alpha", 1201, (odometry, _listener(0x5581E3D2)),
+                "odometry", "alpha", 1201, (odometry, listener(0x5581E3D2)),
                 start_ns=3 * MILLISECOND, executors=both,
             ),
             Process(
-                "localisation", "alpha", 1301, (localisation, _listener(0x55D01C40)),
+                "localisation", "alpha", 1301, (localisation, listener(0x55D01C40)),
                 start_ns=7 * MILLISECOND, executors=both,
             ),
             Process("sink", "alpha", 1401, (sink,), start_ns=11 * MILLISECOND),
