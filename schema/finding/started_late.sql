@@ -9,37 +9,13 @@
 --     record initialisation into a snapshot session that runs all the time, and ingest both.
 -- grain: one row per process
 -- severity: warning
--- needs: main.node, main.publisher, main.subscription, main.timer, main.service, main.client,
---     main.callback, main.process, main.host, derive.lossy_start
-WITH object AS (
-    SELECT process_id, 'nodes' AS kind, is_inferred FROM main.node
-    UNION ALL
-    SELECT process_id, 'publishers', is_inferred FROM main.publisher WHERE NOT is_internal
-    UNION ALL
-    SELECT process_id, 'subscriptions', is_inferred FROM main.subscription WHERE NOT is_internal
-    UNION ALL
-    SELECT process_id, 'timers', is_inferred FROM main.timer
-    UNION ALL
-    SELECT process_id, 'services', is_inferred FROM main.service
-    UNION ALL
-    SELECT process_id, 'clients', is_inferred FROM main.client
-    UNION ALL
-    SELECT process_id, 'callbacks', created_ns IS NULL FROM main.callback
-),
-counted AS (
-    SELECT process_id, kind, sum(is_inferred::BIGINT)::BIGINT AS inferred, count(*) AS number
-    FROM object
-    GROUP BY process_id, kind
-)
+-- needs: derive.unseen_creation, main.process, main.host
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
-    sum(c.inferred)::BIGINT AS count,
-    'not seen to be created: '
-    || string_agg(printf('%d of %d %s', c.inferred, c.number, c.kind), ', ' ORDER BY c.kind)
-        AS detail
-FROM counted AS c
-JOIN main.process AS p ON c.process_id = p.process_id
+    u.count,
+    u.detail
+FROM derive.unseen_creation AS u
+JOIN main.process AS p ON u.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
-WHERE c.inferred > 0 AND p.process_id NOT IN (SELECT process_id FROM derive.lossy_start)
-GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname
+WHERE NOT u.is_lossy

@@ -9,16 +9,14 @@
 --     originals.
 -- grain: one row per recording, by the trace that ends last
 -- severity: warning
--- needs: store.packet, main.trace, derive.counted
+-- needs: store.packet, main.trace, derive.recording, derive.counted
 WITH packet AS (
     SELECT
-        t.run_id,
-        min(t.trace_id) OVER (PARTITION BY t.run_id, coalesce(t.uuid::VARCHAR, t.path))
-            AS recording_id,
-        t.path, p.cpu_id, p.stream_class_id, p.stream_instance_id,
+        t.run_id, r.recording_id, t.path, p.cpu_id, p.stream_class_id, p.stream_instance_id,
         coalesce(p.end_ns, p.last_event_ns) AS end_ns
     FROM store.packet AS p
     JOIN main.trace AS t ON p.trace_id = t.trace_id
+    JOIN derive.recording AS r ON p.trace_id = r.trace_id
     WHERE t.domain IS DISTINCT FROM 'kernel'
 ),
 stream AS (

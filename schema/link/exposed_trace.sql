@@ -1,16 +1,14 @@
 -- name: derive.exposed_trace
--- description: Traces whose recording has gaps. The chunks of a rotated trace, and the snapshots of
---     one session, are one recording.
+-- description: Traces whose recording has gaps.
 -- grain: one row per such trace
--- needs: store.trace, store.loss_interval
+-- needs: derive.recording, store.loss_interval
 SELECT run_id, trace_id, recording_id
 FROM (
     SELECT
-        run_id, trace_id,
-        min(trace_id) OVER (PARTITION BY run_id, coalesce(uuid, path)) AS recording_id,
+        run_id, trace_id, recording_id,
         bool_or(trace_id IN (SELECT trace_id FROM store.loss_interval)) OVER (
-            PARTITION BY run_id, coalesce(uuid, path)
+            PARTITION BY run_id, recording_id
         ) AS has_gaps
-    FROM store.trace
+    FROM derive.recording
 )
 WHERE has_gaps

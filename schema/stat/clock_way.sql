@@ -9,14 +9,9 @@
 --     not count.
 -- grain: one row per message or packet between two clocks
 -- needs: store.link_transport, store.publication, store.take, store.request, store.response,
---     store.link_request, store.callback_instance, store.thread, store.process, store.host,
---     store.link_packet, store.trace
-WITH process_clock AS (
-    SELECT p.process_id, h.clock_id
-    FROM store.process AS p
-    JOIN store.host AS h ON p.host_id = h.host_id
-),
-trace_clock AS (
+--     store.link_request, store.callback_instance, store.thread, store.host,
+--     store.link_packet, store.trace, derive.process_clock
+WITH trace_clock AS (
     SELECT t.trace_id, h.clock_id
     FROM store.trace AS t
     JOIN store.host AS h ON t.host_id = h.host_id
@@ -24,7 +19,7 @@ trace_clock AS (
 thread_clock AS (
     SELECT t.thread_id, c.clock_id
     FROM store.thread AS t
-    JOIN process_clock AS c ON t.process_id = c.process_id
+    JOIN derive.process_clock AS c ON t.process_id = c.process_id
 )
 SELECT
     l.run_id, f.clock_id AS from_clock_id, o.clock_id AS to_clock_id, false AS is_packet,
@@ -32,8 +27,8 @@ SELECT
 FROM store.link_transport AS l
 JOIN store.publication AS b ON l.publication_id = b.publication_id
 JOIN store.take AS t ON l.take_id = t.take_id
-JOIN process_clock AS f ON b.process_id = f.process_id
-JOIN process_clock AS o ON t.process_id = o.process_id
+JOIN derive.process_clock AS f ON b.process_id = f.process_id
+JOIN derive.process_clock AS o ON t.process_id = o.process_id
 WHERE l.method IN ('exact', 'exact_stamp', 'nearest')
     AND l.candidate_count = 1
     AND f.clock_id <> o.clock_id

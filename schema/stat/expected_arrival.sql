@@ -4,17 +4,12 @@
 --     messages tell how far the two are apart, or else the correction of both does (NULL: nothing
 --     tells).
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
--- needs: store.publication, store.publisher, store.subscription, store.process, store.host,
---     store.clock, derive.clock_shift, derive.corrected_ns, derive.recorded_ns
-WITH process_clock AS (
-    SELECT p.run_id, p.process_id, h.clock_id
-    FROM store.process AS p
-    JOIN store.host AS h ON p.host_id = h.host_id
-),
-audience AS (
+-- needs: store.publication, store.publisher, store.subscription, store.clock,
+--     derive.process_clock, derive.clock_shift, derive.corrected_ns, derive.recorded_ns
+WITH audience AS (
     SELECT DISTINCT s.run_id, s.topic_name, c.clock_id
     FROM store.subscription AS s
-    JOIN process_clock AS c ON s.process_id = c.process_id
+    JOIN derive.process_clock AS c ON s.process_id = c.process_id
     WHERE s.topic_name IS NOT NULL
 ),
 sent AS (
@@ -23,7 +18,7 @@ sent AS (
         b.source_timestamp_ns, f.clock_id AS from_clock_id, a.clock_id
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-    JOIN process_clock AS f ON p.process_id = f.process_id
+    JOIN derive.process_clock AS f ON p.process_id = f.process_id
     JOIN audience AS a ON p.run_id = a.run_id AND p.topic_name = a.topic_name
 )
 SELECT

@@ -6,17 +6,10 @@
 --     stop and to go on, so that a pause lasts from the last event of the process before it to the
 --     first one after it.
 -- grain: one row per process and gap
--- needs: derive.process_presence, store.loss_interval, store.trace, store.publication, store.take,
---     store.callback_instance, store.executor_state, store.thread
+-- needs: derive.process_presence, derive.recording, store.loss_interval, store.publication,
+--     store.take, store.callback_instance, store.executor_state, store.thread
 CREATE OR REPLACE MACRO derive.process_gap(of_run) AS TABLE
-WITH recording AS (
-    SELECT
-        run_id, trace_id,
-        min(trace_id) OVER (PARTITION BY run_id, coalesce(uuid, path)) AS recording_id
-    FROM store.trace
-    WHERE run_id = of_run
-),
-presence AS MATERIALIZED (
+WITH presence AS MATERIALIZED (
     SELECT run_id, process_id, recording_id, begin_ns, end_ns, first_ns, last_ns, is_born
     FROM derive.process_presence
     WHERE run_id = of_run
@@ -24,7 +17,7 @@ presence AS MATERIALIZED (
 interval_of_process AS MATERIALIZED (
     SELECT p.run_id, p.process_id, l.kind, l.start_ns, l.end_ns
     FROM store.loss_interval AS l
-    JOIN recording AS r ON l.trace_id = r.trace_id
+    JOIN derive.recording AS r ON l.trace_id = r.trace_id
     JOIN presence AS p ON r.recording_id = p.recording_id
 ),
 pause AS MATERIALIZED (

@@ -4,18 +4,19 @@
 --     before is recorded from its first event on, as the tracer tells one process after the other
 --     that it begins; one whose first events may have been lost, from the begin of the recording.
 -- grain: one row per process and recording (the chunks of one trace) that it did something in
--- needs: store.trace, store.process, store.publication, store.take, store.callback_instance,
---     store.node, store.publisher, store.subscription, store.loss_interval
+-- needs: derive.recording, store.trace, store.process, store.publication, store.take,
+--     store.callback_instance, store.node, store.publisher, store.subscription, store.loss_interval
 WITH recording AS (
     SELECT
-        run_id,
-        trace_id,
-        min(trace_id) OVER chunks AS recording_id,
-        min(start_ns) OVER chunks AS begin_ns,
-        max(end_ns) OVER chunks AS end_ns
-    FROM store.trace
-    WHERE domain IS DISTINCT FROM 'kernel'
-    WINDOW chunks AS (PARTITION BY run_id, coalesce(uuid, path))
+        r.run_id,
+        r.trace_id,
+        r.recording_id,
+        min(t.start_ns) OVER chunks AS begin_ns,
+        max(t.end_ns) OVER chunks AS end_ns
+    FROM derive.recording AS r
+    JOIN store.trace AS t ON r.trace_id = t.trace_id
+    WHERE t.domain IS DISTINCT FROM 'kernel'
+    WINDOW chunks AS (PARTITION BY r.run_id, r.recording_id)
 ),
 lossy AS (
     SELECT r.run_id, r.recording_id, min(l.start_ns) AS start_ns
