@@ -84,8 +84,7 @@ SELECT
     p.is_cut,
     p.path
 FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
 ) AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
-WHERE p.is_path
 ORDER BY p.run_id, p.path, p.path_id

@@ -133,11 +133,10 @@ SELECT
     r.lost_reasons,
     p.path
 FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
 ) AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
 LEFT JOIN reason AS r ON p.path_id = r.path_id
 LEFT JOIN looped AS o ON p.path_id = o.path_id
-WHERE p.is_path
 ORDER BY p.run_id, p.path, p.path_id

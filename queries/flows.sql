@@ -42,7 +42,7 @@ FROM main.end_to_end(
     max_depth := $max_depth, max_paths := $max_paths
 ) AS f
 JOIN main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
 ) AS p ON f.path_id = p.path_id
 WHERE CASE $case
     WHEN 'first' THEN f.is_first

@@ -107,7 +107,7 @@ message AS (
         unnest(p.topics) AS topic_name,
         unnest(p.publishers) AS publisher_id
     FROM main.flow_path(
-        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
     ) AS p
     WHERE p.is_path
 )

@@ -38,7 +38,7 @@
 --     false: it may have arrived during this piece. Else NULL
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- needs: main.end_to_end_part, main.executor_wait, main.executor_interference,
+-- needs: main.end_to_end_part, main.executor_wait, derive.executor_meanwhile,
 --     main.callback_instance, main.publication, main.take, derive.executor_busy,
 --     derive.executor_size, derive.callback_exclusion, derive.process_clock, derive.corrected_ns,
 --     store.link_transport, store.link_causal
@@ -79,7 +79,9 @@ meanwhile AS MATERIALIZED (
         r.process_id,
         greatest(r.start_ns, w.earliest_ns) AS from_ns,
         least(r.end_ns, w.start_ns) AS to_ns
-    FROM main.executor_interference AS i
+    FROM derive.executor_meanwhile(
+        (SELECT coalesce(list(callback_instance_id), []) FROM wait)
+    ) AS i
     JOIN wait AS w ON i.callback_instance_id = w.callback_instance_id
     JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
     WHERE i.overlap_ns > 0
@@ -206,23 +208,33 @@ boundary AS (
     UNION
     SELECT position, latest_ns FROM clipped WHERE latest_ns > from_ns AND latest_ns < to_ns
 ),
-piece AS (
+piece AS MATERIALIZED (
     SELECT
         b.position,
+        row_number() OVER in_time AS number,
         b.at_ns AS from_ns,
-        coalesce(lead(b.at_ns) OVER (PARTITION BY b.position ORDER BY b.at_ns), p.to_ns) AS to_ns
+        coalesce(lead(b.at_ns) OVER in_time, p.to_ns) AS to_ns
     FROM boundary AS b
     JOIN part AS p ON b.position = p.position
+    WINDOW in_time AS (PARTITION BY b.position ORDER BY b.at_ns)
+),
+-- What lasts goes from one piece on to another: both ends of it are boundaries.
+covering AS (
+    SELECT
+        c.position, c.priority, c.activity, c.latest_ns, c.callback_instance_id, c.publication_id,
+        c.from_ns, unnest(range(f.number, l.number + 1)) AS number
+    FROM clipped AS c
+    JOIN piece AS f ON c.position = f.position AND c.from_ns = f.from_ns
+    JOIN piece AS l ON c.position = l.position AND c.to_ns = l.to_ns
 ),
 chosen AS (
     SELECT
         p.position, p.from_ns, p.to_ns, c.priority, c.activity, c.latest_ns,
         c.callback_instance_id, c.publication_id
     FROM piece AS p
-    LEFT JOIN clipped AS c
-        ON p.position = c.position AND c.from_ns <= p.from_ns AND c.to_ns >= p.to_ns
+    LEFT JOIN covering AS c ON p.position = c.position AND p.number = c.number
     QUALIFY row_number() OVER (
-        PARTITION BY p.position, p.from_ns
+        PARTITION BY p.position, p.number
         ORDER BY c.priority NULLS LAST, c.from_ns, c.callback_instance_id
     ) = 1
 ),

@@ -33,7 +33,7 @@
 -- column: is_newest BOOLEAN  Newest root of the arrival
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     where it did not arrive, as long as the longest flow of the path took
--- needs: main.flow_path, derive.flow_root, derive.flow_transport, derive.flow_continuation,
+-- needs: derive.flow_chain, derive.flow_root, derive.flow_transport, derive.flow_continuation,
 --     main.publication, main.callback_instance, main.take, main.loss_interval, store.publisher,
 --     store.undelivered
 CREATE OR REPLACE MACRO main.end_to_end(
@@ -43,9 +43,8 @@ CREATE OR REPLACE MACRO main.end_to_end(
 WITH RECURSIVE chain AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        publishers[1] AS first_publisher_id, routes[1] AS first_route, routes[-1] AS route,
-        is_cached, is_path
-    FROM main.flow_path(
+        first_publisher_id, first_route, route, is_cached, is_path
+    FROM derive.flow_chain(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
 ),

@@ -41,7 +41,7 @@
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
--- needs: main.end_to_end, main.flow_path, main.publication, main.take, main.callback_instance,
+-- needs: main.end_to_end, derive.flow_chain, main.publication, main.take, main.callback_instance,
 --     main.request, derive.flow_transport, derive.flow_caller, derive.flow_root,
 --     store.callback_instance, store.take, store.link_causal, store.link_request
 CREATE OR REPLACE MACRO main.end_to_end_part(
@@ -71,12 +71,11 @@ WITH RECURSIVE flow AS MATERIALIZED (
         ORDER BY e.latency_ns DESC, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
     ) = 1
 ),
-path AS MATERIALIZED (
-    SELECT path_id, depth, publishers, subscriptions, routes
-    FROM main.flow_path(
+chain AS MATERIALIZED (
+    SELECT path_id, parent_path_id, depth, publisher_id, subscription_id, route
+    FROM derive.flow_chain(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
-    WHERE is_path
 ),
 transport AS MATERIALIZED (
     SELECT publication_id, publisher_id, take_id
@@ -102,36 +101,62 @@ continuation AS MATERIALIZED (
     JOIN store.link_causal AS l ON c.callback_instance_id = l.callback_instance_id
     WHERE list_contains(runs, l.run_id)
 ),
--- From the end of each flow back to its root, one way of each.
-trail (flow_id, hop, take_id, publication_id, takes, publications) AS (
-    SELECT f.flow_id, p.depth, f.take_id, t.publication_id, [f.take_id], [t.publication_id]
+-- Steps back: from a publication to the message that led to it.
+step AS MATERIALIZED (
+    SELECT DISTINCT
+        c.publication_id AS next_publication_id, c.subscription_id, c.route, t.publisher_id,
+        t.take_id, t.publication_id
+    FROM continuation AS c
+    JOIN transport AS t ON c.take_id = t.take_id
+),
+link AS MATERIALIZED (
+    SELECT c.path_id, c.route, p.path_id AS parent_path_id, p.publisher_id, p.subscription_id
+    FROM chain AS c
+    JOIN chain AS p ON c.parent_path_id = p.path_id
+),
+-- From the end of each flow back to its root, one way of each: that whose list of publications,
+-- then of takes, comes first. Ranks among those lists stand for the lists.
+trail (
+    flow_id, path_id, hop, take_id, publication_id, next_take_id, publications_rank, takes_rank
+) AS (
+    SELECT f.flow_id, c.path_id, c.depth, f.take_id, t.publication_id, NULL::BIGINT, 1, 1
     FROM flow AS f
-    JOIN path AS p ON f.path_id = p.path_id
+    JOIN chain AS c ON f.path_id = c.path_id
     JOIN transport AS t ON f.take_id = t.take_id
     UNION ALL
-    SELECT flow_id, hop, take_id, publication_id, takes, publications
+    SELECT
+        flow_id,
+        path_id,
+        hop,
+        take_id,
+        publication_id,
+        way.next_take_id,
+        dense_rank() OVER (ORDER BY flow_id, publication_id, way.publications_rank),
+        dense_rank() OVER (ORDER BY flow_id, take_id, way.takes_rank)
     FROM (
         SELECT
-            r.flow_id, r.hop - 1 AS hop, t.take_id, t.publication_id,
-            list_prepend(t.take_id, r.takes) AS takes,
-            list_prepend(t.publication_id, r.publications) AS publications
+            r.flow_id,
+            l.parent_path_id AS path_id,
+            r.hop - 1 AS hop,
+            s.take_id,
+            s.publication_id,
+            min(struct_pack(
+                publications_rank := r.publications_rank,
+                takes_rank := r.takes_rank,
+                next_take_id := r.take_id
+            )) AS way
         FROM trail AS r
-        JOIN flow AS f ON r.flow_id = f.flow_id
-        JOIN path AS p ON f.path_id = p.path_id
-        JOIN continuation AS c
-            ON r.publication_id = c.publication_id
-            AND p.subscriptions[r.hop - 1] = c.subscription_id
-            AND p.routes[r.hop] = c.route
-        JOIN transport AS t
-            ON c.take_id = t.take_id AND p.publishers[r.hop - 1] = t.publisher_id
-        WHERE r.hop > 1
+        JOIN link AS l ON r.path_id = l.path_id
+        JOIN step AS s
+            ON r.publication_id = s.next_publication_id
+            AND l.route = s.route
+            AND l.subscription_id = s.subscription_id
+            AND l.publisher_id = s.publisher_id
+        GROUP BY r.flow_id, l.parent_path_id, r.hop, s.take_id, s.publication_id
     )
-    QUALIFY row_number() OVER (
-        PARTITION BY flow_id, take_id ORDER BY publications, takes
-    ) = 1
 ),
 whole AS (
-    SELECT r.flow_id, r.takes, r.publications
+    SELECT r.flow_id, r.take_id, r.publication_id, r.next_take_id
     FROM trail AS r
     JOIN flow AS f ON r.flow_id = f.flow_id
     JOIN derive.flow_root AS o ON r.publication_id = o.publication_id
@@ -140,16 +165,17 @@ whole AS (
             WHEN f.root_kind = 'publication' THEN f.root_id = r.publication_id
             ELSE o.root_kind = 'callback_instance' AND o.root_id = f.root_id
         END
-    QUALIFY row_number() OVER (PARTITION BY r.flow_id ORDER BY r.publications DESC) = 1
+    QUALIFY row_number() OVER (
+        PARTITION BY r.flow_id ORDER BY r.publications_rank DESC, r.takes_rank DESC
+    ) = 1
 ),
-hop AS MATERIALIZED (
-    SELECT
-        flow_id,
-        unnest(range(1, len(takes) + 1)) AS hop,
-        unnest(takes) AS take_id,
-        unnest(publications) AS publication_id,
-        unnest(list_prepend(NULL, takes[:-2])) AS previous_take_id
-    FROM whole
+hop (flow_id, hop, take_id, publication_id, previous_take_id, next_take_id) AS (
+    SELECT flow_id, 1::BIGINT, take_id, publication_id, NULL::BIGINT, next_take_id FROM whole
+    UNION ALL
+    SELECT h.flow_id, r.hop, r.take_id, r.publication_id, h.take_id, r.next_take_id
+    FROM hop AS h
+    JOIN trail AS r
+        ON h.flow_id = r.flow_id AND h.hop + 1 = r.hop AND h.next_take_id = r.take_id
 ),
 -- The callback (or take without one) of the node that each message came out of.
 entered AS MATERIALIZED (
@@ -274,18 +300,18 @@ moment AS (
         m.publication_id
     FROM message AS m
     JOIN flow AS f ON m.flow_id = f.flow_id
-    JOIN path AS p ON f.path_id = p.path_id
+    JOIN chain AS p ON f.path_id = p.path_id
     WHERE m.called_ns IS NOT NULL AND (m.hop < p.depth OR f.sink_event <> 'take')
     UNION ALL
     SELECT f.flow_id, p.depth + 1, 1, 0, 'callback', m.called_ns, m.callback_instance_id, NULL
     FROM flow AS f
-    JOIN path AS p ON f.path_id = p.path_id
+    JOIN chain AS p ON f.path_id = p.path_id
     JOIN message AS m ON f.flow_id = m.flow_id AND p.depth = m.hop
     WHERE f.sink_event = 'callback_end'
     UNION ALL
     SELECT f.flow_id, p.depth + 2, 1, 0, NULL, f.sink_ns, NULL, NULL
     FROM flow AS f
-    JOIN path AS p ON f.path_id = p.path_id
+    JOIN chain AS p ON f.path_id = p.path_id
     WHERE f.flow_id IN (SELECT flow_id FROM whole)
 ),
 -- The layers follow each other in time, everything else in the order of causes.

@@ -12,6 +12,7 @@
 -- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
 -- param: max_depth INTEGER = 32  Longest chain, in topics
 -- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- param: only_paths BOOLEAN = false  Leave out the chains that are no paths
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Number of the chain in this result
 -- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
@@ -27,16 +28,18 @@
 -- column: is_cached BOOLEAN  The last step may wait in its node for other messages
 -- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
 -- column: is_cut BOOLEAN  The chain goes on, or has siblings, beyond the limits
--- needs: derive.flow_hop, derive.node_label, store.publisher, store.subscription, store.node,
+-- needs: derive.flow_chain, derive.node_label, store.publisher, store.subscription, store.node,
 --     store.process, store.service
 CREATE OR REPLACE MACRO main.flow_path(
-    runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
+    runs, from_topic, to_topic, max_depth := 32, max_paths := 1000, only_paths := false
 ) AS TABLE
-WITH RECURSIVE taken_hop AS MATERIALIZED (
+WITH RECURSIVE chain AS MATERIALIZED (
     SELECT
-        run_id, from_subscription_id, route, publisher_id, subscription_id, is_source, is_cached
-    FROM derive.flow_hop
-    WHERE list_contains(runs, run_id)
+        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id, route, is_cached,
+        is_path, is_cut
+    FROM derive.flow_chain(
+        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
+    )
 ),
 called AS (
     SELECT
@@ -51,7 +54,7 @@ called AS (
     FROM (
         SELECT
             route, unnest(route[2:]) AS service_id, unnest(range(2, len(route) + 1)) AS position
-        FROM (SELECT DISTINCT route FROM taken_hop)
+        FROM (SELECT DISTINCT route FROM chain)
     ) AS r
     LEFT JOIN store.service AS s ON r.service_id = s.service_id
     LEFT JOIN store.node AS n ON s.node_id = n.node_id
@@ -70,147 +73,59 @@ route AS (
     LEFT JOIN store.process AS p ON coalesce(n.process_id, -c.route[1]) = p.process_id
     GROUP BY c.route
 ),
-hop AS MATERIALIZED (
+lineage (path_id, step_id, depth, parent_path_id) AS (
+    SELECT path_id, path_id, depth, parent_path_id FROM chain WHERE is_path OR NOT only_paths
+    UNION ALL
+    SELECT l.path_id, c.path_id, c.depth, c.parent_path_id
+    FROM lineage AS l
+    JOIN chain AS c ON l.parent_path_id = c.path_id
+),
+step AS (
     SELECT
-        h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id, h.is_cached,
-        p.topic_name,
-        coalesce(r.caller, derive.node_label(pn.full_name, pp.name, pp.pid)) AS from_node,
-        r.services,
-        derive.node_label(sn.full_name, sp.name, sp.pid) AS to_node,
-        CASE
-            WHEN h.from_subscription_id IS NOT NULL THEN false
-            WHEN from_topic IS NULL THEN h.is_source
-            ELSE coalesce(p.topic_name = from_topic, false)
-        END AS is_start
-    FROM taken_hop AS h
-    LEFT JOIN route AS r ON h.route = r.route
-    JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
+        c.path_id, c.publisher_id, c.subscription_id, c.route, p.topic_name,
+        concat_ws(
+            ' → ',
+            CASE WHEN c.depth = 1
+                THEN coalesce(r.caller, derive.node_label(pn.full_name, pp.name, pp.pid)) END,
+            r.services,
+            coalesce(p.topic_name, '?'),
+            derive.node_label(sn.full_name, sp.name, sp.pid)
+        ) AS label
+    FROM chain AS c
+    LEFT JOIN route AS r ON c.route = r.route
+    JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
     JOIN store.process AS pp ON p.process_id = pp.process_id
     LEFT JOIN store.node AS pn ON p.node_id = pn.node_id
-    JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
+    JOIN store.subscription AS s ON c.subscription_id = s.subscription_id
     JOIN store.process AS sp ON s.process_id = sp.process_id
     LEFT JOIN store.node AS sn ON s.node_id = sn.node_id
 ),
--- Only what leads to the topic asked for is followed, so that nothing else is enumerated.
-toward_end (run_id, subscription_id) AS (
-    SELECT run_id, subscription_id
-    FROM hop
-    WHERE to_topic IS NULL OR topic_name = to_topic
-    UNION
-    SELECT h.run_id, h.from_subscription_id
-    FROM toward_end AS l
-    JOIN hop AS h ON l.subscription_id = h.subscription_id
-    WHERE h.from_subscription_id IS NOT NULL
-),
-useful AS MATERIALIZED (
+whole AS (
     SELECT
-        h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id,
-        h.is_cached, h.topic_name, h.from_node, h.services, h.to_node, h.is_start
-    FROM hop AS h
-    JOIN toward_end AS l ON h.subscription_id = l.subscription_id
-),
-chain AS (
-    SELECT
-        run_id,
-        [publisher_id] AS publishers,
-        [subscription_id] AS subscriptions,
-        [topic_name] AS topics,
-        [route] AS routes,
-        concat_ws(' → ', from_node, services, coalesce(topic_name, '?'), to_node) AS path,
-        is_cached,
-        count(*) OVER (PARTITION BY run_id) > max_paths AS is_crowded
-    FROM useful
-    WHERE is_start
-    QUALIFY row_number() OVER (
-        PARTITION BY run_id ORDER BY publisher_id, subscription_id, route
-    ) <= max_paths
-    UNION ALL
-    SELECT run_id, publishers, subscriptions, topics, routes, path, is_cached, is_crowded
-    FROM (
-        SELECT
-            c.run_id,
-            list_append(c.publishers, u.publisher_id) AS publishers,
-            list_append(c.subscriptions, u.subscription_id) AS subscriptions,
-            list_append(c.topics, u.topic_name) AS topics,
-            list_append(c.routes, u.route) AS routes,
-            concat_ws(' → ', c.path, u.services, coalesce(u.topic_name, '?'), u.to_node) AS path,
-            u.is_cached,
-            c.is_crowded OR count(*) OVER (PARTITION BY c.run_id) > max_paths AS is_crowded
-        FROM chain AS c
-        JOIN useful AS u
-            ON c.subscriptions[-1] = u.from_subscription_id
-        WHERE len(c.subscriptions) < max_depth
-            AND NOT list_contains(c.subscriptions, u.subscription_id)
-            AND (to_topic IS NULL OR c.topics[-1] IS DISTINCT FROM to_topic)
-    )
-    QUALIFY row_number() OVER (
-        PARTITION BY run_id ORDER BY publishers, subscriptions, routes
-    ) <= max_paths
-),
-numbered AS MATERIALIZED (
-    SELECT
-        run_id, publishers, subscriptions, topics, routes, path, is_cached, is_crowded,
-        row_number() OVER (ORDER BY run_id, publishers, subscriptions, routes) AS path_id
-    FROM chain
-),
-continuable AS (
-    SELECT DISTINCT n.path_id
-    FROM numbered AS n
-    JOIN useful AS u ON n.subscriptions[-1] = u.from_subscription_id
-    WHERE NOT list_contains(n.subscriptions, u.subscription_id)
-        AND (to_topic IS NULL OR n.topics[-1] IS DISTINCT FROM to_topic)
-),
-parented AS MATERIALIZED (
-    SELECT n.path_id, p.path_id AS parent_path_id
-    FROM numbered AS n
-    JOIN numbered AS p
-        ON p.publishers = n.publishers[:-2]
-        AND p.subscriptions = n.subscriptions[:-2]
-        AND p.routes = n.routes[:-2]
-),
-limited AS (
-    SELECT
-        n.run_id, n.path_id, n.publishers, n.subscriptions, n.topics, n.routes, n.path,
-        n.is_cached, p.parent_path_id,
-        n.path_id NOT IN (SELECT parent_path_id FROM parented) AS is_end,
-        n.is_crowded
-        OR (
-            n.path_id IN (SELECT path_id FROM continuable)
-            AND n.path_id NOT IN (SELECT parent_path_id FROM parented)
-        ) AS is_cut
-    FROM numbered AS n
-    LEFT JOIN parented AS p ON n.path_id = p.path_id
-),
-ranked AS (
-    SELECT
-        run_id, path_id, parent_path_id, publishers, subscriptions, topics, routes, path,
-        is_cached, is_cut,
-        CASE WHEN to_topic IS NULL THEN is_end ELSE topics[-1] = to_topic END AS is_candidate,
-        row_number() OVER (
-            PARTITION BY
-                run_id, CASE WHEN to_topic IS NULL THEN is_end ELSE topics[-1] = to_topic END
-            ORDER BY len(subscriptions), path_id
-        ) AS path_number
-    FROM limited
+        l.path_id,
+        list(s.publisher_id ORDER BY l.depth) AS publishers,
+        list(s.subscription_id ORDER BY l.depth) AS subscriptions,
+        list(s.topic_name ORDER BY l.depth) AS topics,
+        list(s.route ORDER BY l.depth) AS routes,
+        string_agg(s.label, ' → ' ORDER BY l.depth) AS path
+    FROM lineage AS l
+    JOIN step AS s ON l.step_id = s.path_id
+    GROUP BY l.path_id
 )
 SELECT
-    run_id,
-    path_id,
-    parent_path_id,
-    len(subscriptions) AS depth,
-    publishers,
-    subscriptions,
-    topics,
-    routes,
-    path,
-    publishers[-1] AS publisher_id,
-    subscriptions[-1] AS subscription_id,
-    is_cached,
-    is_candidate AND path_number <= max_paths AS is_path,
-    CASE
-        WHEN bool_or(is_candidate AND path_number > max_paths) OVER run THEN true
-        WHEN to_topic IS NULL THEN is_cut
-        ELSE bool_or(is_cut) OVER run
-    END AS is_cut
-FROM ranked
-WINDOW run AS (PARTITION BY run_id)
+    c.run_id,
+    c.path_id,
+    c.parent_path_id,
+    c.depth,
+    w.publishers,
+    w.subscriptions,
+    w.topics,
+    w.routes,
+    w.path,
+    c.publisher_id,
+    c.subscription_id,
+    c.is_cached,
+    c.is_path,
+    c.is_cut
+FROM chain AS c
+JOIN whole AS w ON c.path_id = w.path_id

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from mutations import packet_begins, streams
 
-from msgflow import open_db
+from msgflow import open_db, sim
 from msgflow.errors import TraceError
 from msgflow.ingest import ingest
 
@@ -145,3 +145,36 @@ def test_a_pipe_beside_the_streams(trace: Path, tmp_path: Path, new_database: Pa
     os.mkfifo(directories(changed)[0] / "pipe")
     ingest([changed], new_database)
     assert "a pipe, no file: left out" in diagnostics(new_database)["damaged_trace"][2]
+
+
+@pytest.mark.parametrize("length", [1024, 1025, 1_000_000])
+def test_names_that_are_too_long(tmp_path: Path, new_database: Path, length: int) -> None:
+    """Each message is joined with the name of its topic, so that one took gigabytes."""
+    topic = "/" + "x" * (length - 1)
+    timer = sim.Timer(10**6, publishes=(topic,))
+    talker = sim.Node("talker", publishers=(sim.Publisher(topic),), timers=(timer,))
+    hearer = sim.Node("hearer", subscriptions=(sim.Subscription(topic),))
+    scenario = sim.Scenario(
+        "long_name",
+        "A topic with a long name.",
+        (sim.Host("alpha"),),
+        (
+            sim.Process("talker", "alpha", 100, (talker,)),
+            sim.Process("hearer", "alpha", 200, (hearer,)),
+        ),
+        duration_ns=600_000_000,
+    )
+    packets = sim.Recording(start_ns=1, packet_bytes=1 << 23)
+    trace = sim.simulate(scenario, tmp_path / "out", recording=packets).directory
+    ingest([trace], new_database)
+    found = diagnostics(new_database)
+    assert rows(new_database, "SELECT count(*) > 400 FROM link_transport") == [(True,)]
+    longest = "SELECT max(length(topic_name)) FROM publisher"
+    if length > 1024:
+        severity, count, detail = found["implausible_value"]
+        assert (severity, count) == ("data_loss", 1)
+        assert "names: too long: left out" in detail
+        assert rows(new_database, longest)[0][0] < 100
+    else:
+        assert "implausible_value" not in found
+        assert rows(new_database, longest) == [(length,)]

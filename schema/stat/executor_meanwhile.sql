@@ -1,0 +1,59 @@
+-- name: derive.executor_meanwhile
+-- kind: macro
+-- description: What the threads of its executor ran while a callback instance waited, of these or
+--     (NULL) of all: main.executor_interference. The messages of a burst wait for each other, so
+--     that all pairs are many, those of one instance few.
+-- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
+-- needs: derive.callback_ready, derive.executor_run, store.executor_thread
+CREATE OR REPLACE MACRO derive.executor_meanwhile(waiting) AS TABLE
+WITH ready AS (
+    SELECT
+        r.run_id,
+        r.executor_id,
+        r.callback_instance_id,
+        coalesce(r.earliest_ns, r.latest_ns) AS from_ns,
+        r.latest_ns,
+        r.start_ns,
+        x.thread_id
+    FROM derive.callback_ready AS r
+    JOIN store.executor_thread AS x ON r.executor_id = x.executor_id
+    WHERE r.start_ns > coalesce(r.earliest_ns, r.latest_ns)
+        AND (
+            waiting IS NULL
+            OR r.callback_instance_id IN (SELECT unnest(waiting::BIGINT[]))
+        )
+),
+run AS (
+    SELECT thread_id, callback_instance_id, start_ns, end_ns, position
+    FROM derive.executor_run
+    WHERE end_ns > start_ns
+),
+-- What a thread runs is in order, so those that overlap a wait are neighbours: from the one that
+-- was under way when it began to the last one that began before it ended.
+bounded AS (
+    SELECT
+        w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,
+        w.thread_id, l.position AS last_position,
+        CASE WHEN f.end_ns > w.from_ns THEN f.position ELSE coalesce(f.position, 0) + 1 END
+            AS first_position
+    FROM ready AS w
+    ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
+    ASOF LEFT JOIN run AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
+),
+pair AS (
+    SELECT
+        run_id, executor_id, callback_instance_id, from_ns, latest_ns, start_ns, thread_id,
+        unnest(range(first_position, last_position + 1)) AS position
+    FROM bounded
+    WHERE first_position <= last_position
+)
+SELECT
+    p.run_id,
+    p.callback_instance_id,
+    r.callback_instance_id AS meanwhile_id,
+    p.executor_id,
+    p.thread_id,
+    least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.from_ns) AS overlap_ns,
+    greatest(least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.latest_ns), 0) AS certain_ns
+FROM pair AS p
+JOIN run AS r ON p.thread_id = r.thread_id AND p.position = r.position

@@ -1,0 +1,76 @@
+"""Long paths and bursts: the memory of an answer grows with its rows, not with their square."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import duckdb
+from golden import SYSTEMS, fill
+from ros_system import RosSystem
+from staged_events import Analysis, Thread
+
+from msgflow.db.connection import open_memory
+from msgflow.db.derive import derive
+from msgflow.query.catalogue import load_query
+from msgflow.query.run import run_query
+
+TALKER, HEARER = Thread(100), Thread(200)
+LENGTH, MESSAGES = 1500, 4000
+
+
+def limit(con: duckdb.DuckDBPyConnection, most: str) -> None:
+    """Take no more memory than that, and no disk in its place."""
+    con.execute("SET memory_limit = ?", [most])
+    con.execute("SET temp_directory = ''")
+    con.execute("SET threads = 2")
+
+
+def test_a_long_path(fresh_database: Path, tmp_path: Path) -> None:
+    con = open_memory()
+    con.execute(f"ATTACH '{fresh_database}' AS target; USE target")
+    fill(con, tmp_path / "nothing")
+    con.execute((SYSTEMS / "long_line.sql").read_text())
+    derive(con, 1)
+    limit(con, "450MB")
+    given = {"max_depth": LENGTH}
+    (path,) = run_query(con, load_query("e2e-latency"), given).to_arrow().to_pylist()
+    parts = run_query(con, load_query("critical-path"), given).to_arrow().to_pylist()
+    con.close()
+    assert (path["roots"], path["reached"], path["is_cut"]) == (2, 2, False)
+    # From the start of the first callback to the end of the last.
+    assert path["min_ns"] == path["max_ns"] == 100 * LENGTH + 50
+    steps = (f"/node_{n} → /topic_{n}" for n in range(1, LENGTH + 1))
+    assert path["path"] == " → ".join([*steps, f"/node_{LENGTH + 1}"])
+    assert sum(part["duration_ns"] for part in parts) == 100 * LENGTH + 50
+    assert [part["hop"] for part in parts if part["part"] == "publish_to_take"] == list(
+        range(1, LENGTH + 1)
+    )
+
+
+def test_a_burst(empty_database: Path, tmp_path: Path) -> None:
+    """One callback publishes thousands of messages: each waits for all before it."""
+    system = RosSystem()
+    system.node(TALKER, 0x1, "talker")
+    system.publisher(TALKER, 0x10, "/a")
+    system.timer(TALKER, 0x20, 0xC0)
+    system.node(HEARER, 0x1, "hearer")
+    system.subscription(HEARER, 0x30, "/a", callback=0xC1)
+    system.ready(HEARER)
+    system.start(TALKER, 0xC0)
+    for stamp in range(1, MESSAGES + 1):
+        system.publish(TALKER, 0x10, stamp)
+    system.end(TALKER, 0xC0)
+    for stamp in range(1, MESSAGES + 1):
+        system.take(HEARER, 0x30, stamp)
+        system.start(HEARER, 0xC1)
+        system.end(HEARER, 0xC1)
+    system.ready(HEARER)
+    analysis = Analysis(empty_database, tmp_path)
+    con = analysis.build(system).connection
+    limit(con, "450MB")
+    parts = run_query(con, load_query("critical-path"), {}).to_arrow().to_pylist()
+    analysis.close()
+    assert sum(part["duration_ns"] for part in parts) == parts[0]["latency_ns"]
+    busy = [part["callback_instance_id"] for part in parts if part["activity"] == "executor_busy"]
+    # The last message waited for the callbacks of all others.
+    assert len(set(busy)) == len(busy) == MESSAGES - 1
