@@ -1,11 +1,15 @@
 """`msgflow` and `python -m msgflow`."""
 
-from msgflow.cli.stop import STOP
+import signal
 
 
 def main() -> None:
     """Run the program; its exit codes are those of `msgflow.errors.ExitCode`."""
-    # Before the imports, which take longest.
+    # Of Ctrl-C in the imports Python would print a traceback.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from msgflow.cli.stop import STOP
+
     STOP.install()
     from msgflow.cli.app import app
 

@@ -30,13 +30,13 @@ def called(frame, event, argument):
         signal.raise_signal(number)
 
 import msgflow.__main__
-install = msgflow.__main__.STOP.install
+install = msgflow.cli.stop.STOP.install
 
 def installed():
     install()
     sys.setprofile(called)
 
-msgflow.__main__.STOP.install = installed
+msgflow.cli.stop.STOP.install = installed
 try:
     msgflow.__main__.main()
 finally:
@@ -68,6 +68,28 @@ def test_at_any_moment_a_signal_ends_the_program_cleanly(
         done = python(_COUNTING, int(number), 1 + calls * part // 5, *arguments)
         ended.add((done.returncode, done.stderr.removeprefix("runs: morning (1), noon (2)\n")))
     assert ended == {_ENDINGS[number]}
+
+
+_EARLY = """
+import os, signal, sys
+import msgflow.__main__
+
+number = int(sys.argv[1])
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "msgflow.cli.stop":
+            signal.raise_signal(number)
+
+sys.meta_path.insert(0, Finder())
+msgflow.__main__.main()
+"""
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_before_anything_is_imported_a_signal_ends_the_process(number: signal.Signals) -> None:
+    done = python(_EARLY, int(number))
+    assert (done.returncode, done.stderr) == (-number, "")
 
 
 _BROKEN = """
