@@ -1,6 +1,6 @@
 -- name: derive.clock_finding
 -- kind: macro
--- description: What messages and packets cannot tell of the clocks: those that nothing connects
+-- description: What messages and packets leave open about the clocks: those that nothing connects
 --     with the others, and why, and those that do not run evenly.
 -- grain: one row per pair of clocks or clock
 -- needs: store.host, store.clock, derive.clock_pair
@@ -40,7 +40,7 @@ SELECT
             p.other_name, p.name, p.received_count, p.sent_count
         )
     END
-    || ', and only both together tell an offset' AS detail
+    || ', and an offset needs both' AS detail
 FROM pair AS p
 JOIN sync AS c ON p.clock_id = c.clock_id
 JOIN sync AS o ON p.other_clock_id = o.clock_id
