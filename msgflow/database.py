@@ -593,6 +593,50 @@ class Database:
 
         return self._ask(export)
 
+    def series(
+        self,
+        what: str = "paths",
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+    ) -> QueryResult:
+        """Return measured values side by side: a row per moment, a column per thing [ns].
+
+        Args:
+            what: 'paths' (latency of first arrivals), 'callbacks' (duration) or 'topics' (latency
+                from publication to take).
+            run: a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+
+        Raises:
+            UsageError: not exactly one run, a time that cannot be read, or nothing of that kind.
+            QueryError: the database could not run it.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.export.series import What, read_series
+        from msgflow.query.window import choose_runs, time_window
+
+        if what not in set(What):
+            raise UsageError(f"there are no series of that — {what}", f"one of {', '.join(What)}")
+        connection = self.connection
+
+        def read() -> QueryResult:
+            runs = choose_runs(read_runs(connection), run)
+            if len(runs) != 1:
+                raise UsageError(
+                    "series are of one run" if runs else "the database holds no run yet",
+                    "choose one with --run" if runs else "msgflow ingest TRACE",
+                )
+            window = time_window(runs, start, end, skip_first)
+            return read_series(connection, runs[0], What(what), window)
+
+        return self._ask(read)
+
     def export_perfetto(
         self,
         path: str | Path,

@@ -76,7 +76,7 @@ def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
 
 
 def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterator[str]:
-    from msgflow.export.human import format_cell
+    from msgflow.query.human import format_cell
 
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)
     for number, group in groupby(_numbered(findings), key=lambda item: item[0]):

@@ -17,6 +17,9 @@ from msgflow.cli.options import (
     SkipFirstOption,
     StartOption,
 )
+from msgflow.errors import UsageError
+from msgflow.export.series import What
+from msgflow.query.times import Times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -142,6 +145,52 @@ def perfetto(
         f" {count(trace.values, 'value')} of counters written to {output}:"
         " open it at ui.perfetto.dev"
     )
+
+
+@app.command("series")
+def series(
+    output: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="FILE.csv or FILE.parquet, replaced when it exists"),
+    ],
+    what: Annotated[
+        What,
+        typer.Option(
+            "--what",
+            help="Latency of paths, duration of callbacks, or latency from publication to take of"
+            " topics",
+            rich_help_panel=SELECTION,
+        ),
+    ] = What.PATHS,
+    run: RunOption = None,
+    start: StartOption = None,
+    end: EndOption = None,
+    skip_first: SkipFirstOption = None,
+    times: Annotated[
+        Times,
+        typer.Option(
+            "--times",
+            help="First column: seconds since the start of the run (relative), seconds or ns since"
+            " the epoch, or UTC as text (iso); with all but ns, values are in seconds",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = Times.RELATIVE,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write measured values side by side: a row per moment, a column per path or other thing.
+
+    PlotJuggler and spreadsheets draw such files: the first column is the time.
+    """
+    from msgflow.cli.output import print_result
+    from msgflow.database import Database
+    from msgflow.export.formats import Format, format_of
+
+    form = format_of(output)
+    if form not in (Format.CSV, Format.PARQUET):
+        raise UsageError(f"series are written as CSV or Parquet — {output}", "FILE.csv")
+    with Database(database) as opened:
+        result = opened.series(what, run=run, start=start, end=end, skip_first=skip_first)
+    print_result(result.with_times(times), form, output)
 
 
 def _report(exported: Sequence[ExportedView], directory: Path) -> None:

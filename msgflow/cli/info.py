@@ -74,7 +74,7 @@ def _json(results: dict[str, QueryResult]) -> Iterator[str]:
 
 
 def _sections(results: dict[str, QueryResult], form: InfoFormat) -> Iterator[str]:
-    from msgflow.export.table import markdown_lines, table_lines
+    from msgflow.query.table import markdown_lines, table_lines
 
     for position, (section, result) in enumerate(results.items()):
         if position:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from msgflow.export.formats import Format
+from msgflow.query.times import Times
 
 DEFAULT_DATABASE = Path("msgflow.duckdb")
 
@@ -71,6 +72,16 @@ FormatOption = Annotated[
         metavar="FORMAT",
         help=", ".join(Format),
         show_default="by the suffix of FILE, else table",
+        rich_help_panel=OUTPUT,
+    ),
+]
+TimesOption = Annotated[
+    Times | None,
+    typer.Option(
+        "--times",
+        help="Points in time: ns since the epoch, seconds since it, seconds since the start of the"
+        " run (relative), or UTC as text (iso); with all but ns, durations are in seconds",
+        show_default="ns; tables have units",
         rich_help_panel=OUTPUT,
     ),
 ]

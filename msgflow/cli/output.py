@@ -170,7 +170,7 @@ def terminal(stream: IO[bytes]) -> IO[bytes]:
 def _shown(text: str) -> str:
     if text.isprintable():
         return text
-    from msgflow.export.human import printable
+    from msgflow.query.human import printable
 
     return printable(text, keep="\n\r\t")
 

@@ -43,7 +43,7 @@ def group(
             refuse_list(context.invoked_subcommand)
         return
     from msgflow.cli.output import print_lines
-    from msgflow.export.table import lay_out
+    from msgflow.query.table import lay_out
 
     rows = [(header.name, header.title) for header in load_queries()]
     print_lines(lay_out(("query", "title"), rows, (False, False)))

@@ -19,6 +19,7 @@ from msgflow.cli.options import (
     RunOption,
     SkipFirstOption,
     StartOption,
+    TimesOption,
 )
 from msgflow.errors import UsageError
 
@@ -96,6 +97,7 @@ def build_command(header: Header) -> Any:
         ("internal", InternalOption, False),
         ("form", FormatOption, None),
         ("output", OutputOption, None),
+        ("times", TimesOption, None),
         ("show", _ShowOption, False),
         ("list_queries", _ListOption, False),
         ("database", DatabaseOption, DEFAULT_DATABASE),
@@ -117,7 +119,15 @@ def build_command(header: Header) -> Any:
 def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
     from msgflow.cli.output import print_result
     from msgflow.database import Database
+    from msgflow.export.formats import Format, format_of
 
+    times = given["times"]
+    form = given["form"] or format_of(given["output"])
+    if times is not None and form in (Format.TABLE, Format.MARKDOWN):
+        raise UsageError(
+            "tables for people have times with their units — --times",
+            "--format csv, json, jsonl or parquet, or a file with such a suffix",
+        )
     with Database(given["database"]) as database:
         result = database.query(
             header.name,
@@ -128,7 +138,9 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
             internal=given["internal"],
             **own,
         )
-    print_result(result, given["form"], given["output"])
+    if times is not None:
+        result = result.with_times(times)
+    print_result(result, form, given["output"])
 
 
 def _option(param: Param) -> Parameter:

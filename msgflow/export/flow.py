@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any
 
-from msgflow.export.plain import plain
 from msgflow.query.clocks import clock_notes
 from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
+from msgflow.query.plain import plain
 
 if TYPE_CHECKING:
     import duckdb
@@ -135,6 +136,9 @@ class Flow:
         from msgflow.export.flow_tree import tree_text
 
         return tree_text(self)
+
+    def _repr_html_(self) -> str:
+        return f'<pre style="line-height: 1.2">{escape(str(self))}</pre>'
 
 
 def read_flow(

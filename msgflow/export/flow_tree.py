@@ -11,7 +11,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from msgflow.export.flow_layout import lay_out_flow, walk
-from msgflow.export.human import format_cell, format_duration, short_symbol
+from msgflow.query.human import format_cell, format_duration, short_symbol
 from msgflow.query.window import format_epoch
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ import json
 from enum import StrEnum
 from typing import IO, TYPE_CHECKING
 
-from msgflow.export.plain import plain
+from msgflow.errors import UsageError
+from msgflow.query.plain import plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -36,12 +37,26 @@ _SUFFIXES = {
     ".jsonl": Format.JSONL,
     ".md": Format.MARKDOWN,
     ".parquet": Format.PARQUET,
+    ".txt": Format.TABLE,
 }
 
 
 def format_of(path: Path | None) -> Format:
-    """Return the format that the suffix of a file asks for, else a table."""
-    return Format.TABLE if path is None else _SUFFIXES.get(path.suffix.lower(), Format.TABLE)
+    """Return the format that the suffix of a file asks for; a table without file or suffix.
+
+    Raises:
+        UsageError: no format has this suffix.
+    """
+    if path is None or not path.suffix:
+        return Format.TABLE
+    try:
+        return _SUFFIXES[path.suffix.lower()]
+    except KeyError:
+        raise UsageError(
+            f"no format has this suffix — {path}",
+            f"end it with {', '.join(_SUFFIXES)}, or say --format;"
+            " spreadsheets open CSV, PlotJuggler CSV and Parquet",
+        ) from None
 
 
 def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
@@ -65,7 +80,7 @@ def json_rows(result: QueryResult) -> Iterator[str]:
 
 
 def _lines(result: QueryResult, form: Format) -> Iterable[str]:
-    from msgflow.export.table import markdown_lines, table_lines
+    from msgflow.query.table import markdown_lines, table_lines
 
     if form is Format.TABLE:
         return table_lines(result)

@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
-from msgflow.export.human import printable
-from msgflow.export.plain import plain
+from msgflow.query.human import printable
+from msgflow.query.plain import plain
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -96,6 +96,12 @@ class Comparison:
     run_a: Run
     run_b: Run
 
+    def __str__(self) -> str:
+        return str(self.result)
+
+    def _repr_html_(self) -> str:
+        return self.result._repr_html_()
+
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
         """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class QueryResult:
     """Rows in the order of the query. Times are integers in nanoseconds.
+
+    `print` shows the first rows as a table, and a notebook does so, too.
 
     Attributes:
         table: the rows.
@@ -47,6 +49,36 @@ class QueryResult:
         if self.header is None:
             return {}
         return {column.name: column.unit for column in self.header.columns if column.unit}
+
+    def __str__(self) -> str:
+        from msgflow.query.shown import shown_text
+
+        return shown_text(self)
+
+    def _repr_html_(self) -> str:
+        from msgflow.query.shown import shown_html
+
+        return shown_html(self)
+
+    def with_times(self, times: str) -> QueryResult:
+        """Return the rows with points in time and durations in another form.
+
+        Args:
+            times: 'ns', 'seconds' (since the epoch), 'relative' (seconds since the start of the
+                run) or 'iso' (UTC as text). With all but 'ns' durations are in seconds.
+
+        Raises:
+            UsageError: no such form, or the rows do not say which columns are times.
+        """
+        from msgflow.query.times import Times, converted
+
+        try:
+            form = Times(times)
+        except ValueError:
+            raise UsageError(
+                f"there are no such times — {times}", f"choose one of {', '.join(Times)}"
+            ) from None
+        return replace(self, table=converted(self, form))
 
     def to_arrow(self) -> pa.Table:
         """Return the rows as a pyarrow.Table."""

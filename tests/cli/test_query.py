@@ -145,3 +145,26 @@ def test_mistakes_have_a_message_and_a_code(
     assert message.startswith("error: ")
     assert error in message
     assert hint in rest
+
+
+def test_times_are_chosen_for_programs_only(msgflow: Msgflow, small_database: Path) -> None:
+    result = msgflow(
+        "query", "info-runs", "--db", small_database, "--format", "jsonl", "--times", "iso"
+    )
+    assert result.exit_code == 0
+    row = json.loads(result.stdout)
+    assert row["start_utc"].endswith("Z")
+    assert "duration_s" in row
+    refused = msgflow("query", "info-runs", "--db", small_database, "--times", "iso")
+    assert refused.exit_code == 2
+    assert "--times" in refused.stderr
+
+
+def test_a_suffix_of_no_format_is_refused(msgflow: Msgflow, small_database: Path) -> None:
+    for name in ("runs.xlsx", "runs.png"):
+        result = msgflow("query", "info-runs", "--db", small_database, "-o", name)
+        assert result.exit_code == 2
+        assert name in result.stderr
+        assert not Path(name).exists()
+    assert msgflow("query", "info-runs", "--db", small_database, "-o", "runs.txt").exit_code == 0
+    assert Path("runs.txt").read_text().startswith("run_id")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from msgflow.export.plain import plain
+from msgflow.query.plain import plain
 from msgflow.query.window import format_epoch
 
 _BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
 
-from msgflow.export.human import format_cell, shown_name
+from msgflow.query.human import format_cell, shown_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def table_lines(result: QueryResult) -> Iterator[str]:
     """Yield the lines of a table: names, a rule, one line per row, numbers to the right."""
-    return lay_out(*_cells(result))
+    return lay_out(*cells(result))
 
 
 def lay_out(
@@ -45,7 +45,7 @@ def lay_out(
 
 def markdown_lines(result: QueryResult) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
-    names, rows, right = _cells(result)
+    names, rows, right = cells(result)
     if not names:
         return
     yield _markdown_line(names)
@@ -54,7 +54,8 @@ def markdown_lines(result: QueryResult) -> Iterator[str]:
         yield _markdown_line(row)
 
 
-def _cells(result: QueryResult) -> tuple[list[str], list[list[str]], list[bool]]:
+def cells(result: QueryResult) -> tuple[list[str], list[list[str]], list[bool]]:
+    """Return titles, rows as people read them, and which columns are numbers."""
     import pyarrow.types
 
     units = result.units

@@ -1,0 +1,96 @@
+"""Points in time and durations of a result as other programs read them."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from msgflow.query.result import QueryResult
+
+_NS = "_ns"
+_SECOND = 1e9
+
+
+class Times(StrEnum):
+    """How times are written.
+
+    All but `ns` have durations in seconds; `seconds` counts from the epoch (a floating-point
+    number, exact to a quarter of a microsecond), `relative` from the start of the run, `iso` is
+    UTC.
+    """
+
+    NS = "ns"
+    SECONDS = "seconds"
+    RELATIVE = "relative"
+    ISO = "iso"
+
+
+def converted(result: QueryResult, times: Times) -> pa.Table:
+    """Return the rows of a result with its times in another form; `_ns` becomes `_s` or `_utc`.
+
+    Raises:
+        UsageError: the result does not say which of its columns are times, or of which run.
+    """
+    table = result.table
+    if times is Times.NS:
+        return table
+    if result.header is None:
+        raise UsageError(
+            "plain SQL does not say which numbers are times", "use a query: msgflow query --list"
+        )
+    units = result.units
+    columns, names = [], []
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        unit = units.get(name)
+        suffix = ""
+        if unit == "epoch ns":
+            column, suffix = _moment(result, column, times)
+        elif unit == "ns":
+            column, suffix = _seconds(column), "_s"
+        renamed = name.removesuffix(_NS) + suffix if name.endswith(_NS) and suffix else name
+        columns.append(column)
+        names.append(renamed if renamed not in table.column_names else name)
+    import pyarrow
+
+    return pyarrow.table(columns, names=names)
+
+
+def _moment(result: QueryResult, column: Any, times: Times) -> tuple[Any, str]:
+    import pyarrow
+    from pyarrow import compute
+
+    if times is Times.SECONDS:
+        return _seconds(column), "_s"
+    if times is Times.RELATIVE:
+        return _seconds(compute.subtract(column, _starts(result))), "_s"
+    stamps = column.cast(pyarrow.timestamp("ns"))
+    return compute.strftime(stamps, format="%Y-%m-%dT%H:%M:%SZ"), "_utc"
+
+
+def _seconds(column: Any) -> Any:
+    import pyarrow
+    from pyarrow import compute
+
+    return compute.divide(column.cast(pyarrow.float64(), safe=False), _SECOND)
+
+
+def _starts(result: QueryResult) -> Any:
+    """Return when the run of each row began."""
+    import pyarrow
+    from pyarrow import compute
+
+    starts = {run.run_id: run.start_ns for run in result.runs}
+    if "run_id" in result.columns and len(starts) > 1:
+        place = compute.index_in(
+            result.table["run_id"], value_set=pyarrow.array(list(starts), pyarrow.int64())
+        )
+        return pyarrow.array(list(starts.values()), pyarrow.int64()).take(place.combine_chunks())
+    if len(starts) != 1:
+        raise UsageError("no row says which run it is of", "choose one with --run")
+    (start,) = starts.values()
+    return pyarrow.scalar(start, pyarrow.int64())
