@@ -23,6 +23,7 @@ _LENGTHS = {
     "mixed_intra_process": 0.5,
     "autoware": 0.2,
     "autoware_two_threads": 0.2,
+    "rtabmap": 0.2,
 }
 _SHORT = 0.15
 # Flows in them pass ring buffers, messages taken without a callback, or calls of services.
