@@ -8,7 +8,7 @@
 CREATE OR REPLACE TEMP TABLE truth_pair AS
 WITH life AS (
     SELECT
-        subscription_id, host, pid, subscription_handle, created_ns, ended_ns,
+        subscription_id, host, pid, subscription_handle, created_ns,
         row_number() OVER (
             PARTITION BY host, pid, subscription_handle ORDER BY created_ns
         ) AS life
@@ -62,7 +62,7 @@ SELECT
             THEN p.sent_ns + CASE WHEN p.host = s.host THEN 0 ELSE w.apart_ns END
         ELSE s.created_ns
     END AS since_ns,
-    coalesce(n.taken_ns, s.ended_ns, 9223372036854775807) AS until_ns,
+    coalesce(n.taken_ns, 9223372036854775807) AS until_ns,
     f.sent_ns < p.sent_ns AS has_earlier,
     n.taken_ns IS NOT NULL AS has_later
 FROM pair AS a

@@ -1,7 +1,8 @@
 -- name: staging.take
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
--- needs: staging.take_origin, staging.subscription, staging.beside_gap, staging.callback_gap
+-- needs: staging.take_origin, staging.subscription, staging.beside_gap, staging.callback_gap,
+--     staging.predecessor, raw
 WITH subscription_of AS (
     SELECT o.start_event_id, s.subscription_id
     FROM staging.take_origin AS o
@@ -31,6 +32,14 @@ interrupted AS (
         ON o.thread_id = g.thread_id
         AND coalesce(o.callback_start_event_id, o.end_event_id) >= g.event_id
     WHERE g.event_id > o.start_event_id
+),
+-- Callbacks right behind the last layer of a take whose others are in a gap.
+remnant AS (
+    SELECT p.event_id
+    FROM staging.predecessor AS p
+    JOIN staging.beside_gap AS g ON p.previous_event_id = g.event_id AND g.is_behind
+    JOIN raw.ros2_rclcpp_take AS u ON p.previous_event_id = u.event_id
+    WHERE p.sequence = 'call'
 )
 SELECT
     n.take_id,
@@ -44,7 +53,10 @@ SELECT
     o.start_event_id,
     o.end_event_id,
     o.callback_start_event_id,
-    behind.event_id IS NOT NULL OR before.event_id IS NOT NULL OR inside.start_event_id IS NOT NULL
+    behind.event_id IS NOT NULL
+    OR before.event_id IS NOT NULL
+    OR inside.start_event_id IS NOT NULL
+    OR (o.method = 'callback_only' AND o.start_event_id IN (SELECT event_id FROM remnant))
         AS is_loss_affected
 FROM staging.take_origin AS o
 JOIN numbered AS n ON o.start_event_id = n.start_event_id

@@ -502,6 +502,24 @@ def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse
     assert model.column("SELECT is_loss_affected FROM callback_instance") == [True]
 
 
+def test_a_callback_with_the_rest_of_its_take(system: RosSystem, analyse: Analyse) -> None:
+    """The layers with the stamp are in the gap, the last one is not; then a whole one without."""
+    thread = Thread(100)
+    system.subscription(thread, 0x30, "/a", callback=0xC1)
+    system.add("ros2:rmw_take", thread, message=0xB)
+    system.lose()
+    system.add("ros2:rclcpp_take", thread, message=0xB)
+    system.start(thread, 0xC1)
+    system.end(thread, 0xC1)
+    system.start(thread, 0xC1)
+    system.end(thread, 0xC1)
+    model = analyse(system)
+    assert model.rows(
+        "SELECT method, t.is_loss_affected, o.reason FROM take AS t JOIN stat_orphan AS o "
+        "USING (take_id) WHERE method = 'callback_only' ORDER BY taken_ns"
+    ) == [("callback_only", True, "receiver_gap"), ("callback_only", False, "no_stamp")]
+
+
 def test_links_of_a_run_that_meets_a_gap_are_marked(system: RosSystem, analyse: Analyse) -> None:
     thread = Thread(100)
     system.publisher(thread, 0x10, "/a")
