@@ -39,7 +39,8 @@
 -- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
 -- column: path VARCHAR             Nodes and topics
 -- note: clocks
--- needs: main.flow_path, main.end_to_end, main.looped_arrival
+-- needs: main.flow_path, main.end_to_end, main.looped_arrival,
+--     main.continued_subscription, main.take
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, sink_event, latency_ns, status, reason,
@@ -107,7 +108,17 @@ looped AS (
         $runs,
         (
             SELECT list([path_id, take_id])
-            FROM (SELECT DISTINCT path_id, take_id FROM flow WHERE take_id IS NOT NULL)
+            FROM (
+                SELECT DISTINCT path_id, take_id
+                FROM flow
+                WHERE take_id IN (
+                    SELECT take_id
+                    FROM main.take
+                    WHERE subscription_id IN (
+                        SELECT subscription_id FROM main.continued_subscription($runs)
+                    )
+                )
+            )
         )
     )
     GROUP BY path_id

@@ -8,7 +8,8 @@
 -- param: arrivals BIGINT[][]  Arrivals of main.end_to_end: each path_id and take_id, once
 -- column: path_id BIGINT  Path, as main.end_to_end numbers it
 -- column: take_id BIGINT  Take at the end of the path
--- needs: derive.flow_transport, derive.flow_continuation, derive.flow_hop, store.take
+-- needs: derive.flow_transport, derive.flow_continuation, derive.continued_pair,
+--     store.take
 CREATE OR REPLACE MACRO main.looped_arrival(runs, arrivals) AS TABLE
 WITH RECURSIVE arrival AS MATERIALIZED (
     SELECT arrival[1] AS path_id, arrival[2] AS take_id
@@ -19,20 +20,20 @@ sink AS MATERIALIZED (
     FROM arrival AS a
     JOIN store.take AS t ON a.take_id = t.take_id
 ),
+-- The steps of the graph are looked for only where the end of a path goes on.
+hop AS MATERIALIZED (
+    SELECT DISTINCT c.subscription_id AS from_subscription_id, t.subscription_id
+    FROM derive.continued_pair AS c
+    JOIN (
+        SELECT DISTINCT run_id, publisher_id, subscription_id
+        FROM derive.flow_transport
+    ) AS t ON c.publisher_id = t.publisher_id
+    WHERE list_contains(runs, c.run_id) AND list_contains(runs, t.run_id)
+),
 continued AS MATERIALIZED (
     SELECT DISTINCT subscription_id
     FROM sink
-    WHERE subscription_id IN (
-        SELECT subscription_id FROM derive.flow_continuation WHERE list_contains(runs, run_id)
-    )
-),
--- The steps of the graph are looked for only where the end of a path goes on.
-hop AS MATERIALIZED (
-    SELECT DISTINCT from_subscription_id, subscription_id
-    FROM derive.flow_hop
-    WHERE list_contains(runs, run_id)
-        AND from_subscription_id IS NOT NULL
-        AND EXISTS (SELECT 1 FROM continued)
+    WHERE subscription_id IN (SELECT from_subscription_id FROM hop)
 ),
 ahead (sink_id, subscription_id) AS (
     SELECT s.subscription_id, h.subscription_id

@@ -1,0 +1,11 @@
+-- name: main.continued_subscription
+-- kind: macro
+-- description: Subscriptions at which flows go on: some message of theirs led to another one.
+-- grain: one row per such subscription
+-- param: runs BIGINT[]  Runs to look at
+-- column: subscription_id BIGINT  The subscription
+-- needs: derive.continued_pair
+CREATE OR REPLACE MACRO main.continued_subscription(runs) AS TABLE
+SELECT DISTINCT subscription_id
+FROM derive.continued_pair
+WHERE list_contains(runs, run_id)
