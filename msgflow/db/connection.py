@@ -140,7 +140,9 @@ def _prepare(con: duckdb.DuckDBPyConnection) -> None:
     con.execute("SET autoinstall_known_extensions = false")
     con.execute("SET autoload_known_extensions = false")
     # stdout is for data: DuckDB would draw its bar there when a statement takes long.
-    con.execute("SET enable_progress_bar = false")
+    # In a notebook without ipywidgets there is none, and the setting cannot be touched.
+    if con.execute("SELECT current_setting('enable_progress_bar')").fetchall() == [(True,)]:
+        con.execute("SET enable_progress_bar = false")
     # What is set for a connection is set for those made of it, too, only where it is global.
     for scope in ("", "GLOBAL"):
         # A name that is no table is no variable of Python either.

@@ -42,7 +42,7 @@ _STATE = ("missing", "reason", "cut_count", "internal_count")
 NOT_TAKEN = "not_taken"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flow:
     """What one message caused and was caused by. Times are integers in nanoseconds.
 
@@ -131,6 +131,9 @@ class Flow:
             else:
                 parts.append(f'  "{name}": {json.dumps(value, ensure_ascii=False)}')
         return "{\n" + ",\n".join(parts) + "\n}"
+
+    def __repr__(self) -> str:
+        return f"<Flow of {self.start.kind} {self.start.id}: {len(self.nodes)} nodes>"
 
     def __str__(self) -> str:
         from msgflow.export.flow_tree import tree_text

@@ -65,6 +65,8 @@ def tree_text(
         file=stream,
         width=_UNBOUNDED if width is None else max(width, _INDENT * deepest + _LEAST_WIDTH),
         force_terminal=color,
+        # In a notebook it would draw there, and not into the text.
+        force_jupyter=False,
         color_system="standard" if color else None,
         highlight=False,
         markup=False,

@@ -129,7 +129,7 @@ def _brief(duration_ns: int) -> str:
     return f"{duration_ns} ns"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Graph:
     """Nodes, topics and services of a run, and what passes between them.
 
@@ -232,6 +232,9 @@ class Graph:
             GraphFormat.JSON: self.to_json,
         }
         return write[form]()
+
+    def __repr__(self) -> str:
+        return f"<{self}>"
 
     def __str__(self) -> str:
         kinds = [vertex.kind for vertex in self.vertices.values()]

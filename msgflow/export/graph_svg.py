@@ -19,27 +19,31 @@ _WIDE, _NARROW, _ABOVE = 104, 44, 16
 _MARGIN = 14
 _TITLE = 20
 _SWEEPS = 8
+# Of this picture alone, also where it stands inside a page.
 _STYLE = """
-text { font: 11px sans-serif; fill: #1b2430; }
-.small { font-size: 9.5px; fill: #5a6573; }
-.said { paint-order: stroke; stroke: #f4f6f8; stroke-width: 4px; stroke-linejoin: round; }
-.lane { fill: #f4f6f8; stroke: #c9d1d9; }
-.node { fill: #ffffff; stroke: #3d4653; }
-.topic { fill: #e3eefb; stroke: #2f6fb0; }
-.service { fill: #fbf0dc; stroke: #a86b00; }
-.edge { fill: none; stroke: #3d4653; stroke-width: 1.2; }
-.call, .serve { stroke: #a86b00; }
-.periodic_async { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 8 4; }
-.partial_sync { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 2 4; }
+.msgflow-graph text { font: 11px sans-serif; fill: #1b2430; }
+.msgflow-graph .small { font-size: 9.5px; fill: #5a6573; }
+.msgflow-graph .said { paint-order: stroke; stroke: #f4f6f8; stroke-width: 4px; }
+.msgflow-graph .lane { fill: #f4f6f8; stroke: #c9d1d9; }
+.msgflow-graph .node { fill: #ffffff; stroke: #3d4653; }
+.msgflow-graph .topic { fill: #e3eefb; stroke: #2f6fb0; }
+.msgflow-graph .service { fill: #fbf0dc; stroke: #a86b00; }
+.msgflow-graph .edge { fill: none; stroke: #3d4653; stroke-width: 1.2; }
+.msgflow-graph .call, .msgflow-graph .serve { stroke: #a86b00; }
+.msgflow-graph .periodic_async { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 8 4; }
+.msgflow-graph .partial_sync { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 2 4; }
 @media (prefers-color-scheme: dark) {
-  svg { background: #14191f; }
-  text { fill: #e6ebf0; } .small { fill: #9aa5b1; }
-  .said { stroke: #1c232b; }
-  .lane { fill: #1c232b; stroke: #39434e; }
-  .node { fill: #14191f; stroke: #c3ccd6; }
-  .topic { fill: #1b2f47; stroke: #6fa8dc; } .service { fill: #3a2d12; stroke: #dba53a; }
-  .edge { stroke: #c3ccd6; } .call, .serve { stroke: #dba53a; }
-  .periodic_async, .partial_sync { stroke: #d991cf; }
+  .msgflow-graph { background: #14191f; }
+  .msgflow-graph text { fill: #e6ebf0; }
+  .msgflow-graph .small { fill: #9aa5b1; }
+  .msgflow-graph .said { stroke: #1c232b; }
+  .msgflow-graph .lane { fill: #1c232b; stroke: #39434e; }
+  .msgflow-graph .node { fill: #14191f; stroke: #c3ccd6; }
+  .msgflow-graph .topic { fill: #1b2f47; stroke: #6fa8dc; }
+  .msgflow-graph .service { fill: #3a2d12; stroke: #dba53a; }
+  .msgflow-graph .edge { stroke: #c3ccd6; }
+  .msgflow-graph .call, .msgflow-graph .serve { stroke: #dba53a; }
+  .msgflow-graph .periodic_async, .msgflow-graph .partial_sync { stroke: #d991cf; }
 }
 """.strip()
 
@@ -71,8 +75,8 @@ def svg(graph: Graph) -> str:
     _order(boxes, graph.edges)
     lanes, width, height = _place(boxes, titles, graph.edges)
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"'
-        f' viewBox="0 0 {width:.0f} {height:.0f}" role="img">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="msgflow-graph" width="{width:.0f}"'
+        f' height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}" role="img">',
         f"<title>{escape(str(graph))}</title>",
         f"<style>{_STYLE}</style>",
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7"'

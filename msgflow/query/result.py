@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from msgflow.query.window import Run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class QueryResult:
     """Rows in the order of the query. Times are integers in nanoseconds.
 
@@ -49,6 +49,10 @@ class QueryResult:
         if self.header is None:
             return {}
         return {column.name: column.unit for column in self.header.columns if column.unit}
+
+    def __repr__(self) -> str:
+        name = "SQL" if self.header is None else self.header.name
+        return f"<QueryResult of {name}: {len(self)} rows>"
 
     def __str__(self) -> str:
         from msgflow.query.shown import shown_text
