@@ -3,7 +3,8 @@
     python benchmarks/fuzz.py [--cases 10000] [--seed 1] [--jobs N] [--kind KIND]… [--case N]…
 
 Each case changes a small recording, an archive of one, a database, or a file of links or clocks,
-and runs the whole of msgflow on it in a process with limits: ingest, check, and three queries.
+and runs the whole of msgflow on it in a process with limits, forked from one that has imported
+everything: ingest, check, and three queries.
 Counted are, by kind of input:
 
 - traceback: one is printed; mistake: an error says "mistake of msgflow"; crash: the process ends by
@@ -49,6 +50,8 @@ from mutations import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from msgflow import Database
+
 SECONDS_OF_CPU = 30
 # Of waiting for nothing, even where other processes have the machine.
 SECONDS = 900
@@ -72,6 +75,16 @@ CLOCKS = """clocks:
     offset_ns: 1000
     drift_ppb: 3
 """
+CLOCKS_TOML = """[{host}]
+offset_ns = 1_000
+drift_ppb = 3
+"""
+# Name of the file, its content, and the option that takes it.
+FILES = {
+    "links": ("links.yaml", LINKS, "--links"),
+    "clocks": ("clocks.yaml", CLOCKS, "--clock-sync"),
+    "clocks in TOML": ("clocks.toml", CLOCKS_TOML, "--clock-sync"),
+}
 
 
 @dataclass(frozen=True)
@@ -158,32 +171,53 @@ def _base(directory: Path, system: str, layout: str) -> Base:
 
 
 def commands(database: Path, traces: Sequence[Path], options: Sequence[str]) -> dict[str, Any]:
-    """Run msgflow; runs in a process of its own."""
+    """Run msgflow; runs in a process of its own.
+
+    What reads a database opens it once: opening takes as long as a query. What it raises that is no
+    error of msgflow is a traceback.
+    """
+    from msgflow import MsgflowError, open_db
+
     found: dict[str, Any] = {"codes": []}
-    db = ["--db", str(database)]
     before = database.read_bytes()
     if traces:
-        code, _ = msgflow("ingest", *map(str, traces), *db, *options)
+        code, _ = msgflow("ingest", *map(str, traces), "--db", str(database), *options)
         found["codes"].append(code)
         if code:
             found["damaged"] = database.read_bytes() != before
             return found
-    code, text = msgflow("check", "--format", "json", *db)
-    found["codes"].append(code)
-    found["reports"] = [text]
-    code, text = msgflow("query", "info-diagnostics", "--format", "json", *db)
-    found["reports"].append(text)
-    found["results"] = []
-    for query in QUERIES:
-        code, text = msgflow("query", query, "--format", "json", *db)
-        found["codes"].append(code)
-        found["results"].append(text)
-    if traces:
-        code, _ = msgflow("db", "check", *db)
-        found["damaged"] = code != 0
     else:
+        code, _ = msgflow("check", "--db", str(database))
+        found["codes"].append(code)
+    found["damaged"] = False
+    try:
+        with open_db(database) as opened:
+            found["reports"] = [str(opened.findings()), written(opened, "info-diagnostics")]
+            results = [written(opened, query) for query in QUERIES]
+            if traces:
+                found["damaged"] = any(
+                    check.row_count and check.severity == "error" for check in opened.check()
+                )
+        found["results"] = results
+    except MsgflowError as error:
+        print(f"error: {error}", file=sys.stderr)
+        found["codes"].append(int(error.exit_code))
+        # What msgflow has just written, it has to be able to read.
+        found["damaged"] = bool(traces)
+    if not traces:
         found["damaged"] = database.read_bytes() != before
     return found
+
+
+def written(database: Database, query: str) -> str:
+    """Return what a query answers, as the command line writes it."""
+    import io
+
+    from msgflow.export.formats import Format, write_result
+
+    stream = io.BytesIO()
+    write_result(database.query(query), Format.JSON, stream)
+    return stream.getvalue().decode("utf-8", "replace")
 
 
 def msgflow(*arguments: str) -> tuple[int, str]:
@@ -303,11 +337,11 @@ def case(
     elif kind == "database":
         change, traces, protected = damage_file(database, random), [], False
     else:
-        text = LINKS if kind == "links" else CLOCKS.format(host=random.choice(base.hosts))
-        file = place / f"{kind}.yaml"
-        content, change = damage_text(text, random)
+        name, text, option = FILES[kind]
+        content, change = damage_text(text.replace("{host}", random.choice(base.hosts)), random)
+        file = place / name
         file.write_bytes(content)
-        options = ["--links", str(file)] if kind == "links" else ["--clock-sync", str(file)]
+        options = [option, str(file)]
         protected = False
     ending, found, said = run(lambda: commands(database, traces, options), place)
     bad = []
@@ -378,7 +412,7 @@ def outcomes(
                 yield Outcome(**{**row, "bad": tuple(row["bad"])})
 
 
-KINDS = ("trace",) * 12 + ("archive",) * 3 + ("database",) * 2 + ("links", "clocks")
+KINDS = ("trace",) * 12 + ("archive",) * 3 + ("database",) * 2 + tuple(FILES)
 
 
 def campaign(
@@ -426,12 +460,12 @@ def main() -> None:
 
     kinds = tuple(arguments.kind or KINDS)
     found = campaign(numbers, arguments.seed, kinds, arguments.jobs, report)
-    print(f"\n{'kind':10}{'cases':>8}{'refused':>9}" + "".join(f"{bad:>12}" for bad in BAD))
+    print(f"\n{'kind':15}{'cases':>8}{'refused':>9}" + "".join(f"{bad:>12}" for bad in BAD))
     for kind in sorted({outcome.kind for outcome in found}):
         of_kind = [outcome for outcome in found if outcome.kind == kind]
         counts = Counter(bad for outcome in of_kind for bad in outcome.bad)
         refused = sum(outcome.ending == "refused" for outcome in of_kind)
-        print(f"{kind:10}{len(of_kind):8}{refused:9}" + "".join(f"{counts[bad]:12}" for bad in BAD))
+        print(f"{kind:15}{len(of_kind):8}{refused:9}" + "".join(f"{counts[bad]:12}" for bad in BAD))
     bad = sum(bool(outcome.bad) for outcome in found)
     print(f"\n{len(found)} cases in {time.monotonic() - begin:.0f} s, {bad} of them not well")
     sys.exit(bool(bad))

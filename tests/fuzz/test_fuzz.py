@@ -6,30 +6,96 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 SEED = 1
-COUNT = 20
+COUNT = 40
 CAMPAIGN = """
 import json, sys
 import fuzz
 found = fuzz.campaign(range(int(sys.argv[1])), int(sys.argv[2]))
 print(json.dumps([[o.number, o.ending, o.bad, o.change, o.said[-500:]] for o in found]))
 """
+# The same case with a fault in msgflow each time: everything is forked from here.
+PLANTED = """
+import json, os, signal, tempfile
+from pathlib import Path
+from typing import Any
+import fuzz
+import msgflow.cli.app, msgflow.database, msgflow.ingest.implausible, msgflow.ingest.load
+from msgflow import Database, TraceError
+
+findings, query, ingest = Database.findings, Database.query, Database.ingest
+
+def broken(self, *arguments, **options):
+    raise ValueError("planted")
+
+def killed(self, *arguments, **options):
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+def endless(self, *arguments, **options):
+    while True:
+        pass
+
+def damaging(self, *arguments, **options):
+    with self.path.open("ab") as file:
+        file.write(b"planted")
+    raise TraceError("planted")
+
+def untrue(self, name, **options):
+    return query(self, "info-runs" if name == "delivery" else name, **options)
+
+PLANTS = {
+    "nothing": {},
+    "traceback": {"findings": broken},
+    "mistake": {"ingest": broken},
+    "crash": {"findings": killed},
+    "hang": {"findings": endless},
+    "damage": {"ingest": damaging},
+    "unreported": {"query": untrue},
+}
+
+def harmless(directory, random):
+    return "nothing"
+
+fuzz.MUTATIONS, fuzz.STRUCTURAL, fuzz.SECONDS_OF_CPU = (harmless,), (), 12
+fuzz.BASES = fuzz.BASES[:1]
+found = {}
+with tempfile.TemporaryDirectory() as temporary:
+    bases = fuzz.prepare(Path(temporary))
+    for name, planted in PLANTS.items():
+        for method in ("findings", "query", "ingest"):
+            setattr(Database, method, planted.get(method, globals()[method]))
+        place = Path(temporary) / name
+        place.mkdir()
+        found[name] = fuzz.case(1, 1, bases, ("trace",), place).bad
+print(json.dumps(found))
+"""
 
 
-def test_a_slice_of_the_campaign() -> None:
+def run(program: str, *arguments: object) -> Any:
     # In a process of its own: cases are forked from it, and what pytest has loaded would count
     # against their limits.
     ran = subprocess.run(
-        [sys.executable, "-c", CAMPAIGN, str(COUNT), str(SEED)],
+        [sys.executable, "-c", program, *map(str, arguments)],
         cwd=BENCHMARKS,
         capture_output=True,
         text=True,
         check=False,
     )
     assert ran.returncode == 0, ran.stderr[-2000:]
-    found = json.loads(ran.stdout.splitlines()[-1])
+    return json.loads(ran.stdout.splitlines()[-1])
+
+
+def test_the_campaign_finds_what_is_planted() -> None:
+    found = run(PLANTED)
+    assert found == {name: [] if name == "nothing" else [name] for name in found}
+    assert len(found) == 7
+
+
+def test_a_slice_of_the_campaign() -> None:
+    found = run(CAMPAIGN, COUNT, SEED)
     assert sorted(number for number, *_ in found) == list(range(COUNT))
     assert {ending for _, ending, *_ in found} >= {"ended", "refused"}
     assert [outcome for outcome in found if outcome[2]] == []

@@ -250,7 +250,7 @@ def damage_text(text: str, random: Random) -> tuple[bytes, str]:
         del content[at:]
     elif kind == "insert":
         content[at:at] = random.choice(
-            (b"[", b"{", b": ", b"\n", b"\x00", b"&a *a", b"!!x ", b"\xff")
+            (b"[", b"{", b": ", b" = ", b'"""', b"\n", b"\x00", b"&a *a", b"!!x ", b"\xff")
         )
     elif kind == "number":
         numbers = list(re.finditer(rb"\d+", content))
@@ -260,7 +260,7 @@ def damage_text(text: str, random: Random) -> tuple[bytes, str]:
             (b"9" * 5000, b"1__0", b"-1", b"1e999", b".inf", str(1 << 63).encode(), b"0x10")
         )
     elif kind == "nest":
-        odd = (b"[", b"{", b": ", b"\n", b"\x00", b"&a *a", b"!!x ", b"\xff")
+        odd = (b"[", b"{", b": ", b" = ", b'"""', b"\n", b"\x00", b"&a *a", b"!!x ", b"\xff")
         content[at:at] = random.choice(odd)
     elif kind == "number":
         numbers = list(re.finditer(rb"\d+", content))
