@@ -116,7 +116,8 @@ class TestTimeless:
     @pytest.fixture
     def trace(self, tmp_path: Path) -> Path:
         metadata = """stream {
-            packet.context := struct { uint8_t content_size; uint8_t packet_size; };
+            packet.context := struct { uint8_t content_size; uint8_t packet_size;
+                uint8_t timestamp_begin; uint8_t timestamp_end; };
             event.header := struct { uint8_t id; uint8_t timestamp; }; };
             event { name = "one"; id = 1; fields := struct { uint8_t _n; }; };
             event { name = "two"; id = 2; fields := struct { uint8_t _n; }; };"""
@@ -126,8 +127,9 @@ class TestTimeless:
             for packet in range(3):
                 number = first + 2 * packet
                 # What is called a time is one of no clock: it falls.
+                times = bytes([90 - number, 80 - number])
                 events = bytes([1, 90 - number, number, 2, 10, number + 1])
-                content += bytes([64, 64]) + events
+                content += bytes([80, 80]) + times + events
             return content
 
         return write(tmp_path / "timeless", metadata, b=stream(10), a=stream(0))
