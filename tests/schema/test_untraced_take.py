@@ -1,0 +1,118 @@
+"""Which processes take messages without a trace of it, each condition of the rule by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import duckdb
+import pytest
+
+from msgflow.db import objects
+
+# Thread 1 serves a message, waits, and runs what would be a timer; then it serves another message.
+STAGE = """
+CREATE SCHEMA staging;
+CREATE SCHEMA raw;
+CREATE TABLE staging.callback_announced AS
+    SELECT 1 AS process_id, 7 AS callback_handle, NULL::INTEGER AS callback_event_id, 70 AS handle,
+        NULL::VARCHAR AS kind;
+CREATE TABLE staging.callback_trigger AS
+    SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_handle,
+        NULL::INTEGER AS callback_event_id;
+CREATE TABLE staging.callback_run (start_event_id INTEGER, callback_handle INTEGER,
+    previous_event_id INTEGER, executor_event_id INTEGER, process_id INTEGER DEFAULT 1,
+    thread_id INTEGER DEFAULT 1, depth INTEGER DEFAULT 1, is_intra_process BOOLEAN DEFAULT false);
+INSERT INTO staging.callback_run (start_event_id, callback_handle, previous_event_id,
+    executor_event_id) VALUES (50, 8, 45, 44), (100, 7, 80, 90), (200, 9, 195, 190);
+CREATE TABLE staging.callback_binding AS FROM (VALUES (50, 'subscription', 45), (100, NULL, NULL),
+    (200, 'subscription', 195)) AS b (start_event_id, kind, take_event_id);
+CREATE TABLE staging.callback_gap (thread_id INTEGER, event_id INTEGER);
+CREATE TABLE waited AS SELECT 1 AS process_id, 1 AS thread_id, 80 AS event_id;
+CREATE TABLE raw.ros2_rclcpp_executor_execute AS FROM (VALUES (44), (90), (190)) AS e (event_id);
+CREATE MACRO staging.located(tracepoint) AS TABLE FROM waited;
+"""
+NO_WAIT = "DELETE FROM waited"
+NO_TAKE = "UPDATE staging.callback_binding SET take_event_id = NULL WHERE start_event_id = 200"
+ANNOUNCED = "UPDATE staging.callback_announced SET"
+SERVED = "UPDATE staging.callback_run SET"
+
+
+@pytest.fixture
+def staged() -> Iterator[duckdb.DuckDBPyConnection]:
+    (rule,) = (each for each in objects.load("model") if each.name == "staging.untraced_take")
+    with duckdb.connect() as con:
+        con.execute(STAGE)
+        con.execute(f"CREATE VIEW found AS {rule.body}")
+        yield con
+
+
+@pytest.mark.parametrize(
+    ("changes", "is_found"),
+    [
+        ([], False),
+        # In the round of a message.
+        ([NO_WAIT], True),
+        (["UPDATE waited SET event_id = 40"], True),
+        ([NO_WAIT, "INSERT INTO staging.callback_gap VALUES (1, 60)"], False),
+        ([NO_WAIT, "INSERT INTO staging.callback_gap VALUES (1, 30)"], True),
+        ([NO_WAIT, "INSERT INTO staging.callback_gap VALUES (2, 60)"], True),
+        ([NO_WAIT, f"{SERVED} depth = 2 WHERE start_event_id = 50"], False),
+        ([NO_WAIT, f"{SERVED} thread_id = 2 WHERE start_event_id = 50"], False),
+        (
+            [NO_WAIT, "UPDATE staging.callback_binding SET take_event_id = NULL, kind = 'service'"],
+            True,
+        ),
+        (
+            [NO_WAIT, "UPDATE staging.callback_binding SET take_event_id = NULL, kind = 'timer'"],
+            False,
+        ),
+        ([NO_WAIT, f"{ANNOUNCED} handle = NULL"], False),
+        ([NO_WAIT, f"{ANNOUNCED} kind = 'timer'"], False),
+        ([NO_WAIT, f"{ANNOUNCED} callback_event_id = 5"], False),
+        (
+            [
+                NO_WAIT,
+                "INSERT INTO staging.callback_run (start_event_id, callback_handle, thread_id) "
+                "VALUES (300, 8, 2)",
+                "INSERT INTO staging.callback_binding VALUES (300, 'subscription', 295)",
+            ],
+            False,
+        ),
+        # A subscription runs without a take.
+        ([f"{ANNOUNCED} kind = 'subscription'"], True),
+        ([NO_TAKE, f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200"], True),
+        ([NO_TAKE, f"{SERVED} previous_event_id = NULL WHERE start_event_id = 200"], True),
+        ([NO_TAKE], False),
+        ([f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200"], False),
+        (
+            [
+                NO_TAKE,
+                f"{SERVED} previous_event_id = 150, is_intra_process = true "
+                "WHERE start_event_id = 200",
+            ],
+            False,
+        ),
+        (
+            [
+                NO_TAKE,
+                f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200",
+                "UPDATE staging.callback_binding SET kind = 'timer' WHERE start_event_id = 200",
+            ],
+            False,
+        ),
+        (
+            [
+                NO_TAKE,
+                f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200",
+                "DELETE FROM staging.callback_trigger",
+            ],
+            False,
+        ),
+    ],
+)
+def test_messages_reach_callbacks_although_none_is_taken(
+    staged: duckdb.DuckDBPyConnection, changes: list[str], *, is_found: bool
+) -> None:
+    for change in changes:
+        staged.execute(change)
+    assert staged.execute("FROM found").fetchall() == [(1,)] * is_found
