@@ -103,7 +103,7 @@ export class TimelinePage {
       item("timer", "timer callback"), item("subscription", "subscription callback"), item("service", "service callback"),
       item("publication", "publication"), item("take", "take"), item("call", "request, response"),
       item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"),
-      item("transport", "transport", "stroke"), item("direct", "direct link", "stroke"),
+      item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
       item("indirect", "indirect link", "stroke dashed"), item("critical", "slowest chain", "stroke"),
       item("gap", "not recorded"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
   }

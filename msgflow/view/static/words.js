@@ -6,8 +6,8 @@ export const KINDS = [
 export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
 
 export const LINKS = {
-  transport: "transport",
-  callback: "handed to the callback",
+  transport: "publish to take",
+  callback: "take to callback",
   direct: "published by",
   periodic_async: "periodic (cached until the timer)",
   partial_sync: "synchronised (cached until the set was complete)",
