@@ -9,7 +9,8 @@
 -- grain: one row per take whose publication is not known
 -- needs: store.take, store.link_transport, store.subscription, store.publisher, store.node,
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
---     derive.process_presence, derive.take_candidate, store.nearest_message
+--     derive.process_presence, derive.take_candidate, store.nearest_message,
+--     derive.delivery_limit
 CREATE OR REPLACE MACRO derive.orphan_take(of_run) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT
@@ -98,7 +99,7 @@ sent AS (
         o.take_id, s.process_id, s.created_ns, s.last_seen_ns, s.recorded_from_ns, s.is_known,
         s.is_stampless,
         o.stamp_ns + coalesce(h.shift_ns, 0) AS at_ns,
-        o.stamp_ns + coalesce(h.shift_ns, 0) + 1_000_000 AS until_ns
+        o.stamp_ns + coalesce(h.shift_ns, 0) + derive.delivery_limit().stamp_slack_ns AS until_ns
     FROM orphan AS o
     JOIN sender AS s ON o.topic_name IS NOT DISTINCT FROM s.topic_name
     ASOF LEFT JOIN (SELECT * FROM derive.stamp_shift WHERE run_id = of_run) AS h
@@ -106,7 +107,8 @@ sent AS (
     WHERE o.stamp_ns IS NOT NULL
         AND (
             s.created_ns < s.begin_ns
-            OR s.created_ns <= o.stamp_ns + coalesce(h.shift_ns, 0) + 1_000_000
+            OR s.created_ns
+            <= o.stamp_ns + coalesce(h.shift_ns, 0) + derive.delivery_limit().stamp_slack_ns
         )
 ),
 judged AS (
@@ -116,7 +118,11 @@ judged AS (
             bool_and(s.at_ns < s.recorded_from_ns) FILTER (WHERE s.is_known),
             bool_and(s.at_ns < s.recorded_from_ns)
         ) AS is_before_tracing,
-        bool_or(coalesce(g.covered_until_ns >= s.at_ns - 1_000_000, false)) AS has_gap,
+        bool_or(
+            coalesce(
+                g.covered_until_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns, false
+            )
+        ) AS has_gap,
         coalesce(
             bool_and(s.last_seen_ns < s.at_ns) FILTER (WHERE s.is_known),
             bool_and(s.last_seen_ns < s.at_ns)

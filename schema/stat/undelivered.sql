@@ -10,7 +10,8 @@
 --     nor that messages were overwritten where it took none of the publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 -- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap, store.publisher,
---     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state
+--     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state,
+--     derive.delivery_limit
 CREATE OR REPLACE MACRO derive.undelivered(of_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
@@ -69,9 +70,12 @@ delivered AS MATERIALIZED (
 pace AS (
     SELECT
         subscription_id,
-        greatest(max(taken_ns - arrival_ns), 10_000_000) AS longest_ns,
+        greatest(max(taken_ns - arrival_ns), derive.delivery_limit().longest_ns) AS longest_ns,
         quantile_disc(taken_ns - arrival_ns, 0.5) AS usual_ns,
-        greatest(10 * quantile_disc(taken_ns - arrival_ns, 0.5), 1_000_000) AS patience_ns
+        greatest(
+            derive.delivery_limit().patience_factor * quantile_disc(taken_ns - arrival_ns, 0.5),
+            derive.delivery_limit().least_patience_ns
+        ) AS patience_ns
     FROM delivered
     GROUP BY subscription_id
 ),
@@ -112,7 +116,7 @@ long_wait AS (
     LEFT JOIN pace AS p ON s.subscription_id = p.subscription_id
     WHERE w.run_id = of_run
         AND w.state = 'wait'
-        AND w.end_ns - w.start_ns > coalesce(p.patience_ns, 10_000_000)
+        AND w.end_ns - w.start_ns > coalesce(p.patience_ns, derive.delivery_limit().longest_ns)
         AND s.subscription_id IN (SELECT subscription_id FROM missing)
 ),
 known AS (
@@ -120,8 +124,8 @@ known AS (
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
         m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
         s.last_seen_ns, s.replaced_ns, s.host_end_ns,
-        coalesce(c.longest_ns, 10_000_000) AS longest_ns,
-        coalesce(c.patience_ns, 10_000_000) AS patience_ns,
+        coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
+        coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
         c.usual_ns,
         p.taken_ns AS publisher_taken_ns,
         n.taken_ns AS any_taken_ns,
@@ -159,8 +163,9 @@ waiting AS (
         k.next_arrival_ns < w.end_ns
         AND k.any_taken_ns >= w.end_ns
         AND (
-            w.end_ns - greatest(w.start_ns, k.next_arrival_ns) > 10 * k.usual_ns
-            OR k.row_length >= greatest(k.queue_depth, 2)
+            w.end_ns - greatest(w.start_ns, k.next_arrival_ns)
+            > derive.delivery_limit().patience_factor * k.usual_ns
+            OR k.row_length >= greatest(k.queue_depth, derive.delivery_limit().least_row)
         ) AS is_starved
     FROM (
         SELECT

@@ -1,0 +1,292 @@
+"""Why messages were not delivered, each number and comparison of the rules from both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import duckdb
+import pytest
+
+from msgflow.db import objects
+
+MS = 1_000_000
+# What the rules look at, without the views and the store that it is told from.
+STAGE = """
+CREATE SCHEMA derive;
+CREATE SCHEMA store;
+CREATE TABLE derive.expected_arrival (run_id BIGINT DEFAULT 1, publication_id BIGINT,
+    publisher_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a', clock_id BIGINT DEFAULT 1,
+    source_timestamp_ns BIGINT DEFAULT 1, arrival_ns BIGINT, has_one_clock BOOLEAN DEFAULT true);
+CREATE TABLE derive.subscription_life (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
+    topic_name VARCHAR DEFAULT '/a', process_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
+    queue_depth BIGINT DEFAULT 10, created_ns BIGINT DEFAULT 0,
+    last_seen_ns BIGINT DEFAULT 10_000_000_000, replaced_ns BIGINT,
+    host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1);
+CREATE TABLE gap (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
+CREATE MACRO derive.process_gap(of_run) AS TABLE FROM gap;
+CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT);
+CREATE TABLE derive.copied_pair (publisher_id BIGINT, subscription_id BIGINT);
+CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGINT,
+    publisher_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1, take_id BIGINT,
+    is_copy BOOLEAN);
+CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
+    subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1);
+CREATE TABLE derive.vain_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
+    failed_ns BIGINT);
+CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
+    state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
+INSERT INTO store.publisher VALUES (1, 0), (2, 0);
+"""
+RULES = ("delivery_limit", "undelivered")
+
+
+class Delivery:
+    """One subscription, and what was published for it. Times in ns."""
+
+    def __init__(self, con: duckdb.DuckDBPyConnection) -> None:
+        self.con = con
+        self._count = 0
+
+    def lives(self, **columns: int | None) -> None:
+        names = "".join(f", {name}" for name in columns)
+        marks = "".join(", ?" for _ in columns)
+        self.con.execute(
+            f"INSERT INTO derive.subscription_life (run_id{names}) VALUES (1{marks})",
+            list(columns.values()),
+        )
+
+    def publish(self, arrival: int, taken: int | None = None, publisher: int = 1) -> int:
+        """Publish a message that arrives, and is taken, at these times; return its number."""
+        self._count += 1
+        self.con.execute(
+            "INSERT INTO derive.expected_arrival (publication_id, publisher_id, arrival_ns) "
+            "VALUES (?, ?, ?)",
+            [self._count, publisher, arrival],
+        )
+        if taken is not None:
+            self.con.execute(
+                "INSERT INTO store.link_transport (publication_id, publisher_id, take_id) "
+                "VALUES (?, ?, ?)",
+                [self._count, publisher, self._count],
+            )
+            self.con.execute(
+                "INSERT INTO store.take (take_id, taken_ns) VALUES (?, ?)", [self._count, taken]
+            )
+        return self._count
+
+    def waits(self, start: int, end: int) -> None:
+        self.con.execute(
+            "INSERT INTO store.executor_state (start_ns, end_ns) VALUES (?, ?)", [start, end]
+        )
+
+    def misses(self, start: int, end: int) -> None:
+        self.con.execute("INSERT INTO gap (start_ns, covered_until_ns) VALUES (?, ?)", [start, end])
+
+    def reason(self, number: int) -> str:
+        rows = self.con.execute(
+            "SELECT reason FROM derive.undelivered(1) WHERE publication_id = ?", [number]
+        ).fetchall()
+        ((reason,),) = rows
+        return str(reason)
+
+
+@pytest.fixture
+def delivery() -> Iterator[Delivery]:
+    with duckdb.connect() as con:
+        con.execute(STAGE)
+        for header in objects.views():
+            if header.name.removeprefix("derive.") in RULES:
+                con.execute(header.body)
+        yield Delivery(con)
+
+
+@pytest.mark.parametrize(
+    ("usual", "patience"),
+    [
+        pytest.param(300_000, 3 * MS, id="ten_times_what_is_usual"),
+        pytest.param(50_000, MS, id="at_least_a_millisecond"),
+    ],
+)
+@pytest.mark.parametrize(("more", "reason"), [(0, "not_delivered"), (-1, "lost_in_transport")])
+def test_a_reader_waits_for_longer_than_messages_take(
+    delivery: Delivery, usual: int, patience: int, more: int, reason: str
+) -> None:
+    """The wait goes on for so long behind the arrival; the next message is taken at once."""
+    delivery.lives()
+    for at in range(10):
+        delivery.publish(at * 20 * MS, at * 20 * MS + usual)
+    missing = delivery.publish(300 * MS)
+    end = 300 * MS + patience + more
+    delivery.waits(280 * MS, end)
+    delivery.publish(end, end + usual)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("length", "reason"), [(1, "not_delivered"), (0, "lost_in_transport")])
+def test_a_wait_is_no_shorter_than_that(delivery: Delivery, length: int, reason: str) -> None:
+    """It began before the message arrived; where no longer, it says nothing."""
+    delivery.lives()
+    for at in range(10):
+        delivery.publish(at * 20 * MS, at * 20 * MS + 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.waits(300 * MS - length, 303 * MS)
+    delivery.publish(303 * MS, 303 * MS + 300_000)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("more", "reason"), [(1, "not_delivered"), (0, "pending_at_end")])
+def test_the_patience_of_who_never_took_anything(
+    delivery: Delivery, more: int, reason: str
+) -> None:
+    """Ten milliseconds."""
+    delivery.lives()
+    missing = delivery.publish(300 * MS)
+    delivery.waits(300 * MS, 310 * MS + more)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("late", "reason"), [(0, "not_delivered"), (1, "lost_in_transport")])
+def test_a_message_that_is_taken_late_shows_a_reader_without_cpu(
+    delivery: Delivery, late: int, reason: str
+) -> None:
+    """More than ten times as late as usual at the end of the wait."""
+    delivery.lives()
+    for at in range(10):
+        delivery.publish(at * 20 * MS, at * 20 * MS + 300_000)
+    missing = delivery.publish(300 * MS)
+    end = 310 * MS
+    delivery.waits(280 * MS, end)
+    delivery.publish(end - 3 * MS - late, end + 1)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("depth", "missing", "reason"),
+    [
+        (1, 1, "not_delivered"),
+        (1, 2, "overwritten"),
+        (3, 2, "not_delivered"),
+        (3, 3, "overwritten"),
+    ],
+)
+def test_as_many_missing_in_a_row_as_a_queue_holds(
+    delivery: Delivery, depth: int, missing: int, reason: str
+) -> None:
+    """Two at least: one alone may be lost at any time. The next is taken behind the wait."""
+    delivery.lives(queue_depth=depth)
+    for at in range(10):
+        delivery.publish(at * 20 * MS, at * 20 * MS + 300_000)
+    numbers = [delivery.publish(300 * MS + at) for at in range(missing)]
+    delivery.waits(280 * MS, 310 * MS)
+    delivery.publish(309 * MS, 310 * MS + 1)
+    for at in range(3):
+        delivery.publish(310 * MS + 1 - at - 1, 311 * MS + at)
+    assert delivery.reason(numbers[0]) == reason
+
+
+@pytest.mark.parametrize(
+    ("slowest", "silent", "reason"),
+    [
+        pytest.param(300_000, 10 * MS, "pending_at_end", id="ten_milliseconds"),
+        pytest.param(300_000, 10 * MS + 1, "subscription_ended", id="more"),
+        pytest.param(25 * MS, 25 * MS, "pending_at_end", id="the_slowest_message"),
+        pytest.param(25 * MS, 25 * MS + 1, "subscription_ended", id="more_than_that"),
+    ],
+)
+def test_others_go_on_for_longer_than_any_message_took(
+    delivery: Delivery, slowest: int, silent: int, reason: str
+) -> None:
+    """After the first message that a reader may have missed, as it was not seen any more."""
+    delivery.lives(last_seen_ns=300 * MS - 1, host_end_ns=300 * MS + silent)
+    delivery.publish(0, slowest)
+    for at in range(1, 5):
+        delivery.publish(at * 30 * MS, at * 30 * MS + 300_000)
+    missing = delivery.publish(300 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("seen", "reason"), [(0, "pending_at_end"), (-1, "subscription_ended")])
+def test_a_reader_that_was_seen_when_the_message_arrived(
+    delivery: Delivery, seen: int, reason: str
+) -> None:
+    delivery.lives(last_seen_ns=300 * MS + seen, host_end_ns=400 * MS)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("start", "reason"), [(10, "receiver_gap"), (10 + 1, "pending_at_end")])
+def test_a_gap_hides_a_take_for_as_long_as_messages_need(
+    delivery: Delivery, start: int, reason: str
+) -> None:
+    """Behind the last event of the reader, where nothing later was taken: 10 ms at least."""
+    delivery.lives(last_seen_ns=300 * MS, host_end_ns=301 * MS)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(299 * MS)
+    begin = 310 * MS if start == 10 else 310 * MS + 1
+    delivery.misses(begin, 900 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("until", "reason"), [(0, "receiver_gap"), (-1, "lost_in_transport")])
+def test_a_gap_that_ends_before_a_message_arrives(
+    delivery: Delivery, until: int, reason: str
+) -> None:
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(320 * MS, 320 * MS + 300_000)
+    delivery.misses(250 * MS, 300 * MS + until)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("created", "publisher", "until", "reason"),
+    [
+        (100 * MS, 50 * MS, 100 * MS, "unknown"),
+        (100 * MS, 50 * MS, 100 * MS - 1, "before_discovery"),
+        (50 * MS, 100 * MS, 100 * MS, "unknown"),
+        (50 * MS, 100 * MS, 100 * MS - 1, "before_discovery"),
+    ],
+)
+def test_a_gap_hides_what_the_two_knew_of_each_other(
+    delivery: Delivery, created: int, publisher: int, until: int, reason: str
+) -> None:
+    """From the time on when both were there."""
+    delivery.con.execute("UPDATE store.publisher SET created_ns = ?", [publisher])
+    delivery.lives(created_ns=created)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(320 * MS, 320 * MS + 300_000)
+    delivery.misses(10 * MS, until)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("newer", "reason"), [(2, "lost_in_transport"), (3, "overwritten")])
+def test_as_many_newer_messages_as_fit(delivery: Delivery, newer: int, reason: str) -> None:
+    """Of any publisher, until the next one is taken; the message itself does not count."""
+    delivery.lives(queue_depth=3)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    for at in range(newer - 1):
+        delivery.publish(301 * MS + at, publisher=2)
+    delivery.publish(305 * MS, 306 * MS)
+    delivery.publish(306 * MS + 1)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("created", "reason"), [(300 * MS, "pending_at_end"), (300 * MS + 1, "before_subscription")]
+)
+def test_created_before_the_message_arrived(delivery: Delivery, created: int, reason: str) -> None:
+    delivery.lives(created_ns=created, last_seen_ns=301 * MS, host_end_ns=301 * MS)
+    assert delivery.reason(delivery.publish(300 * MS)) == reason
+
+
+@pytest.mark.parametrize(
+    ("replaced", "reason"), [(300 * MS, "pending_at_end"), (300 * MS - 1, "subscription_ended")]
+)
+def test_replaced_before_the_message_arrived(
+    delivery: Delivery, replaced: int, reason: str
+) -> None:
+    delivery.lives(replaced_ns=replaced, last_seen_ns=301 * MS, host_end_ns=301 * MS)
+    assert delivery.reason(delivery.publish(300 * MS)) == reason
