@@ -88,13 +88,16 @@ def command(
             show_default="grows with need",
         ),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print errors and lost work only")
+    ] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Read LTTng traces of a ROS 2 system into a database, as one run."""
     hosts = _hosts(host or [])
     # From before the imports, which may lose Ctrl-C, until the last word about a stored run.
     with noted_interrupts():
+        from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
 
@@ -117,6 +120,8 @@ def command(
             )
         if not quiet:
             _print_report(report, database)
+        for warning in report.warnings:
+            print_note(warning)
 
 
 def _print_report(report: IngestReport, database: Path) -> None:
@@ -130,8 +135,6 @@ def _print_report(report: IngestReport, database: Path) -> None:
     for diagnostic in report.diagnostics:
         if diagnostic.severity != "info":
             print_note(f"{diagnostic.name} ({diagnostic.count}): {diagnostic.detail}")
-    for warning in report.warnings:
-        print_note(warning)
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import Result
 
+from msgflow.database import Database
+from msgflow.ingest import IngestReport
 from msgflow.sim import simulate
 
 Msgflow = Callable[..., Result]
@@ -52,6 +56,21 @@ def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
     refused = msgflow("query", "e2e-latency", "--case", "middle")
     assert refused.exit_code == 2
     assert refused.stderr.startswith("error: --case has no such value — middle\n\nhint: choose ")
+
+
+@pytest.mark.parametrize("options", [(), ("--quiet",)])
+def test_what_went_wrong_is_said_even_when_quiet(
+    msgflow: Msgflow, trace: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
+) -> None:
+    ingest = Database.ingest
+
+    def full(self: Database, *arguments: Any, **given: Any) -> IngestReport:
+        return replace(ingest(self, *arguments, **given), warnings=("the disk is full",))
+
+    monkeypatch.setattr(Database, "ingest", full)
+    result = msgflow("ingest", trace, *options)
+    assert result.exit_code == 0
+    assert result.stderr.count("note: the disk is full\n") == 1
 
 
 def test_quiet_says_nothing_and_a_run_has_the_name_given(msgflow: Msgflow, trace: Path) -> None:
