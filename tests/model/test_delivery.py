@@ -324,6 +324,30 @@ def test_a_stamp_in_a_gap_of_the_publisher(pair: Pair, analyse: Analyse) -> None
     assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
 
 
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        (MS - 1_000, "publisher_gap"),
+        (MS + 1_000, "publisher_not_traced"),
+        (-MS + 1_000, "publisher_gap"),
+        (-MS - 1_000, "publisher_not_traced"),
+    ],
+)
+def test_a_stamp_beside_a_gap_of_the_publisher(
+    pair: Pair, analyse: Analyse, more: int, reason: str
+) -> None:
+    """No more than a millisecond behind its end, or before its begin."""
+    pair.create()
+    stamped(pair)
+    pair.wait(3 * MS)
+    pair.lose()
+    stamp = pair._now + 1 + more
+    pair.wait(3 * MS)
+    pair.hear(stamp)
+    stamped(pair)
+    assert (stamp, reason) in analyse(pair).rows(ORPHANS)
+
+
 def test_a_stamp_after_the_last_event_of_every_publisher(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     stamped(pair)

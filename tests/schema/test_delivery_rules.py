@@ -100,6 +100,13 @@ def delivery() -> Iterator[Delivery]:
         yield Delivery(con)
 
 
+def usually(delivery: Delivery, usual: int) -> None:
+    """Ten messages that need so long; but four are quicker, and one is slower."""
+    for at in range(10):
+        needed = 1_000 if at < 4 else usual + MS if at == 9 else usual
+        delivery.publish(at * 20 * MS, at * 20 * MS + needed)
+
+
 @pytest.mark.parametrize(
     ("usual", "patience"),
     [
@@ -113,8 +120,7 @@ def test_a_reader_waits_for_longer_than_messages_take(
 ) -> None:
     """The wait goes on for so long behind the arrival; the next message is taken at once."""
     delivery.lives()
-    for at in range(10):
-        delivery.publish(at * 20 * MS, at * 20 * MS + usual)
+    usually(delivery, usual)
     missing = delivery.publish(300 * MS)
     end = 300 * MS + patience + more
     delivery.waits(280 * MS, end)
@@ -126,8 +132,7 @@ def test_a_reader_waits_for_longer_than_messages_take(
 def test_a_wait_is_no_shorter_than_that(delivery: Delivery, length: int, reason: str) -> None:
     """It began before the message arrived; where no longer, it says nothing."""
     delivery.lives()
-    for at in range(10):
-        delivery.publish(at * 20 * MS, at * 20 * MS + 300_000)
+    usually(delivery, 300_000)
     missing = delivery.publish(300 * MS)
     delivery.waits(300 * MS - length, 303 * MS)
     delivery.publish(303 * MS, 303 * MS + 300_000)
@@ -151,8 +156,7 @@ def test_a_message_that_is_taken_late_shows_a_reader_without_cpu(
 ) -> None:
     """More than ten times as late as usual at the end of the wait."""
     delivery.lives()
-    for at in range(10):
-        delivery.publish(at * 20 * MS, at * 20 * MS + 300_000)
+    usually(delivery, 300_000)
     missing = delivery.publish(300 * MS)
     end = 310 * MS
     delivery.waits(280 * MS, end)
@@ -174,8 +178,7 @@ def test_as_many_missing_in_a_row_as_a_queue_holds(
 ) -> None:
     """Two at least: one alone may be lost at any time. The next is taken behind the wait."""
     delivery.lives(queue_depth=depth)
-    for at in range(10):
-        delivery.publish(at * 20 * MS, at * 20 * MS + 300_000)
+    usually(delivery, 300_000)
     numbers = [delivery.publish(300 * MS + at) for at in range(missing)]
     delivery.waits(280 * MS, 310 * MS)
     delivery.publish(309 * MS, 310 * MS + 1)
@@ -290,3 +293,80 @@ def test_replaced_before_the_message_arrived(
 ) -> None:
     delivery.lives(replaced_ns=replaced, last_seen_ns=301 * MS, host_end_ns=301 * MS)
     assert delivery.reason(delivery.publish(300 * MS)) == reason
+
+
+@pytest.mark.parametrize(
+    ("failed", "reason"),
+    [
+        (300 * MS - 1, "lost_in_transport"),
+        (300 * MS, "take_failed"),
+        (320 * MS, "take_failed"),
+        (320 * MS + 1, "lost_in_transport"),
+    ],
+)
+def test_an_attempt_failed_before_a_later_message_was_taken(
+    delivery: Delivery, failed: int, reason: str
+) -> None:
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(310 * MS, 320 * MS)
+    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [failed])
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("taken", "reason"),
+    [
+        (300 * MS - 1, "lost_in_transport"),
+        (300 * MS, "unknown"),
+        (320 * MS, "unknown"),
+        (320 * MS + 1, "lost_in_transport"),
+    ],
+)
+def test_a_take_without_a_message_was_before_a_later_one(
+    delivery: Delivery, taken: int, reason: str
+) -> None:
+    """It had no stamp, so that it may be of any message."""
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(310 * MS, 320 * MS)
+    delivery.con.execute(
+        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (99, ?, NULL)",
+        [taken],
+    )
+    # One with a stamp cannot be of a message with one.
+    delivery.con.execute(
+        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (98, ?, 7)",
+        [305 * MS],
+    )
+    with_stamp = "UPDATE derive.expected_arrival SET source_timestamp_ns = 5"
+    delivery.con.execute(with_stamp)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("first", "reason"), [(300 * MS, "lost_in_transport"), (300 * MS + 1, "before_discovery")]
+)
+def test_nothing_earlier_of_the_publisher_was_taken(
+    delivery: Delivery, first: int, reason: str
+) -> None:
+    """One that arrived at the same time is not later."""
+    delivery.lives()
+    missing = delivery.publish(300 * MS)
+    delivery.publish(first, 310 * MS)
+    delivery.publish(320 * MS, 321 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(("last", "reason"), [(0, "pending_at_end"), (1, "lost_in_transport")])
+def test_a_later_message_of_another_publisher_was_taken(
+    delivery: Delivery, last: int, reason: str
+) -> None:
+    """One that arrived at the same time is not later."""
+    delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(300 * MS + last, 310 * MS, publisher=2)
+    assert delivery.reason(missing) == reason
