@@ -140,6 +140,24 @@ equal_stamp AS (
 ),
 unnamed AS (
     SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+),
+-- Publications of which every event that names the publisher is missing.
+nameless AS (
+    SELECT p.publication_id
+    FROM simulated_publication AS p
+    CROSS JOIN (
+        SELECT count(*) > 0 AS is_named_by_rmw
+        FROM simulated_declared
+        WHERE event = 'ros2:rmw_publish' AND field LIKE '%publisher_handle'
+    )
+    CROSS JOIN LATERAL unnest(
+        [p.intra_ns, p.rcl_ns, CASE WHEN is_named_by_rmw THEN p.rmw_ns END]
+    ) AS n(ts_ns)
+    LEFT JOIN simulated_unrecorded AS r
+        ON p.host = r.host AND p.pid = r.pid AND p.tid = r.tid AND n.ts_ns = r.ts_ns
+    WHERE n.ts_ns IS NOT NULL
+    GROUP BY p.publication_id
+    HAVING bool_and(r.ts_ns IS NOT NULL)
 )
 SELECT
     u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
@@ -148,6 +166,7 @@ SELECT
         WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
             OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
             THEN 'initialisation is missing'
+        WHEN u.publication_id IN (FROM nameless) THEN 'nothing names its publisher'
         WHEN q.topic_name IS NOT NULL THEN 'another message has its stamp'
         WHEN u.reason = 'before_subscription' THEN CASE
             WHEN s.has_two_clocks AND (s.arrival_ns + s.longest_ns >= s.created_ns) IS NOT FALSE
