@@ -1,8 +1,8 @@
 -- name: derive.executor_meanwhile
 -- kind: macro
--- description: What the threads of its executor ran while a callback instance waited, of these or
---     (NULL) of all: main.executor_interference. The messages of a burst wait for each other, so
---     that all pairs are many, those of one instance few.
+-- description: What the threads of its executor ran while a callback instance waited, of some
+--     instances, otherwise as main.executor_interference. The messages of a burst wait for each
+--     other, so that all pairs are many, those of one instance few.
 -- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
 -- needs: derive.callback_ready, derive.executor_run, store.executor_thread
 CREATE OR REPLACE MACRO derive.executor_meanwhile(waiting) AS TABLE
@@ -18,10 +18,7 @@ WITH ready AS (
     FROM derive.callback_ready AS r
     JOIN store.executor_thread AS x ON r.executor_id = x.executor_id
     WHERE r.start_ns > coalesce(r.earliest_ns, r.latest_ns)
-        AND (
-            waiting IS NULL
-            OR r.callback_instance_id IN (SELECT unnest(waiting::BIGINT[]))
-        )
+        AND r.callback_instance_id IN (SELECT unnest(waiting::BIGINT[]))
 ),
 run AS (
     SELECT thread_id, callback_instance_id, start_ns, end_ns, position

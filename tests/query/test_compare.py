@@ -143,7 +143,7 @@ def test_each_statistic_is_of_the_values_and_in_its_interval(fresh_database: Pat
             {"count": count},
         )
     with msgflow.open_db(fresh_database) as database:
-        rows = {row["statistic"]: row for row in _rows(database, "after", resamples=200)}
+        rows = {row["statistic"]: row for row in _rows(database, "after", resamples=400)}
     values = {name: row["a_ns"] for name, row in rows.items()}
     assert values == {
         "median": 500_000, "mean": 500_500, "p95": 950_000, "p99": 990_000, "max": 1_000_000,

@@ -45,7 +45,7 @@ export class ExecutorsPage {
       fill(blame, async () => {
         const table = await app.query("interference");
         return [dataTable(table, { label: "interference", sort: { name: "overlap_max_ns", down: true }, shown: 20, nothing: "No callback waited for another one.",
-          columns: ["node", "callback", "meanwhile_node", "meanwhile_callback", "waits", "runs", "overlap_min_ns", "overlap_max_ns", "worst_ns", "share"] }), notes(table.meta.notes), command(table.meta.command)];
+          columns: ["node", "callback", "meanwhile_node", "meanwhile_callback", "waits", "instances", "overlap_min_ns", "overlap_max_ns", "worst_ns", "share"] }), notes(table.meta.notes), command(table.meta.command)];
       }),
       fill(waits, async () => {
         const table = await app.query("executor-wait");
