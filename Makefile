@@ -30,8 +30,15 @@ help:
 demo: $(VENV)/.installed
 	rm -rf $(DEMO)
 	$(BIN)/msgflow simulate demo $(DEMO)/trace
-	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb
+	$(BIN)/msgflow ingest $(DEMO)/trace --db $(DEMO)/msgflow.duckdb --clock-sync messages
 	$(BIN)/msgflow query e2e-latency --db $(DEMO)/msgflow.duckdb
+	@echo
+	@echo 'What to try next:'
+	@echo '  export MSGFLOW_DB=$(CURDIR)/$(DEMO)/msgflow.duckdb; . $(BIN)/activate'
+	@echo '  msgflow check                            what is wrong with the recording'
+	@echo '  msgflow query critical-path              why the slowest message was late'
+	@echo '  msgflow query interference               which callbacks keep which waiting'
+	@echo '  msgflow flow --topic /camera/image       one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 
 test: $(VENV)/.developed babeltrace chromium
@@ -51,6 +58,9 @@ fuzz: $(VENV)/.installed
 	$(BIN)/python benchmarks/fuzz.py
 
 $(VENV)/.made:
+	@! command -v $(PYTHON) >/dev/null 2>&1 \
+		|| $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo 'msgflow needs Python 3.11 or newer; name one: make PYTHON=python3.12 ...' >&2; exit 1; }
 	@$(APT); command -v $(PYTHON) >/dev/null 2>&1 || apt_install python3 python3-venv
 	@$(APT); $(PYTHON) -m venv $(VENV) 2>/dev/null \
 		|| { rm -rf $(VENV); apt_install python3-venv; $(PYTHON) -m venv $(VENV); }

@@ -2,11 +2,12 @@
 
     python benchmarks/pictures.py [--bars 100000 1000000] [--events 10000000] [--database FILE]
 
-For each number of bars a pipeline is simulated, ingested and written as a report; Chromium opens it
-without a graphics card. First paint counts from the begin of the navigation to the first drawing of
-the timeline; a step is one drawing while zooming or panning. `ui` serves a database of so many
-events: new windows are asked for as the page does, each another one, and the memory of the server
-is its peak. Times of different machines and days cannot be compared.
+For each number of bars a pipeline is simulated, ingested, served and written as a report; Chromium
+opens it without a graphics card, and picks a message. First paint counts from the begin of the
+navigation to the first drawing of the timeline; a step is one drawing while zooming or panning.
+`ui` serves a database of so many events: new windows are asked for as the page does, each another
+one, and the memory of the server is its peak. Times of different machines and days cannot be
+compared.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import contextmanager
 from pathlib import Path
-from urllib.parse import urlsplit
+from typing import TYPE_CHECKING, Any
+from urllib.parse import SplitResult, urlsplit
 
 from playwright.sync_api import sync_playwright
 
@@ -29,9 +32,14 @@ from msgflow.database import open_db
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 EVENTS_PER_FACTOR = 66_000
 # Callback instances, publications, takes and states of executors.
 BARS_PER_EVENT = 0.636
+# Each page is opened so often; first paint is the median.
+TIMES = 3
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 
 
@@ -45,33 +53,93 @@ def made(directory: Path, events: float) -> Path:
     return path
 
 
-def look(report: Path) -> tuple[int, float, list[float]]:
-    """Return bars, first paint and the times of steps [ms] of a report."""
+def look(address: str, database: Path) -> tuple[int, float, list[float]]:
+    """Return bars, first paint and the times of steps [ms] of a timeline.
+
+    Nothing may go wrong on the page meanwhile, nothing be fetched from elsewhere, and what lights
+    up when a message is picked is what `flow_both` returns.
+    """
     program = shutil.which("chromium") or shutil.which("chromium-browser")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=ARGUMENTS)
         page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.goto(f"{report.as_uri()}#/timeline")
+        wrong: list[str] = []
+        page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda asked: wrong.extend(foreign(asked.url)))
+        if "token=" in address:
+            page.goto(address)
+            page.wait_for_selector("html[data-ready]", timeout=120_000)
+            address = address.partition("?")[0]
+            page.goto("about:blank")
+        page.goto(f"{address}#/timeline")
         page.wait_for_selector("html[data-painted]", timeout=120_000)
         page.wait_for_selector("html[data-ready]", timeout=120_000)
         painted = float(page.locator("html").get_attribute("data-painted") or "nan")
-        bars = int(page.evaluate("msgflow.page.renderer.bars.table.rows"))
+        bars = int(page.evaluate("msgflow.page.held.count"))
         page.evaluate("msgflow.steps.length = 0")
         page.locator("canvas.timeline").focus()
         for key in ("+", "ArrowRight", "+", "ArrowLeft", "-", "+", "+", "ArrowRight", "-", "-") * 3:
             page.keyboard.press(key)
             page.wait_for_timeout(120)
         steps = page.evaluate("msgflow.steps")
+        require_flow(page, database)
         browser.close()
+    if wrong:
+        raise SystemExit("\n".join(wrong))
     return bars, painted, steps
+
+
+def foreign(address: str) -> list[str]:
+    """Return the address where it is not of this machine."""
+    parts = urlsplit(address)
+    is_own = parts.scheme in ("file", "data", "blob", "about") or parts.hostname == "127.0.0.1"
+    return [] if is_own else [address]
+
+
+def require_flow(page: Any, database: Path) -> None:
+    """Pick a message in the middle of the run; stop where another flow than `flow_both` is lit."""
+    with open_db(database) as opened:
+        connection = opened.connection
+        ((number,),) = connection.execute(
+            "SELECT quantile_disc(publication_id, 0.5) FROM link_transport"
+        ).fetchall()
+        wanted = set(
+            connection.execute(
+                "SELECT kind, id FROM flow_both('publication', ?)", [number]
+            ).fetchall()
+        )
+    page.evaluate(f"location.hash = '#/timeline?flow=publication:{number}'")
+    rows = page.locator(".steps tbody tr")
+    rows.first.wait_for(timeout=120_000)
+    found = rows.evaluate_all("rows => rows.map(row => [row.dataset.kind, +row.dataset.id])")
+    if {(kind, number) for kind, number in found} != wanted:
+        raise SystemExit(f"another flow is lit than that of publication {number}")
+
+
+@contextmanager
+def serving(database: Path) -> Iterator[tuple[str, int]]:
+    """Serve a database; give the address and the process."""
+    command = [sys.executable, "-m", "msgflow", "ui", "--no-browser", "--port", "0"]
+    process = subprocess.Popen([*command, "--db", str(database)], stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    try:
+        yield process.stderr.readline().strip(), process.pid
+    finally:
+        process.terminate()
+        process.wait()
 
 
 def served(database: Path, windows: int = 30) -> tuple[list[float], list[float], int]:
     """Return seconds of new windows, of their arrows, and the peak memory of the server [bytes]."""
-    command = [sys.executable, "-m", "msgflow", "ui", "--no-browser", "--port", "0"]
-    process = subprocess.Popen([*command, "--db", str(database)], stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    address = urlsplit(process.stderr.readline().strip())
+    with serving(database) as (address, pid):
+        return asked(database, urlsplit(address), pid, windows)
+
+
+def asked(
+    database: Path, address: SplitResult, pid: int, windows: int
+) -> tuple[list[float], list[float], int]:
+    """See `served`."""
     token = address.query.removeprefix("token=")
     with open_db(database) as opened:
         (run,) = opened.sql("SELECT start_ns, end_ns FROM run").to_arrow().to_pylist()
@@ -90,7 +158,7 @@ def served(database: Path, windows: int = 30) -> tuple[list[float], list[float],
 
     ask("row", 0, 0)
     first = ask("segments", 0, length + 1)
-    print(f"first window, the whole run, which counts it once: {first:.2f} s")
+    print(f"first window, the whole run, which counts it once: {first:.2f} s", flush=True)
     chance = random.Random(0)
     bars, arrows = [], []
     for number in range(windows):
@@ -99,10 +167,8 @@ def served(database: Path, windows: int = 30) -> tuple[list[float], list[float],
         bars.append(ask("segments", begin, width))
         if width < length / 50:
             arrows.append(ask("links", begin, width))
-    status = Path(f"/proc/{process.pid}/status").read_text()
+    status = Path(f"/proc/{pid}/status").read_text()
     peak = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM"))
-    process.terminate()
-    process.wait()
     return bars, arrows, peak * 1024
 
 
@@ -121,12 +187,19 @@ def main() -> None:
             database = made(place, number / BARS_PER_EVENT)
             with open_db(database) as opened:
                 report = opened.report(place / "report.html", max_size=500_000_000)
-            bars, painted, steps = look(report.path)
-            print(
-                f"report of {bars:,} bars: {report.size / 1e6:.1f} MB,"
-                f" first paint {painted:.0f} ms,"
-                f" steps median {statistics.median(steps):.0f} ms, longest {max(steps):.0f} ms"
-            )
+            with serving(database) as (address, _):
+                for name, place in (("report", report.path.as_uri()), ("ui", address)):
+                    seen = [look(place, database) for _ in range(TIMES)]
+                    steps = [step for _, _, several in seen for step in several]
+                    paint = statistics.median(painted for _, painted, _ in seen)
+                    print(
+                        f"{name} of {seen[0][0]:,} bars"
+                        + (f", {report.size / 1e6:.1f} MB" if name == "report" else "")
+                        + f": first paint {paint:.0f} ms,"
+                        f" steps median {statistics.median(steps):.0f} ms,"
+                        f" longest {max(steps):.0f} ms",
+                        flush=True,
+                    )
         database = arguments.database or made(directory, arguments.events)
         bars_seconds, arrows, peak = served(database)
         print(

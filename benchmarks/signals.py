@@ -1,12 +1,17 @@
 """Ends commands that write at random moments, and looks at what is left.
 
-    python benchmarks/signals.py [--moments 200] [--seed 1] [--command NAME]…
+    python benchmarks/signals.py [--moments 200] [--seed 1] [--command NAME]… [--signal NAME]…
+        [--forked]
 
 SIGINT, SIGTERM and SIGKILL meet `ingest` (into a new and into an old database), `links apply`,
 `clocks apply`, `db upgrade` and `export` in turn, each at a moment between its start and a little
 behind its usual end. Afterwards the database has to be the old or the new one (by the rows of its
 runs), `db check` clean, and after one more command nothing else may lie in its directory. Exit code
 1 otherwise.
+
+What gets a signal is started as a user starts it, or with `--forked` forked from a process that has
+imported all of msgflow, as the commands before and after are: then it costs less, and no signal
+comes before its first statement.
 """
 
 from __future__ import annotations
@@ -17,18 +22,21 @@ import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import duckdb
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
+SECONDS = 600
 MSGFLOW = [sys.executable, "-m", "msgflow"]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 # After SIGKILL the command has no code of its own.
@@ -45,10 +53,76 @@ ORDER BY r.run_id
 """
 
 
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run a command line to its end."""
-    command = [*MSGFLOW, *(str(argument) for argument in arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+@dataclass(frozen=True)
+class Done:
+    """How a command without a signal ended, and what it printed."""
+
+    code: int
+    said: str
+
+
+Start = Callable[[Sequence[str], int], int]
+
+
+def spawned(arguments: Sequence[str], output: int) -> int:
+    """Start a command line as a user does, its output to a file; return the process."""
+    duplicates = [(os.POSIX_SPAWN_DUP2, output, stream) for stream in (1, 2)]
+    line = [*MSGFLOW, *arguments]
+    # Background jobs of a shell ignore SIGINT, and so would what they start.
+    return os.posix_spawn(line[0], line, os.environ, file_actions=duplicates, setsigdef=SIGNALS[:2])
+
+
+def forked(arguments: Sequence[str], output: int) -> int:
+    """Start a command line in a process that has all of this one; otherwise the same."""
+    pid = os.fork()
+    if pid:
+        return pid
+    code = 1
+    try:
+        os.dup2(output, 1)
+        os.dup2(output, 2)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.argv = ["msgflow", *arguments]
+        main_of_msgflow()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+def main_of_msgflow() -> None:
+    """Run the program; what it would do at its end is done here."""
+    from msgflow.__main__ import main
+
+    try:
+        main()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+
+
+def ended(
+    start: Start, arguments: Sequence[object], meanwhile: Callable[[int], None] = lambda pid: None
+) -> Done:
+    """Start a command line, do something with its process, and wait for its end."""
+    with tempfile.TemporaryFile() as output:
+        pid = start([str(argument) for argument in arguments], output.fileno())
+        meanwhile(pid)
+        until = time.monotonic() + SECONDS
+        while not (found := os.waitpid(pid, os.WNOHANG))[0]:
+            if time.monotonic() > until:
+                os.kill(pid, signal.SIGKILL)
+            time.sleep(0.005)
+        output.seek(0)
+        said = output.read().decode("utf-8", "replace")
+    return Done(os.waitstatus_to_exitcode(found[1]), said)
+
+
+def run(*arguments: object) -> Done:
+    """Run a command line to its end, in a process forked from this one."""
+    return ended(forked, arguments)
 
 
 def state(database: Path) -> object:
@@ -63,13 +137,14 @@ def state(database: Path) -> object:
 class Place:
     """A directory with a database, in which one command is run over and over."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, start: Start = spawned) -> None:
+        self.start = start
         self.trace, self.other = root / "robot", root / "pair"
         self.old, self.stale = root / "old.duckdb", root / "stale.duckdb"
         self.links = root / "links.yaml"
         for system, path in (("pipeline", self.trace), ("two_hosts", self.other)):
-            assert run("simulate", system, path, "--factor", "0.02").returncode == 0
-        assert run("ingest", self.other, "--db", self.old).returncode == 0
+            assert run("simulate", system, path, "--factor", "0.02").code == 0
+        assert run("ingest", self.other, "--db", self.old).code == 0
         shutil.copyfile(self.old, self.stale)
         with duckdb.connect(str(self.stale)) as con:
             con.execute("UPDATE store.definition SET hash = 'old'")
@@ -108,14 +183,14 @@ class Place:
         if self.database.exists():
             for command in ("upgrade", "check"):
                 done = run("db", command, *there)
-                if done.returncode:
-                    found.append(f"db {command}: {done.returncode} {done.stdout}{done.stderr}")
+                if done.code:
+                    found.append(f"db {command}: {done.code} {done.said}")
         else:
             run("ingest", self.trace, *there)
         if (self.directory / "out").exists():
             again = run("export", "parquet", self.directory / "out", "--force", *there)
-            if again.returncode:
-                found.append(f"export again: {again.stderr}")
+            if again.code:
+                found.append(f"export again: {again.code} {again.said}")
             found += [path.name for path in (self.directory / "out").glob(".*")]
         left = set(os.listdir(self.directory)) - {self.database.name, "out"}
         return found + sorted(left)
@@ -125,8 +200,8 @@ class Place:
         before, command = self.commands()[name]
         self.prepare(before)
         states, began = [state(self.database)], time.monotonic()
-        done = run(*command)
-        assert done.returncode == 0, done.stderr
+        done = ended(self.start, command)
+        assert done.code == 0, done.said
         return [*states, state(self.database)], time.monotonic() - began
 
     def stopped(
@@ -135,27 +210,36 @@ class Place:
         """Run a command and send it a signal; return its exit code, and what is wrong then."""
         before, command = self.commands()[name]
         self.prepare(before)
-        line = [*MSGFLOW, *(str(argument) for argument in command)]
-        process = subprocess.Popen(
-            line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
-        time.sleep(after)
-        process.send_signal(number)
-        _, errors = process.communicate(timeout=600)
-        found = self.faults(number, process.returncode, states)
+
+        def stop(pid: int) -> None:
+            time.sleep(after)
+            os.kill(pid, number)
+
+        done = ended(self.start, command, stop)
+        found = self.faults(number, done.code, states)
         # Until its first import of ours, Python answers for itself.
-        if "unexpected" in errors or ("Traceback" in errors and "msgflow" in errors):
-            found.append(errors)
-        return process.returncode, found
+        if "unexpected" in done.said or ("Traceback" in done.said and "msgflow" in done.said):
+            found.append(done.said)
+        return done.code, found
 
 
 def moments(
-    count: int, seed: int, names: Sequence[str] = NAMES, signals: Sequence[signal.Signals] = SIGNALS
+    count: int,
+    seed: int,
+    names: Sequence[str] = NAMES,
+    signals: Sequence[signal.Signals] = SIGNALS,
+    start: Start = spawned,
 ) -> Iterator[tuple[str, signal.Signals, int, list[str]]]:
     """Yield command, signal, exit code and faults of so many random moments."""
+    # For the processes forked from this one.
+    import msgflow.database
+    import msgflow.export
+    import msgflow.ingest
+    import msgflow.sim  # noqa: F401
+
     chance = random.Random(seed)
     with tempfile.TemporaryDirectory() as directory:
-        place = Place(Path(directory))
+        place = Place(Path(directory), start)
         known = {name: place.known(name) for name in names}
         for moment in range(count):
             name = names[moment % len(names)]
@@ -171,15 +255,23 @@ def main() -> int:
     parser.add_argument("--moments", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--command", action="append", choices=NAMES)
+    parser.add_argument("--signal", action="append", choices=[number.name for number in SIGNALS])
+    parser.add_argument("--forked", action="store_true")
     arguments = parser.parse_args()
     ends: collections.Counter[tuple[str, str, str]] = collections.Counter()
     faults = 0
     names = tuple(arguments.command or NAMES)
-    for name, number, code, found in moments(arguments.moments, arguments.seed, names):
+    signals = [signal.Signals[name] for name in arguments.signal or ()] or SIGNALS
+    start = forked if arguments.forked else spawned
+    for name, number, code, found in moments(
+        arguments.moments, arguments.seed, names, signals, start
+    ):
         ends[name, number.name, "stopped" if code else "ended"] += 1
         faults += bool(found)
         if found:
             print(f"{name}, {number.name}: {'; '.join(found)}", flush=True)
+        if ends.total() % 50 == 0:
+            print(f"{ends.total()} moments, {faults} with faults", flush=True)
     for (name, signal_name, how), count in sorted(ends.items()):
         print(f"{name:14} {signal_name:8} {how:8} {count:4}")
     print(f"{arguments.moments} moments, {faults} with faults")

@@ -40,6 +40,13 @@ _QUERIES = """\
 `--run NAME|ID|all`; those with a time window `--start`, `--end` and `--skip-first SECONDS`.
 Quantiles are values that occurred (`quantile_disc`).
 
+Rows are chosen by what their columns name, which stands in brackets behind their meaning:
+`--node`, `--topic`, `--callback` and `--host` where a column is a [node], [topic], [callback] or
+[host], `--via` and `--without` where one is a [path]. Names may be globs; several are given one by
+one, or between commas. On every query `--where CONDITION` takes SQL on its columns, and
+`--sort COLUMN[:desc]` and `--limit N` order and cut; `--slowest N` is there where rows take time.
+`Database.query` has keywords of the same names.
+
 """
 
 
@@ -66,7 +73,7 @@ def _object(header: Header) -> str:
     if header.params:
         lines.append("\n| parameter | type | default | meaning |\n| --- | --- | --- | --- |\n")
         for param in header.params:
-            default = _default(param.default) if param.has_default else ""
+            default = _default(param.default, header.kind) if param.has_default else ""
             choices = f" ({', '.join(param.choices)})" if param.choices else ""
             lines.append(
                 f"| `{param.name}` | {param.type} | {default} | {param.description}{choices} |\n"
@@ -82,7 +89,10 @@ def _sentence(grain: str) -> str:
     return f"{grain[:1].upper()}{grain[1:]}."
 
 
-def _default(value: object) -> str:
+def _default(value: object, kind: str | None) -> str:
+    # The command line knows no NULL: an option that is not given has the default it describes.
+    if value is None and kind != "macro":
+        return ""
     return "NULL" if value is None else f"`{value}`"
 
 

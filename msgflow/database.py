@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import duckdb
 
 from msgflow.db.connection import connect
-from msgflow.db.reading import reading_statements
+from msgflow.db.reading import reading_statements, require_condition
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.catalogue import load_queries, load_query
+from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.query.failure import database_errors, in_words
 from msgflow.query.interrupt import interruptible
 from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs, run_query
+from msgflow.query.selection import make_selection
+from msgflow.query.window import choose_runs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -32,14 +35,18 @@ if TYPE_CHECKING:
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
+    from msgflow.verify import Verification
     from msgflow.view.report import Report
 
 _T = TypeVar("_T")
 
 DEFAULT_LIMIT = 10_000
+_MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
 # Of flows: messages in a row, and vertices.
 DEFAULT_DEPTH = 32
 DEFAULT_VERTICES = 1_000
+# Where named paths are looked for.
+DEFAULT_PATHS = "paths.yaml"
 # Of reports, bytes: what mail servers take.
 DEFAULT_REPORT_SIZE = 20_000_000
 
@@ -131,7 +138,7 @@ class Database:
             keep_staging: directory for the staging tables as Parquet.
             links: file with indirect links to declare.
             clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a
-                file with the offset of each, see docs/semantics.md.
+                file with the offset of each, see docs/clocks.md.
             reader: 'auto', 'msgflow' or 'bt2'.
             strict: refuse a trace at its first damage, instead of keeping what is good.
             ignore: names of events to leave out.
@@ -170,7 +177,7 @@ class Database:
         Links that an earlier file declared for these runs are forgotten.
 
         Args:
-            file: YAML; docs/semantics.md has its form.
+            file: YAML; docs/causes.md has its form.
             run: 'all', a name or an id; the latest run when None.
 
         Raises:
@@ -205,6 +212,37 @@ class Database:
         self.close()
         return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
 
+    def rename_run(self, run: str | int, name: str) -> Run:
+        """Give a run another name, and return it as it was.
+
+        Args:
+            run: a name or an id.
+            name: the new name, which no other run has.
+
+        Raises:
+            UsageError: no such run, or a name that is taken, or means something else to `run`.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.db.runs import rename_run
+
+        self.close()
+        return rename_run(self.path, run, name, memory_limit=self._memory_limit)
+
+    def remove_runs(self, run: str | int) -> tuple[Run, ...]:
+        """Delete runs with all that is known of them, and return which.
+
+        Args:
+            run: 'all', a name or an id.
+
+        Raises:
+            UsageError: no such run.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.db.runs import remove_runs
+
+        self.close()
+        return remove_runs(self.path, run, memory_limit=self._memory_limit)
+
     def query(
         self,
         name: str,
@@ -215,9 +253,24 @@ class Database:
         end: str | int | None = None,
         skip_first: float | None = None,
         internal: bool = False,
+        node: str | Sequence[str] | None = None,
+        topic: str | Sequence[str] | None = None,
+        callback: str | Sequence[str] | None = None,
+        host: str | Sequence[str] | None = None,
+        via: str | Sequence[str] | None = None,
+        without: str | Sequence[str] | None = None,
+        where: str | None = None,
+        sort: str | Sequence[str] | None = None,
+        limit: int | None = None,
+        slowest: int | None = None,
+        path: str | None = None,
+        paths: str | Path = DEFAULT_PATHS,
         **parameters: Value,
     ) -> QueryResult:
         """Run a named query.
+
+        Rows can be chosen where the query has such columns. Names may be globs, several in a list
+        or between commas.
 
         Args:
             name: as `list_queries` has it.
@@ -227,17 +280,52 @@ class Database:
             end: its end, likewise.
             skip_first: seconds to leave out at the begin of the run.
             internal: show the rows of ROS's own topics and services too.
+            node: rows that name one of these nodes.
+            topic: rows that name one of these topics.
+            callback: rows that name one of these callbacks, such as 'Timer(*)'.
+            host: rows that name one of these hosts.
+            via: paths that visit all of these nodes, topics and services.
+            without: paths that visit none of these.
+            where: a condition in SQL on the columns of the query, such as 'p99_ns > 80e6'.
+            sort: column to sort by, 'p99_ns' or 'p99_ns:desc', or several.
+            limit: most rows.
+            slowest: so many of the slowest rows, of queries whose rows take time.
+            path: name of a path in a file; in place of `from_`, `to`, `via` and `without`.
+            paths: that file.
             parameters: the query's own; `from_` means `from`.
 
         Raises:
-            UsageError: a query, parameter, run or time that does not exist or cannot be read.
+            UsageError: a query, parameter, name, column, run or time that does not exist or cannot
+                be read, a condition that does not only read, or rows that the query does not have.
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
         header = load_query(name)
         connection = self.connection
-        return self._ask(
-            lambda: run_query(
+        if path is not None:
+            if via or without or {"from", "from_", "to", "to_"} & set(parameters):
+                raise UsageError(
+                    f"a path with a name goes without others — {path}",
+                    "leave out --from, --to, --via and --without",
+                )
+            words = self._ask(lambda: self._named_path(header, path, Path(paths), run))
+            via, without = words.pop("via", None), words.pop("without", None)
+            parameters |= words
+        selection = {
+            "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
+            "without": without, "where": where, "sort": sort, "limit": limit, "slowest": slowest,
+        }  # fmt: skip
+        # What a query has a parameter for, it does itself.
+        own = {param.name for param in header.params} & {
+            word for word, value in selection.items() if value is not None
+        }
+        for word in own:
+            parameters[word] = selection.pop(word)  # type: ignore[assignment]
+
+        def ask() -> QueryResult:
+            if where is not None:
+                require_condition(connection, where)
+            return run_query(
                 connection,
                 header,
                 parameters,
@@ -246,8 +334,23 @@ class Database:
                 end=end,
                 skip_first=skip_first,
                 internal=internal,
-            ),
-        )
+                selection=make_selection(selection),
+            )
+
+        return self._ask(ask)
+
+    def _named_path(
+        self, header: Header, name: str, file: Path, run: str | int | None
+    ) -> dict[str, str]:
+        """Return the words of `query` that a named path stands for."""
+        from msgflow.paths import read_paths
+
+        if not any(param.name == "from" for param in header.params):
+            raise UsageError(f"{header.name} has no paths — --path {name}", "leave it out")
+        named = read_paths(file)
+        path = named.named(name)
+        named.require(self.connection, choose_runs(read_runs(self.connection), run), path)
+        return path.words()
 
     def flow(
         self,
@@ -326,8 +429,8 @@ class Database:
     def flow_page(self, flow: Flow, path: str | Path) -> int:
         """Write the timeline of a flow into one file that any browser opens; return its bytes.
 
-        It is drawn whole in the direction of the flow, up to its limit of vertices, whatever the
-        depth; ROS's own topics included.
+        It is drawn in the direction of the flow, up to its depth and its limit of vertices; ROS's
+        own topics included.
 
         Args:
             flow: as `flow` returned it.
@@ -349,6 +452,7 @@ class Database:
                 flow.run,
                 *flow.start_key,
                 direction=flow.direction,
+                depth=flow.depth,
                 limit=flow.limit,
             ),
         )
@@ -378,16 +482,14 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.graph import Graph
+        from msgflow.query.window import choose_one
 
+        connection = self.connection
+        one = self._ask(lambda: choose_one(read_runs(connection), run, "a graph"))
         result = self.query(
-            "graph", run=run, start=start, end=end, skip_first=skip_first, internal=internal
+            "graph", run=one.run_id, start=start, end=end, skip_first=skip_first, internal=internal
         )
-        if len(result.runs) != 1:
-            raise UsageError(
-                "a graph is of one run" if result.runs else "the database holds no run yet",
-                "choose one with --run" if result.runs else "msgflow ingest TRACE",
-            )
-        return Graph(result.runs[0], result, result.notes)
+        return Graph(one, result, result.notes)
 
     def compare(
         self,
@@ -419,7 +521,7 @@ class Database:
             skip_first: seconds to leave out at the begin of each run.
             confidence: of the intervals, between 0 and 1.
             resamples: that the intervals are from: 20 / (1 - confidence) at least; 1000, or as many
-                as that, when None.
+                as that, when None; 0 leaves out intervals and verdicts, which take longest.
             seed: of the resampling; the same seed gives the same intervals.
             internal: compare what ROS does for itself too.
             max_depth: longest path, in topics.
@@ -451,6 +553,70 @@ class Database:
                 max_paths=max_paths,
             ),
         )
+
+    def verify(
+        self,
+        targets: str | Path,
+        *,
+        run: str | int | None = None,
+        start: str | int | None = None,
+        end: str | int | None = None,
+        skip_first: float | None = None,
+    ) -> Verification:
+        """Tell whether a run meets the requirements of a file.
+
+        Args:
+            targets: YAML; docs/verify.md has its form.
+            run: a name or an id; the latest run when None.
+            start: begin of the time window: epoch ns, an offset from the run's start such as
+                '2.5s', or ISO time.
+            end: its end, likewise.
+            skip_first: seconds to leave out at the begin of the run.
+
+        Returns:
+            The verdicts: one row per requirement and thing of the run that it is of.
+
+        Raises:
+            UsageError: not such a file, no such run or time, or a name that means nothing in the
+                run.
+            QueryError: the database could not run a query.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.verify import read_targets, verify
+
+        file = read_targets(Path(targets))
+        connection = self.connection
+        return self._ask(
+            lambda: verify(connection, file, run=run, start=start, end=end, skip_first=skip_first)
+        )
+
+    def suggest_targets(
+        self, *, run: str | int | None = None, skip_first: float | None = None, margin: float = 0.2
+    ) -> str:
+        """Return a file of requirements that a run meets, to review and to change.
+
+        Args:
+            run: a name or an id; the latest run when None.
+            skip_first: seconds to leave out at the begin of the run.
+            margin: by how much more than measured is allowed, as a share.
+
+        Raises:
+            UsageError: no such run, or a margin below 0.
+            QueryError: the database could not run a query.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.query.window import choose_one
+        from msgflow.verify.suggest import suggest_targets
+
+        if not margin >= 0:
+            raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")
+        connection = self.connection
+        one = self._ask(lambda: choose_one(read_runs(connection), run, "a file of requirements"))
+        results = {
+            name: self.query(name, run=one.run_id, skip_first=skip_first).to_arrow().to_pylist()
+            for name in ("e2e-latency", "timers", "publication-rate", "service-latency")
+        }
+        return suggest_targets(one, results, margin)
 
     def report(
         self,
@@ -619,21 +785,16 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.series import What, read_series
-        from msgflow.query.window import choose_runs, time_window
+        from msgflow.query.window import choose_one, time_window
 
         if what not in set(What):
             raise UsageError(f"there are no series of that — {what}", f"one of {', '.join(What)}")
         connection = self.connection
 
         def read() -> QueryResult:
-            runs = choose_runs(read_runs(connection), run)
-            if len(runs) != 1:
-                raise UsageError(
-                    "series are of one run" if runs else "the database holds no run yet",
-                    "choose one with --run" if runs else "msgflow ingest TRACE",
-                )
-            window = time_window(runs, start, end, skip_first)
-            return read_series(connection, runs[0], What(what), window)
+            one = choose_one(read_runs(connection), run, "a file of series")
+            window = time_window((one,), start, end, skip_first)
+            return read_series(connection, one, What(what), window)
 
         return self._ask(read)
 
@@ -662,19 +823,14 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.perfetto import write_perfetto
-        from msgflow.query.window import choose_runs, time_window
+        from msgflow.query.window import choose_one, time_window
 
         connection = self.connection
 
         def export() -> PerfettoTrace:
-            runs = choose_runs(read_runs(connection), run)
-            if len(runs) != 1:
-                raise UsageError(
-                    "a trace is of one run" if runs else "the database holds no run yet",
-                    "choose one with --run" if runs else "msgflow ingest TRACE",
-                )
-            window = time_window(runs, start, end, skip_first)
-            return write_perfetto(connection, Path(path), runs[0], window)
+            one = choose_one(read_runs(connection), run, "a Perfetto trace")
+            window = time_window((one,), start, end, skip_first)
+            return write_perfetto(connection, Path(path), one, window)
 
         return self._ask(export)
 
@@ -739,6 +895,9 @@ def _sql_error(error: duckdb.Error) -> QueryError:
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))
     hint = " ".join(line.strip() for line in more[:place] if line.strip())
+    missing = _MISSING_TABLE.search(what)
+    if missing and (query := missing[1].replace("_", "-")) in query_names():
+        hint = f"it is a query: msgflow query {query}"
     return QueryError("\n".join([what, *more[place:]]), hint or None)
 
 

@@ -13,6 +13,7 @@ class ExitCode(IntEnum):
     USAGE = 2
     TRACE = 3
     DATABASE = 4
+    NOT_MEASURED = 5
     INTERRUPTED = 130
     TERMINATED = 143
 

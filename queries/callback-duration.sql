@@ -1,13 +1,13 @@
 -- name: callback-duration
 -- title: Callback durations and periods
--- description: How long callbacks ran, and how far apart their starts were. Instances that were
---     never seen to end are counted apart.
+-- description: How long callbacks ran, and how far apart their starts were. Instances without an
+--     end are counted separately.
 -- grain: one row per callback object that ran
 -- column: run_id BIGINT             Run
--- column: node VARCHAR              Node of the callback
--- column: callback VARCHAR          What triggers it
--- column: count BIGINT              Runs that began in the time window
--- column: open BIGINT               Instances never seen to end
+-- column: node VARCHAR [node]  Node of the callback
+-- column: callback VARCHAR [callback]  What triggers it
+-- column: count BIGINT              Callback instances that began in the time window
+-- column: open BIGINT               Instances without an end
 -- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
@@ -21,6 +21,7 @@
 -- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
+-- brief: node, callback, count, median_ns, p95_ns, max_ns, period_median_ns, p99_ns, mean_ns
 -- needs: main.callback_instance, main.callback, main.callback_label
 WITH instance AS (
     SELECT

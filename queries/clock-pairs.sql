@@ -1,17 +1,20 @@
 -- name: clock-pairs
--- title: What tells how far clocks are apart
--- description: Messages and network packets between hosts of two clocks, of each direction, and the
---     shortest way of each as the clocks are corrected now. Both directions are needed; the shorter
---     both ways, the surer the correction.
+-- title: Messages and packets by which clocks are corrected
+-- description: Messages and network packets between hosts of two clocks, for each direction, with
+--     the shortest delay of each after the current correction. A correction needs both directions;
+--     the shorter both delays, the more exact it is.
 -- grain: one row per pair of clocks and direction with messages or packets
 -- column: run_id BIGINT                       Run
--- column: from_hosts VARCHAR                  Hosts of the clock that sent
--- column: to_hosts VARCHAR                    Hosts of the clock that received
+-- column: from_hosts VARCHAR [host]  Hosts of the clock that sent
+-- column: to_hosts VARCHAR [host]  Hosts of the clock that received
 -- column: message_count BIGINT                Messages of ROS matched by their stamps alone,
 --     requests and responses
--- column: packet_count BIGINT                 Network packets that kernel traces saw on both ends
--- column: shortest_message_ns BIGINT [ns]     Shortest way of a message, as corrected
--- column: shortest_packet_ns BIGINT [ns]      Shortest way of a packet, as corrected
+-- column: packet_count BIGINT                 Network packets that kernel traces recorded at both
+--     ends
+-- column: shortest_message_ns BIGINT [ns]     Shortest delay of a message, after correction
+-- column: shortest_packet_ns BIGINT [ns]      Shortest delay of a packet, after correction
+-- brief: from_hosts, to_hosts, message_count, shortest_message_ns, packet_count,
+--     shortest_packet_ns
 -- needs: main.clock_pair, main.host
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts

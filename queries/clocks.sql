@@ -1,25 +1,27 @@
 -- name: clocks
 -- title: Clocks and how they are corrected
--- description: The clocks of a run, the hosts that have them, and what makes their times comparable
---     with those of others. Times of clocks with the same reference can be compared, to within the
---     sum of their uncertainties; the uncertainty grows with the time from the moment of reference.
+-- description: The clocks of a run, the hosts that have them, and how their times are corrected.
+--     Times of clocks with the same reference can be compared, to within the sum of their
+--     uncertainties. The uncertainty grows with the distance from the moment of reference.
 -- grain: one row per clock
 -- column: run_id BIGINT                       Run
--- column: hosts VARCHAR                       Hosts that have it
+-- column: hosts VARCHAR [host]  Hosts that have it
 -- column: method VARCHAR                      'messages', 'packets' (those of kernel traces as
 --     well) or 'file'; 'none': as recorded
--- column: reference VARCHAR                   Hosts of the clock whose times its times become;
---     NULL: not brought together with others
+-- column: reference VARCHAR                   Hosts of the clock that this one is corrected to;
+--     empty: not brought together with others
 -- column: offset_ns BIGINT [ns]               Added to its times
 -- column: uncertainty_ns BIGINT [ns]          Bound of the error of the offset
--- column: drift_ppb BIGINT [1e-9]             Added to its times, per time since reference_ns
--- column: drift_uncertainty_ppb BIGINT [1e-9]  Bound of the error of the drift; NULL: the
+-- column: drift_ppb BIGINT [1e-9]             Added to its times, per unit of time since
+--     reference_ns
+-- column: drift_uncertainty_ppb BIGINT [1e-9]  Bound of the error of the drift; empty: the
 --     uncertainty of the offset holds throughout, or is not known
--- column: reference_ns BIGINT [epoch ns]      Moment at which the offset alone is added, as the
---     clock showed it
--- column: greatest_uncertainty_ns BIGINT [ns]  Bound of the error of its times anywhere in the
---     recording; at any time: main.clock_uncertainty
+-- column: reference_ns BIGINT [epoch ns]      Moment, by this clock, at which only the offset is
+--     added
+-- column: greatest_uncertainty_ns BIGINT [ns]  Largest bound of the error of its times in the
+--     recording; main.clock_uncertainty has the bound at any moment
 -- column: uuid VARCHAR                        UUID of the clock (LTTng: boot identity)
+-- brief: hosts, method, reference, offset_ns, uncertainty_ns, greatest_uncertainty_ns, drift_ppb
 -- needs: main.clock, main.clock_uncertainty, main.host
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts

@@ -1,74 +1,183 @@
 -- name: critical-path
--- title: What one flow waited for
--- description: The flow that took longest, or the longest that ends with a given take (see the
---     query flows), piece by piece. Waits are replaced by what they waited for, as far as the trace
---     shows: what the executor ran meanwhile, the timer that was not due yet, or the message that
---     was still missing and how that came about. The pieces add up to the latency exactly.
--- grain: one row per piece of the flow
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
--- param: take_id BIGINT = NULL     Take at the end of the flow; any when NULL
+-- title: What the slowest flows waited for
+-- description: The flow that took longest, the N slowest, the one at a quantile of the latency, or
+--     the longest that ends with a given take (see the query flows), piece by piece. Waits are
+--     replaced by what they waited for, as far as the trace shows: what the executor ran meanwhile,
+--     the timer that was not due yet, or the message that was still missing and how that came
+--     about. The pieces add up to the latency exactly. Unless detail is full, pieces below 1 % of
+--     the latency are summed up in one line, 'rest', and the layers of publishing are one piece.
+-- grain: one row per flow and piece, node or activity
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
+-- param: via VARCHAR = NULL  Only flows through all of these topics, nodes and services
+-- param: without VARCHAR = NULL  Only flows through none of these
+-- param: slowest BIGINT {1..} = 1  Number of flows, the slowest first
+-- param: at VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of the
+--     latency
+-- param: flow BIGINT = NULL  Instead, the longest flow that ends with this take_id (see the query
+--     flows)
+-- param: by VARCHAR {piece|node|part} = 'piece'  One row for each piece, or totals by node or
+--     by activity
+-- param: detail VARCHAR {short|full} = 'short'  full: every piece and every layer of publishing
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
 --     stops it
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
--- column: at_ns BIGINT [ns]        Begin, since the start of the flow
--- column: duration_ns BIGINT [ns]  Duration; negative where parts of the flow overlap
--- column: hop BIGINT               Which message of the path it is, or leads to
+-- column: rank BIGINT              Number of the flow, the slowest first
+-- column: at_ns BIGINT [ns]        Start, since the start of the flow; empty for several pieces
+-- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap
+-- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
 --     'service', 'publish' or its layer, 'publish_to_take' or 'take_to_callback'
 -- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
---     one) or 'undecided' (nothing tells when the message arrived); in a cache 'timer' (not due
+--     one) or 'undecided' (nothing shows when the message arrived); in a cache 'timer' (not due
 --     yet), 'unpublished' (the message that was waited for had not been published), or a part of
---     the way of that message
--- column: node VARCHAR             Node that did it, or that waited
+--     that message's own flow; 'rest': pieces too short for a line of their own
+-- column: node VARCHAR [node]      Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: share DOUBLE             Part of the latency, rounded to 4 places
--- column: is_certain BOOLEAN       Of 'executor_busy' and 'blocked': what waited was ready by then;
---     no: it may have arrived during this piece
+-- column: pieces BIGINT            Number of pieces in the row
+-- column: is_certain BOOLEAN       For 'executor_busy' and 'blocked': what waited was ready by
+--     then; no: it may have arrived during this piece
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: callback_instance_id BIGINT  Callback instance
 -- column: publication_id BIGINT    Message
 -- column: take_id BIGINT           Take at the end of the flow
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
+-- brief: rank, at_ns, duration_ns, share, activity, node, what, is_certain, pieces, hop, part
 -- note: clocks
--- needs: main.critical_path, main.callback_instance, main.callback_label, main.publication,
---     main.publisher, main.node, main.process
+-- needs: main.critical_path, main.flow_path, main.callback_instance, main.callback_label,
+--     main.publication, main.publisher, main.node, main.process
+WITH path AS (
+    SELECT path_id
+    FROM main.flow_path(
+        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+    )
+    WHERE ($via IS NOT NULL OR $without IS NOT NULL)
+        AND coalesce(list_bool_and(list_transform(
+            string_split($via, ','),
+            lambda each: list_bool_or(list_transform(
+                string_split(path, ' → '),
+                lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
+            ))
+        )), true)
+        AND NOT coalesce(list_bool_or(list_transform(
+            string_split($without, ','),
+            lambda each: list_bool_or(list_transform(
+                string_split(path, ' → '),
+                lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
+            ))
+        )), false)
+),
+piece AS (
+    SELECT
+        c.run_id,
+        c.flow_rank,
+        c.position,
+        c.from_ns - min(CASE WHEN c.position = 1 THEN c.from_ns END)
+            OVER (PARTITION BY c.flow_rank) AS at_ns,
+        c.duration_ns,
+        c.hop,
+        c.part,
+        c.activity,
+        coalesce(
+            l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
+        ) AS node,
+        CASE
+            WHEN c.activity IN (
+                'callback', 'cache', 'take_to_callback', 'service', 'executor_busy', 'blocked',
+                'timer'
+            ) OR c.part = 'request_to_take' THEN l.label
+            ELSE coalesce(p.topic_name, '?')
+        END AS what,
+        c.is_certain,
+        c.from_ns,
+        c.callback_instance_id,
+        c.publication_id,
+        c.take_id,
+        c.latency_ns,
+        $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
+            AND c.part = c.activity AS is_layer
+    FROM main.critical_path(
+        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
+        sink_take_id := $flow, max_depth := $max_depth, max_paths := $max_paths,
+        most_flows := $slowest,
+        at_quantile := CASE $at WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
+            WHEN 'p99' THEN 0.99 WHEN 'max' THEN 1.0 END,
+        path_ids := CASE WHEN $via IS NOT NULL OR $without IS NOT NULL
+            THEN (SELECT coalesce(list(path_id), []) FROM path) END
+    ) AS c
+    LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
+    LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    LEFT JOIN main.publication AS b ON c.publication_id = b.publication_id
+    LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+    LEFT JOIN main.process AS r ON b.process_id = r.process_id
+    LEFT JOIN main.node AS n ON p.node_id = n.node_id
+),
+-- The layers of one publication follow each other.
+folded AS (
+    SELECT
+        run_id, flow_rank, min(position) AS position, min(at_ns) AS at_ns,
+        sum(duration_ns)::BIGINT AS duration_ns, hop,
+        CASE WHEN is_layer THEN 'publish' ELSE any_value(part) END AS part,
+        CASE WHEN is_layer THEN 'publish' ELSE any_value(activity) END AS activity,
+        node, what, is_certain, min(from_ns) AS from_ns, callback_instance_id, publication_id,
+        take_id, latency_ns
+    FROM piece
+    GROUP BY
+        run_id, flow_rank, hop, node, what, is_certain, callback_instance_id, publication_id,
+        take_id, latency_ns, is_layer, CASE WHEN is_layer THEN 0 ELSE position END
+),
+sorted AS (
+    SELECT
+        run_id, flow_rank, position, at_ns, duration_ns, hop, part, activity, node, what,
+        is_certain, from_ns, callback_instance_id, publication_id, take_id, latency_ns,
+        CASE
+            WHEN $by = 'node' THEN coalesce(node, '')
+            WHEN $by = 'part' THEN activity
+            WHEN $detail = 'short' AND abs(duration_ns) < 0.01 * latency_ns THEN 'rest'
+            ELSE position::VARCHAR
+        END AS row_key
+    FROM folded
+)
 SELECT
-    c.run_id,
-    c.from_ns - min(CASE WHEN c.position = 1 THEN c.from_ns END) OVER () AS at_ns,
-    c.duration_ns,
-    c.hop,
-    c.part,
-    c.activity,
-    coalesce(
-        l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
-    ) AS node,
+    run_id,
+    flow_rank AS rank,
+    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(at_ns) END AS at_ns,
+    sum(duration_ns)::BIGINT AS duration_ns,
+    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(hop) END AS hop,
+    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(part) END AS part,
     CASE
-        WHEN c.activity IN (
-            'callback', 'cache', 'take_to_callback', 'service', 'executor_busy', 'blocked', 'timer'
-        ) OR c.part = 'request_to_take' THEN l.label
-        ELSE coalesce(p.topic_name, '?')
-    END AS what,
-    round(c.duration_ns / nullif(c.latency_ns, 0), 4) AS share,
-    c.is_certain,
-    c.from_ns,
-    c.callback_instance_id,
-    c.publication_id,
-    c.take_id,
-    c.latency_ns
-FROM main.critical_path(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-    sink_take_id := $take_id, max_depth := $max_depth, max_paths := $max_paths
-) AS c
-LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
-LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-LEFT JOIN main.publication AS b ON c.publication_id = b.publication_id
-LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-LEFT JOIN main.process AS r ON b.process_id = r.process_id
-LEFT JOIN main.node AS n ON p.node_id = n.node_id
-ORDER BY c.position
+        WHEN $by = 'piece' AND row_key = 'rest' THEN 'rest'
+        WHEN $by <> 'node' THEN any_value(activity)
+    END AS activity,
+    CASE
+        WHEN $by = 'node' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(node)
+    END AS node,
+    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(what) END AS what,
+    round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
+    count(*) AS pieces,
+    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(is_certain) END AS is_certain,
+    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(from_ns) END AS from_ns,
+    CASE
+        WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(callback_instance_id)
+    END AS callback_instance_id,
+    CASE
+        WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(publication_id)
+    END AS publication_id,
+    take_id,
+    latency_ns
+FROM sorted
+GROUP BY run_id, flow_rank, take_id, latency_ns, row_key
+ORDER BY
+    run_id, flow_rank,
+    row_key = 'rest',
+    CASE WHEN $by = 'piece' THEN min(position) END,
+    sum(duration_ns) DESC,
+    row_key

@@ -2,16 +2,18 @@
 -- title: Data age by path
 -- description: How old the data behind the output of a path are. The age of an output (the end of
 --     the path) is that of the newest input (start of a flow) that it reflects. Data stay in use
---     until the next output; the age right before that, the highest that they reach, is their peak
---     age. The time window is that of the outputs.
+--     until the next output. Their age right before that is the highest that they reach: the peak
+--     age. The time window applies to outputs.
 -- grain: one row per path
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
 --     output
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
 -- column: outputs BIGINT           Outputs in the time window
 -- column: loss_affected BIGINT     Outputs with a gap of a trace in the time since their input
@@ -28,7 +30,9 @@
 -- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR             Nodes and topics
+-- column: path VARCHAR [path]  Nodes and topics
+-- brief: path, outputs, median_ns, p95_ns, max_ns, peak_max_ns, loss_affected, p99_ns,
+--     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks
 -- needs: main.flow_path, main.end_to_end
 WITH output AS (

@@ -1,20 +1,21 @@
 -- name: data-quality
--- title: Data quality, and what share of the answers it touches
+-- title: Data quality: what is missing, and what share of the answers it affects
 -- description: What the traces lack, by trace, process and topic. `affected` of `total` things of a
---     kind are touched: events that were discarded among those that happened, time in gaps,
---     callback instances never seen to end, objects that were never seen to be created (those of
---     ROS itself left out), takes without a publication, messages with an unknown fate, links that
---     lost events may have spoilt. The last rows give the share of the whole run.
+--     kind are affected: events that were discarded, time in gaps, callback instances without an
+--     end, objects whose creation was not recorded (without those of ROS itself), takes without a
+--     publication, messages with an unknown fate, and links that lost events may have spoilt. The
+--     last rows give the share of the whole run.
 -- grain: one row per trace, process, topic or run, and measure
--- param: all BOOLEAN = false     Show measures with nothing affected, too
+-- param: all BOOLEAN = false     Also show measures with nothing affected
 -- column: run_id BIGINT          Run
 -- column: scope VARCHAR          'trace', 'process', 'topic' or 'run'
 -- column: subject VARCHAR        Path of the trace, process and host, topic, or name of the run
 -- column: measure VARCHAR        What is counted
--- column: affected BIGINT        How many are affected; of gap_time: nanoseconds in gaps
--- column: total BIGINT           How many there are; of gap_time: nanoseconds traced
+-- column: affected BIGINT        How many are affected; for gap_time: nanoseconds in gaps
+-- column: total BIGINT           How many there are; for gap_time: nanoseconds traced
 -- column: affected_percent DOUBLE [%]  Share affected
 -- column: is_internal BOOLEAN    ROS uses the topic for itself
+-- brief: scope, subject, measure, affected, total, affected_percent
 -- needs: main.trace, main.loss_interval, main.process, main.host, main.callback_instance,
 --     main.node, main.publisher, main.subscription, main.callback, main.take, main.stat_orphan,
 --     main.stat_delivery, main.link_transport, main.link_causal, main.run

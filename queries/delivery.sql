@@ -2,27 +2,29 @@
 -- title: Messages delivered, skipped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Skipped: newer messages took their place in the queue. Lost: they did not arrive
---     or could not be taken. Unconnected: the two were not connected yet, or not any more, or the
---     trace ended. Unknown: events are lost, or nothing tells. The five add up to what was
---     published. Whether a message was overwritten or lost on the way is told by the depth of the
---     queue alone; incompatible QoS, lifespan and best effort do not show in a trace.
+--     or could not be taken. Unconnected: the two were not connected yet or any more, or the
+--     recording ended. Unknown: events are lost, or the trace does not decide. Together with
+--     delivered, these counts add up to what was published. Only the depth of the queue decides
+--     whether a message counts as overwritten or as lost on the way; incompatible QoS, lifespan and
+--     best effort do not show in a trace.
 -- grain: one row per topic and subscription
--- param: topic VARCHAR = NULL       Only this topic
 -- column: run_id BIGINT             Run
--- column: topic_name VARCHAR        Topic
--- column: subscriber VARCHAR        Node that subscribes
+-- column: topic_name VARCHAR [topic]  Topic
+-- column: subscriber VARCHAR [node]  Node that subscribes
 -- column: published BIGINT          Messages published on the topic in the time window
 -- column: delivered BIGINT          Of these, taken
--- column: skipped BIGINT            Of these, replaced by newer ones
+-- column: skipped BIGINT            Of these, replaced by newer ones in the queue
 -- column: lost BIGINT               Of these, lost
 -- column: unconnected BIGINT        Of these, before or after the two were connected
 -- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, those unconnected left out
+-- column: delivered_percent DOUBLE [%]  Share delivered, without those unconnected
 -- column: orphans BIGINT            Takes in the time window whose publication is not known
 -- column: reasons VARCHAR           Why messages were not taken, with counts
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- brief: topic_name, subscriber, published, delivered_percent, skipped, lost, reasons, delivered,
+--     unconnected, unknown, orphans, orphan_reasons
 -- needs: main.stat_delivery, main.stat_orphan, main.publication, main.take, main.subscription,
 --     main.node, main.process
 WITH outcome AS (
@@ -87,5 +89,4 @@ LEFT JOIN delivery AS d ON s.subscription_id = d.subscription_id
 LEFT JOIN orphan AS o ON s.subscription_id = o.subscription_id
 WHERE list_contains($runs, s.run_id)
     AND (d.subscription_id IS NOT NULL OR o.subscription_id IS NOT NULL)
-    AND ($topic IS NULL OR s.topic_name = $topic)
 ORDER BY s.run_id, s.topic_name NULLS LAST, subscriber, s.subscription_id

@@ -2,12 +2,13 @@
 -- title: End-to-end latency by path
 -- description: How long it took from the start of a flow (the callback of the timer that published,
 --     or the publication itself) to its end (the end of the callback at the end of the path), for
---     every path of the computation graph. Roots are counted whole: those that reached the end,
---     those superseded by a newer input before they were used, those lost on the way, and those
---     too close to the begin or end of the trace to tell.
+--     every path of the computation graph. Every root is counted: reached the end of the path,
+--     superseded by a newer input before it was used, lost on the way, or cut by the recording (too
+--     close to its start or end to know).
 -- grain: one row per path
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
@@ -15,18 +16,19 @@
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
 -- column: roots BIGINT             Flows that began in the time window
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
 -- column: lost BIGINT              Roots lost on the way although later ones arrived
--- column: cut_by_recording BIGINT  Roots too close to the begin or end of the trace to tell
--- column: loss_affected BIGINT     Roots with a gap of a trace in their time: what is said of them
---     may be wrong
--- column: pairs BIGINT             Pairs of root and arrival that the latencies are from
--- column: looped BIGINT            Later messages at the end of the path that descend from such an
---     arrival, but only round a loop: no pairs, as a path visits no subscription twice
+-- column: cut_by_recording BIGINT  Roots too close to the start or end of the recording to know
+-- column: loss_affected BIGINT     Roots with a gap of a trace in their time: their status may be
+--     wrong
+-- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
+-- column: looped BIGINT            Later messages at the end of the path that descend from an
+--     arrival there through a loop. They are not pairs, since a path visits no subscription twice
 -- column: min_ns BIGINT [ns]       Shortest latency
 -- column: median_ns BIGINT [ns]    Median latency
 -- column: mean_ns BIGINT [ns]      Mean latency
@@ -37,14 +39,16 @@
 --     sink never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
 -- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
--- column: path VARCHAR             Nodes and topics
+-- column: path VARCHAR [path]  Nodes and topics
+-- brief: path, median_ns, p95_ns, max_ns, reached, roots, lost, superseded, p99_ns,
+--     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
 -- note: clocks
 -- needs: main.flow_path, main.end_to_end, main.looped_arrival,
---     main.continued_subscription, main.take
+--     main.continued_subscription
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, sink_event, latency_ns, status, reason,
-        is_loss_affected,
+        is_first, is_loss_affected,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last
@@ -56,11 +60,16 @@ WITH flow AS (
         max_depth := $max_depth, max_paths := $max_paths
     )
 ),
+-- What became of a root is the same in each of its rows, but for gaps in its time.
 root AS (
-    SELECT run_id, path_id, root_kind, root_id, any_value(status) AS status,
-        any_value(reason) AS reason, bool_or(is_loss_affected) AS is_loss_affected
+    SELECT run_id, path_id, status, reason
     FROM flow
-    GROUP BY run_id, path_id, root_kind, root_id
+    WHERE is_first
+),
+affected AS (
+    SELECT path_id, count(*) AS number
+    FROM (SELECT DISTINCT path_id, root_kind, root_id FROM flow WHERE is_loss_affected)
+    GROUP BY path_id
 ),
 reason AS (
     SELECT
@@ -83,8 +92,7 @@ completeness AS (
         count(*) FILTER (WHERE status = 'reached') AS reached,
         count(*) FILTER (WHERE status = 'superseded') AS superseded,
         count(*) FILTER (WHERE status = 'lost') AS lost,
-        count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording,
-        count(*) FILTER (WHERE is_loss_affected) AS loss_affected
+        count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording
     FROM root
     GROUP BY run_id, path_id
 ),
@@ -102,6 +110,13 @@ latency AS (
     WHERE status = 'reached' AND is_counted
     GROUP BY run_id, path_id
 ),
+path AS MATERIALIZED (
+    SELECT run_id, path_id, subscription_id, is_cut, path
+    FROM main.flow_path(
+        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+    )
+),
+-- Only where the end of a path goes on can anything come back to it.
 looped AS (
     SELECT path_id, count(*) AS number
     FROM main.looped_arrival(
@@ -111,9 +126,9 @@ looped AS (
             FROM (
                 SELECT DISTINCT path_id, take_id
                 FROM flow
-                WHERE take_id IN (
-                    SELECT take_id
-                    FROM main.take
+                WHERE take_id IS NOT NULL AND path_id IN (
+                    SELECT path_id
+                    FROM path
                     WHERE subscription_id IN (
                         SELECT subscription_id FROM main.continued_subscription($runs)
                     )
@@ -130,7 +145,7 @@ SELECT
     coalesce(c.superseded, 0) AS superseded,
     coalesce(c.lost, 0) AS lost,
     coalesce(c.cut_by_recording, 0) AS cut_by_recording,
-    coalesce(c.loss_affected, 0) AS loss_affected,
+    coalesce(a.number, 0) AS loss_affected,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(o.number, 0) AS looped,
     l.min_ns,
@@ -143,10 +158,9 @@ SELECT
     p.is_cut,
     r.lost_reasons,
     p.path
-FROM main.flow_path(
-    $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
-) AS p
+FROM path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
+LEFT JOIN affected AS a ON p.path_id = a.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
 LEFT JOIN reason AS r ON p.path_id = r.path_id
 LEFT JOIN looped AS o ON p.path_id = o.path_id

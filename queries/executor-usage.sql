@@ -1,12 +1,12 @@
 -- name: executor-usage
 -- title: What executor threads spent their time on
--- description: Time of each executor thread in the three states that its events tell (waiting for
+-- description: Time of each executor thread in the three states that its events show (waiting for
 --     work, looking for what is ready, executing), and in callbacks. An executor without such
 --     events (events executor, static executor, rclpy) has callback time only. The callback share
---     is that of the time for which the thread was seen.
+--     is the share of the time for which the thread was seen.
 -- grain: one row per executor thread
 -- column: run_id BIGINT             Run
--- column: host VARCHAR              Host
+-- column: host VARCHAR [host]  Host
 -- column: process VARCHAR           Process name
 -- column: pid INTEGER               Process id
 -- column: tid INTEGER               Thread id
@@ -14,12 +14,14 @@
 -- column: seen_ns BIGINT [ns]       Time for which the thread was seen in the time window
 -- column: wait_ns BIGINT [ns]       Waiting for work
 -- column: process_ns BIGINT [ns]    Looking for what is ready
--- column: execute_ns BIGINT [ns]    Executing, with taking messages
--- column: callback_ns BIGINT [ns]   In callbacks that were seen to end, nested time counted once
+-- column: execute_ns BIGINT [ns]    Executing, including taking messages
+-- column: callback_ns BIGINT [ns]   In callbacks with an end; nested time counts once
 -- column: callbacks BIGINT          Callbacks that began
--- column: callback_share DOUBLE     Callback time by time seen, 0 to 1
+-- column: callback_share DOUBLE     Callback time divided by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
 -- column: thread_id BIGINT          Identity of the thread
+-- brief: process, tid, callback_share, callback_ns, callbacks, host, execute_ns, wait_ns, seen_ns,
+--     executor_kind, pid, process_ns
 -- needs: main.executor_thread, main.executor, main.executor_state, main.callback_instance,
 --     main.thread, main.process, main.host
 WITH member AS (

@@ -2,34 +2,37 @@
 -- title: How long callbacks waited, and what their executor ran meanwhile
 -- description: The time from the end of a publication (or from when a timer was due, or a request
 --     was sent) to the start of its callback, and how much of it the executor was busy with other
---     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds:
---     at least what ran after the executor had found it ready, at most what ran since it can have
---     been there. The rest of the wait was the network, an idle executor or its overhead. The
---     callback that others kept waiting most comes first. Totals are over the callback instances
---     in the time window; 'waits' has them one by one, 'interference' every pair of callbacks.
+--     callbacks. A trace does not say when a message arrived, so the busy time is given as bounds.
+--     At least: what ran after the executor had certainly found it ready. At most: what ran since
+--     the earliest moment at which it can have been there. The rest of the wait was the network, an
+--     idle executor or its overhead. Totals are over the callback instances in the time window. The
+--     callback that others kept waiting longest comes first. The query waits lists the waits one by
+--     one, interference every pair of callbacks.
 -- grain: one row per callback object that ran
 -- column: run_id BIGINT             Run
--- column: node VARCHAR              Node of the callback
--- column: callback VARCHAR          What triggers it
+-- column: node VARCHAR [node]  Node of the callback
+-- column: callback VARCHAR [callback]  What triggers it
 -- column: count BIGINT              Callback instances that began in the time window
--- column: delayed_min BIGINT        Of these, kept waiting for certain: ready while others ran
+-- column: delayed_min BIGINT        Of these, certainly kept waiting: ready while others ran
 -- column: delayed_max BIGINT        Of these, possibly kept waiting
--- column: wait_median_ns BIGINT [ns]  Median wait, where its beginning is known
+-- column: wait_median_ns BIGINT [ns]  Median wait, where its start is known
 -- column: wait_max_ns BIGINT [ns]   Longest wait
--- column: busy_worst_ns BIGINT [ns]   Longest that the executor can have been busy during one wait
+-- column: busy_worst_ns BIGINT [ns]   Longest time for which the executor can have been busy during
+--     one wait
 -- column: busy_total_min_ns BIGINT [ns]  Executor busy with others during all waits, at least
 -- column: busy_total_max_ns BIGINT [ns]  Executor busy with others during all waits, at most
 -- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where known, at least
 -- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
--- column: meanwhile VARCHAR         What ran meanwhile, by its share: the three with the most, with
---     their node where it is another
--- column: unknown BIGINT            Of these, with an unknown beginning of the wait
+-- column: meanwhile VARCHAR         What ran meanwhile: the three with the largest share, with
+--     their node if it is another one
+-- column: unknown BIGINT            Of these, with an unknown start of the wait
 -- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
+-- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, meanwhile, count,
+--     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 -- note: clocks
--- needs: main.executor_wait, main.executor_interference, main.callback_instance,
---     main.callback_label
+-- needs: main.executor_wait, main.executor_interference, main.callback_label
 WITH waited AS (
     SELECT
         run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
@@ -56,13 +59,21 @@ measured AS (
     FROM waited
     GROUP BY run_id, callback_id
 ),
+together AS (
+    -- Of bursts there are far more pairs than rows of the answer: summed up before they are joined.
+    SELECT
+        callback_instance_id,
+        meanwhile_callback_id AS meanwhile_id,
+        sum(overlap_ns) AS overlap_ns
+    FROM main.executor_interference
+    WHERE list_contains($runs, run_id) AND overlap_ns > 0
+    GROUP BY callback_instance_id, meanwhile_callback_id
+),
 pair AS (
-    SELECT w.callback_id, r.callback_id AS meanwhile_id, sum(i.overlap_ns) AS overlap_ns
-    FROM main.executor_interference AS i
-    JOIN waited AS w ON i.callback_instance_id = w.callback_instance_id
-    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
-    WHERE i.overlap_ns > 0
-    GROUP BY w.callback_id, r.callback_id
+    SELECT w.callback_id, t.meanwhile_id, sum(t.overlap_ns) AS overlap_ns
+    FROM together AS t
+    JOIN waited AS w ON t.callback_instance_id = w.callback_instance_id
+    GROUP BY w.callback_id, t.meanwhile_id
 ),
 ranked AS (
     SELECT

@@ -1,10 +1,11 @@
 -- name: flows
 -- title: Flows, one by one
--- description: What became of every root of every path: when it began, when it arrived at the end
+-- description: What became of every root of every path: when it started, when it arrived at the end
 --     of the path and how long that took, or why it did not arrive.
 -- grain: one row per path and root, or per pair of root and arrival
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
@@ -12,18 +13,21 @@
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
 -- column: root_kind VARCHAR        'callback_instance' or 'publication'
 -- column: root_id BIGINT           Identity of the root
 -- column: root_ns BIGINT [epoch ns]  Start of the root
--- column: take_id BIGINT           Take at the end of the path; NULL: not reached
+-- column: take_id BIGINT           Take at the end of the path; empty: not reached
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]   From the start of the root to the end
 -- column: status VARCHAR           'reached', 'superseded', 'lost' or
 --     'cut_by_recording'
 -- column: reason VARCHAR           Why it did not arrive
--- column: path VARCHAR             Nodes and topics
+-- column: path VARCHAR [path]  Nodes and topics
+-- slowest: latency_ns
+-- brief: path, root_ns, latency_ns, status, reason, take_id, sink_ns, root_kind, root_id
 -- note: clocks
 -- needs: main.flow_path, main.end_to_end
 SELECT

@@ -1,23 +1,24 @@
 -- name: graph
--- title: Who sends what to whom, and how long it takes
--- description: The computation graph: nodes, and the topics and services between them, with how
---     often and how long. `msgflow graph` draws it.
+-- title: Which node sends what to which, how often and how fast
+-- description: The computation graph: nodes, and the topics and services between them, with rates
+--     and latencies. `msgflow graph` draws it.
 -- grain: one row per node, topic or service, and what the node does with it
 -- column: run_id BIGINT            Run
 -- column: kind VARCHAR             What the node does: 'publish', 'receive', 'call' or 'serve'
--- column: node VARCHAR             Node
--- column: name VARCHAR             Topic or service
+-- column: node VARCHAR [node]  Node
+-- column: name VARCHAR [topic]  Topic or service
 -- column: indirect VARCHAR         How messages wait in the node for what is published:
---     'periodic_async', 'partial_sync', or both; NULL: no indirect link leads to it
+--     'periodic_async', 'partial_sync', or both; empty: no indirect link leads to it
 -- column: count BIGINT             Messages, or requests, in the time window
--- column: rate_hz DOUBLE [Hz]      How often, from the first to the last
--- column: median_ns BIGINT [ns]    Median latency: of 'receive' from publication to take, of
+-- column: rate_hz DOUBLE [Hz]      Rate from the first to the last
+-- column: median_ns BIGINT [ns]    Median latency: for 'receive' from publication to take, for
 --     'call' from sending the request to taking the response
 -- column: p95_ns BIGINT [ns]       95 % of these are at most this
--- column: executor VARCHAR         Executor of the node: process, host, kind and threads; NULL:
+-- column: executor VARCHAR         Executor of the node: process, host, kind and threads; empty:
 --     not known, or several
 -- column: executor_id BIGINT       Its identity
 -- column: is_internal BOOLEAN      ROS uses the topic or service for itself
+-- brief: kind, node, name, rate_hz, median_ns, p95_ns, count, indirect, executor
 -- note: clocks
 -- needs: main.publication, main.publisher, main.take, main.link_transport, main.link_causal,
 --     main.subscription, main.request, main.response, main.service, main.client,

@@ -1,15 +1,14 @@
 -- name: indirect-links
 -- title: Declared indirect links
--- description: Every declared indirect link (annotation) with what came of it: publications that it
---     explains, those with a message of every input, links, and how long messages waited in their
---     caches.
+-- description: Every declared indirect link (annotation) and what it explains: publications, those
+--     with a message of every input, links, and how long messages waited in their caches.
 -- grain: one row per annotation
 -- column: run_id BIGINT             Run
 -- column: kind VARCHAR              'periodic_async' or 'partial_sync'
 -- column: source VARCHAR            'trace' or 'file'
--- column: node VARCHAR              Node that declares it
--- column: inputs VARCHAR            Topics of its inputs
--- column: outputs VARCHAR           Topics of its outputs
+-- column: node VARCHAR [node]  Node that declares it
+-- column: inputs VARCHAR [topic]  Topics of its inputs
+-- column: outputs VARCHAR [topic]  Topics of its outputs
 -- column: publications BIGINT       Publications that it explains, in the time window
 -- column: complete BIGINT           Those with a message of every input
 -- column: links BIGINT              Indirect links to them
@@ -18,6 +17,8 @@
 --     publication
 -- column: max_wait_ns BIGINT [ns]   Longest
 -- column: annotation_id BIGINT      Identity of the annotation
+-- brief: node, kind, inputs, outputs, publications, complete, links, median_wait_ns, max_wait_ns,
+--     ambiguous, source
 -- needs: main.annotation, main.annotation_input, main.annotation_output, main.annotation_firing,
 --     main.link_causal, main.publication, main.subscription, main.publisher, main.node,
 --     main.process

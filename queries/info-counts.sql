@@ -1,7 +1,7 @@
 -- name: info-counts
 -- title: Rows per table
--- description: How much of everything a run holds, also where that is nothing, in the order from
---     hosts to links.
+-- description: How many rows each view has for a run, from hosts to links. Empty views are listed
+--     too.
 -- grain: one row per run and view
 -- column: run_id BIGINT      Run
 -- column: object VARCHAR     View that holds the rows

@@ -1,7 +1,7 @@
 -- name: info-diagnostics
 -- title: Data quality
--- description: What is worth knowing about the input before trusting a number: lost events,
---     unknown events, callbacks never seen to end, failed checks. The worst comes first.
+-- description: What to know about the input before trusting a number: lost events, unknown events,
+--     callbacks without an end, failed checks. The worst comes first.
 -- grain: one row per finding
 -- column: run_id BIGINT      Run
 -- column: severity VARCHAR   error, data_loss, warning or info
@@ -9,6 +9,7 @@
 -- column: count BIGINT       How often
 -- column: trace VARCHAR      Path of the trace, where it concerns one
 -- column: detail VARCHAR     Where, and what it means
+-- brief: severity, name, count, detail, trace
 -- needs: main.diagnostic, main.trace
 SELECT
     diagnostic.run_id,

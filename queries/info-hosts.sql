@@ -3,7 +3,7 @@
 -- description: The hosts of a run, and how their clocks were brought together.
 -- grain: one row per host
 -- column: run_id BIGINT                       Run
--- column: hostname VARCHAR                    Name of the host
+-- column: hostname VARCHAR [host]  Name of the host
 -- column: trace_count BIGINT                  Traces recorded on it
 -- column: process_count BIGINT                Processes seen on it
 -- column: clock_method VARCHAR                How its clock was corrected; none: as recorded

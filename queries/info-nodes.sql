@@ -1,10 +1,11 @@
 -- name: info-nodes
 -- title: ROS nodes
--- description: The nodes of a run and how much each has of what; what ROS adds to every node
---     by itself (parameter services, /rosout, /parameter_events) is not counted.
+-- description: The nodes of a run, and how many publishers, subscriptions, timers, services and
+--     clients each has. What ROS adds to every node (parameter services, /rosout,
+--     /parameter_events) is not counted.
 -- grain: one row per node
 -- column: run_id BIGINT               Run
--- column: node VARCHAR                Namespace and name
+-- column: node VARCHAR [node]  Namespace and name
 -- column: process_name VARCHAR        Process it runs in
 -- column: pid INTEGER                 Id of that process
 -- column: publisher_count BIGINT      Publishers
@@ -12,6 +13,8 @@
 -- column: timer_count BIGINT          Timers
 -- column: service_count BIGINT        Services
 -- column: client_count BIGINT         Service clients
+-- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
+--     client_count, pid
 -- needs: main.node, main.process, main.publisher, main.subscription, main.timer, main.service,
 --     main.client
 SELECT

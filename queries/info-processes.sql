@@ -3,7 +3,7 @@
 -- description: The processes of a run with the number of their threads and nodes.
 -- grain: one row per process life
 -- column: run_id BIGINT                     Run
--- column: hostname VARCHAR                  Host it ran on
+-- column: hostname VARCHAR [host]  Host it ran on
 -- column: pid INTEGER                       Process id
 -- column: process_name VARCHAR              Name of the process
 -- column: tracetools_version VARCHAR        Version of tracetools it was built with
@@ -11,6 +11,8 @@
 -- column: thread_count BIGINT               Threads seen
 -- column: first_seen_ns BIGINT [epoch ns]   First event
 -- column: duration_ns BIGINT [ns]           From its first event to its last
+-- brief: process_name, pid, hostname, node_count, thread_count, duration_ns, tracetools_version,
+--     first_seen_ns
 -- needs: main.process, main.host, main.node, main.thread
 SELECT
     process.run_id,

@@ -11,6 +11,8 @@
 -- column: event_count BIGINT             Events read
 -- column: discarded_event_count BIGINT   Events that the tracer could not record
 -- column: msgflow_version VARCHAR        Version of msgflow that read it
+-- brief: run_id, name, start_ns, duration_ns, event_count, discarded_event_count, trace_count,
+--     end_ns, msgflow_version
 -- needs: main.run, main.trace
 WITH run_trace AS (
     SELECT

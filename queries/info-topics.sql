@@ -5,12 +5,13 @@
 --     row of their own.
 -- grain: one row per topic
 -- column: run_id BIGINT               Run
--- column: topic_name VARCHAR          Topic
+-- column: topic_name VARCHAR [topic]  Topic
 -- column: publisher_count BIGINT      Publishers
 -- column: subscription_count BIGINT   Subscriptions
 -- column: publication_count BIGINT    Messages published
 -- column: take_count BIGINT           Messages handed over to a subscription
 -- column: is_internal BOOLEAN         ROS uses it for itself
+-- brief: topic_name, publication_count, take_count, publisher_count, subscription_count
 -- needs: main.publisher, main.subscription, main.publication, main.take
 WITH publisher_message AS (
     SELECT publisher_id, count(*) AS publication_count

@@ -1,40 +1,47 @@
 -- name: interference
--- title: Which callbacks keep which waiting
--- description: For every pair of callbacks of one executor how long one ran while the other waited
---     (literature: interference, or blocking where the one that ran was not to come first; no
---     callback is ever interrupted). Bounds as in executor-wait. Threads of one executor count
---     each.
+-- title: Which callbacks keep which others waiting
+-- description: For every pair of callbacks of one executor: how long one ran while the other
+--     waited. The literature calls this interference, or blocking if the one that ran should not
+--     have come first; callbacks are never interrupted. Bounds are those of executor-wait. Each
+--     thread of an executor counts.
 -- grain: one row per waiting callback and callback that ran meanwhile
 -- column: run_id BIGINT             Run
--- column: node VARCHAR              Node of the callback that waited
--- column: callback VARCHAR          What triggers it
--- column: meanwhile_node VARCHAR    Node of the callback that ran
--- column: meanwhile_callback VARCHAR  What triggers it
--- column: waits BIGINT              Waits during which it may have run
+-- column: node VARCHAR [node]  Node of the callback that waited
+-- column: callback VARCHAR [callback]  What triggers it
+-- column: meanwhile_node VARCHAR [node]  Node of the callback that ran
+-- column: meanwhile_callback VARCHAR [callback]  What triggers it
+-- column: waits BIGINT              Waits during which the other callback may have run
 -- column: instances BIGINT          Callback instances that ran during these waits
 -- column: overlap_min_ns BIGINT [ns]  How long it ran during waits, at least
 -- column: overlap_max_ns BIGINT [ns]  How long it ran during waits, at most
--- column: worst_ns BIGINT [ns]      The most of it during one wait
--- column: share DOUBLE              Of all that ran while the callback waited, 0 to 1
+-- column: worst_ns BIGINT [ns]      Longest time that it ran during one wait
+-- column: share DOUBLE              Share of all that ran while the callback waited, 0 to 1
 -- column: callback_id BIGINT        Identity of the callback that waited
 -- column: meanwhile_callback_id BIGINT  Identity of the callback that ran
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
--- needs: main.executor_wait, main.executor_interference, main.callback_instance,
---     main.callback_label
-WITH pair AS (
+-- brief: node, callback, meanwhile_node, meanwhile_callback, worst_ns, share, waits,
+--     overlap_max_ns, overlap_min_ns, instances
+-- needs: main.executor_wait, main.executor_interference, main.callback_label
+WITH together AS (
+    -- The messages of a burst wait for each other: pairs are far more than rows of the answer, and
+    -- nothing may keep them all. So they are summed up before anything is joined to them.
     SELECT
-        w.run_id,
-        w.callback_id,
-        w.callback_instance_id,
-        r.callback_id AS meanwhile_callback_id,
+        callback_instance_id,
+        meanwhile_callback_id,
         count(*) AS instances,
-        sum(i.certain_ns)::BIGINT AS overlap_min_ns,
-        sum(i.overlap_ns)::BIGINT AS overlap_max_ns
-    FROM main.executor_interference AS i
-    JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
-    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
-    WHERE list_contains($runs, i.run_id) AND w.start_ns >= $start_ns AND w.start_ns < $end_ns
-    GROUP BY w.run_id, w.callback_id, w.callback_instance_id, r.callback_id
+        sum(certain_ns)::BIGINT AS overlap_min_ns,
+        sum(overlap_ns)::BIGINT AS overlap_max_ns
+    FROM main.executor_interference
+    WHERE list_contains($runs, run_id)
+    GROUP BY callback_instance_id, meanwhile_callback_id
+),
+pair AS (
+    SELECT
+        w.run_id, w.callback_id, t.meanwhile_callback_id, t.instances, t.overlap_min_ns,
+        t.overlap_max_ns
+    FROM together AS t
+    JOIN main.executor_wait AS w ON t.callback_instance_id = w.callback_instance_id
+    WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
 measured AS (
     SELECT

@@ -1,23 +1,24 @@
 -- name: link-suggestions
--- title: Indirect links that the data suggests
+-- title: Indirect links that the data suggest
 -- description: Where messages seem to be kept for later: a timer publishes while messages that its
 --     node receives lead nowhere (periodic_async), or callbacks of a node's subscriptions publish
---     only once each of several inputs has had a message (partial_sync). Nobody but the author of
---     the node knows whether it is so: review them before you apply any.
+--     only once each of several inputs has had a message (partial_sync). Only the author of the
+--     node knows whether that is so: review the candidates before you apply any.
 -- grain: one row per candidate
--- param: min_share DOUBLE = 0.95    Share of the publications that had a message of an input since
---     the one before, from which on it counts as an input of a partial_sync candidate
+-- param: min_share DOUBLE = 0.95    Minimum share of publications that had a new message of a
+--     topic, for it to count as an input of a partial_sync candidate
 -- column: run_id BIGINT             Run
 -- column: kind VARCHAR              'periodic_async' or 'partial_sync'
--- column: node VARCHAR              Node
--- column: inputs VARCHAR[]          Topics of the inputs
--- column: outputs VARCHAR[]         Topics of the outputs
+-- column: node VARCHAR [node]  Node
+-- column: inputs VARCHAR[] [topic]  Topics of the inputs
+-- column: outputs VARCHAR[] [topic]  Topics of the outputs
 -- column: evidence VARCHAR          What was seen
--- column: doubt VARCHAR             Why it may be incomplete or misleading; NULL: nothing known
+-- column: doubt VARCHAR             Why it may be incomplete or misleading; empty: nothing known
 -- column: process VARCHAR           Process name of the node
 -- column: pid INTEGER               Process id of the node
--- column: host VARCHAR              Host of the node
+-- column: host VARCHAR [host]  Host of the node
 -- column: is_name_repeated BOOLEAN  Several nodes of the run have this name
+-- brief: kind, node, inputs, outputs, evidence, doubt
 -- needs: main.node, main.process, main.host, main.timer, main.callback, main.callback_instance,
 --     main.subscription, main.publication, main.publisher, main.link_causal
 WITH named_node AS (

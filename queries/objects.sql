@@ -2,21 +2,22 @@
 -- title: ROS objects
 -- description: Every publisher, subscription, timer, service and client with its node and process.
 -- grain: one row per object
--- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object;
---     all when NULL
+-- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object
+--     (default: all)
 -- column: run_id BIGINT             Run
--- column: host VARCHAR              Host
+-- column: host VARCHAR [host]  Host
 -- column: process VARCHAR           Process name
 -- column: pid INTEGER               Process id
--- column: node VARCHAR              Full name of the node; NULL: not known
+-- column: node VARCHAR [node]  Full name of the node; empty: not known
 -- column: kind VARCHAR              Kind of object
--- column: name VARCHAR              Topic, service, or period of the timer
+-- column: name VARCHAR [topic]  Topic, service, or period of the timer
 -- column: queue_depth BIGINT        History depth asked for
 -- column: created_ns BIGINT [epoch ns]  First initialisation event
 -- column: symbols VARCHAR           Functions registered for its callbacks
 -- column: object_id BIGINT          Identity within its kind
--- column: is_inferred BOOLEAN       Its initialisation was not traced
+-- column: is_inferred BOOLEAN       Its initialisation was not recorded
 -- column: is_internal BOOLEAN       Infrastructure of ROS
+-- brief: kind, name, node, process, pid, host, queue_depth, created_ns, symbols
 -- needs: main.publisher, main.subscription, main.timer, main.service, main.client, main.callback,
 --     main.node, main.process, main.host
 WITH object AS (

@@ -1,17 +1,18 @@
 -- name: path-breakdown
 -- title: What the latency of each path consists of
--- description: End-to-end latency of every path hop by hop. The parts of a flow follow each other
---     from its start to its end and add up to its latency exactly. A part is negative where the
---     next began before it ended (overlaps), as between hosts whose clocks are apart. Parts of a
---     hop are the callback up to its publication; the wait in a cache for other messages or a
---     timer; calls of services; publishing by layer; what passed up to the take; and from the take
---     to the callback. A trace does not say when a message arrived, so what passed up to the take
---     is three parts, with the bounds of executor-wait: the network or an idle executor; the
---     executor busy with other callbacks; and undecided, the one or the other. Executors were busy
---     at least executor_busy, at most executor_busy and undecided together.
+-- description: End-to-end latency of every path, hop by hop. The parts of a flow follow each other
+--     from its start to its end and add up to its latency exactly. The parts of a hop are: the
+--     callback up to its publication; the wait in a cache for other messages or a timer; calls of
+--     services; publishing by layer; the time up to the take; and the time from the take to the
+--     callback. A trace does not say when a message arrived, so the time up to the take is three
+--     parts, with the bounds of executor-wait: network_or_idle, executor_busy (with other
+--     callbacks), and undecided (one or the other). Executors were busy at least for executor_busy,
+--     at most for executor_busy and undecided together. A part is negative if the next one began
+--     before it ended (overlaps), for example between hosts whose clocks are apart.
 -- grain: one row per path, hop, part, and callback that it belongs to
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
@@ -19,14 +20,15 @@
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
 -- column: path_id BIGINT           Number of the path
--- column: hop BIGINT               Which message of the path it is, or leads to
+-- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
 --     'network_or_idle', 'undecided', 'executor_busy' or 'take_to_callback'
--- column: node VARCHAR             Node that runs the callback, waits for it, or publishes
+-- column: node VARCHAR [node]  Node that runs the callback, waits for it, or publishes
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
 -- column: overlaps BIGINT          Flows in which it is negative
@@ -36,8 +38,10 @@
 -- column: max_ns BIGINT [ns]       Longest duration
 -- column: share DOUBLE             Part of the latency of all flows of the path, rounded to 4
 --     places
--- column: total_ns BIGINT [ns]     Sum over all flows; adds up to that of their latencies
--- column: path VARCHAR             Nodes and topics
+-- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to the sum of latencies
+-- column: path VARCHAR [path]  Nodes and topics
+-- brief: path, hop, part, node, what, median_ns, share, p95_ns, max_ns, mean_ns, flows, total_ns,
+--     overlaps
 -- note: clocks
 -- needs: main.end_to_end_part, main.executor_wait, main.flow_path, main.callback_instance,
 --     main.callback_label, main.publisher, main.node, main.process

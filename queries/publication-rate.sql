@@ -1,11 +1,11 @@
 -- name: publication-rate
 -- title: Publication rates and periods
--- description: How many messages publishers published, at what rate, and how regularly. The rate is
---     that between the first and the last publication in the time window.
+-- description: How many messages each publisher published, at what rate, and how regularly. The
+--     rate is taken from the first to the last publication in the time window.
 -- grain: one row per publisher that published
 -- column: run_id BIGINT             Run
--- column: topic_name VARCHAR        Topic
--- column: publisher VARCHAR         Node that published
+-- column: topic_name VARCHAR [topic]  Topic
+-- column: publisher VARCHAR [node]  Node that published
 -- column: count BIGINT              Publications in the time window
 -- column: rate_hz DOUBLE [Hz]       Publications per second
 -- column: period_min_ns BIGINT [ns]     Shortest time from one publication to the next
@@ -15,6 +15,8 @@
 -- column: period_deviation_ns BIGINT [ns]  Standard deviation of these times (jitter)
 -- column: publisher_id BIGINT       Identity of the publisher
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- brief: topic_name, publisher, rate_hz, period_median_ns, period_deviation_ns, period_max_ns,
+--     count, period_p95_ns, period_min_ns
 -- needs: main.publication, main.publisher, main.node, main.process
 WITH published AS (
     SELECT

@@ -2,23 +2,25 @@
 -- title: Reaction time by path
 -- description: How long it takes at most until something that happens shows at the end of a path.
 --     What happens right after an input (the start of a flow) is seen by the next input at the
---     earliest, and shows with the first output that reflects that input or a later one: the
---     reaction time of an interval between two inputs is from the earlier input to that output,
---     the longest for any event in the interval. A lost input delays the reaction to the output
---     of the next. The time window is that of the later input.
+--     earliest. It shows in the first output that reflects that input or a later one. So the
+--     reaction time of an interval between two inputs is from the earlier input to that output: the
+--     longest for any event in the interval. If an input is lost, the reaction waits for an output
+--     of a later one. The time window applies to the later input.
 -- grain: one row per path
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
 --     output
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
 -- column: inputs BIGINT            Inputs in the time window
--- column: intervals BIGINT         Intervals between inputs that the times are from
+-- column: intervals BIGINT         Intervals between inputs that the times are computed from
 -- column: unanswered BIGINT        Inputs that no output followed
--- column: loss_affected BIGINT     Intervals whose input has a gap of a trace in its time
+-- column: loss_affected BIGINT     Intervals with a gap of a trace in the time of their input
 -- column: min_ns BIGINT [ns]       Shortest reaction time
 -- column: median_ns BIGINT [ns]    Median reaction time
 -- column: mean_ns BIGINT [ns]      Mean reaction time
@@ -29,7 +31,9 @@
 -- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR             Nodes and topics
+-- column: path VARCHAR [path]  Nodes and topics
+-- brief: path, inputs, median_ns, p95_ns, max_ns, unanswered, event_mean_ns, p99_ns,
+--     loss_affected, intervals, mean_ns, min_ns
 -- note: clocks
 -- needs: main.flow_path, main.end_to_end
 WITH input AS (

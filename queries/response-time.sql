@@ -1,20 +1,22 @@
 -- name: response-time
 -- title: Response time by path, as CARET counts it
 -- description: The four response times of CARET. An input that does not arrive is answered by the
---     first output of a later one; the inputs that one output answers are its cycle. 'all' is from
---     every input to its output; of every output 'best' is from the newest input of the cycle,
---     'worst' from the oldest, and 'worst-with-external-latency' from the newest input of the
---     cycle before. As in CARET, the earliest output of a path counts for none of them. The time
---     window is that of the input for 'all', else that of the newest input of the cycle. With
---     from_event publish and to_event callback_start it is CARET's own path.
+--     first output of a later one. The inputs that one output answers are its cycle. 'all' is from
+--     every input to its output. The others have one value per output: 'best' from the newest input
+--     of the cycle, 'worst' from the oldest, 'worst-with-external-latency' from the newest input of
+--     the cycle before. As in CARET, the earliest output of a path is left out. The time window
+--     applies to the input for 'all', else to the newest input of the cycle. With --from-event
+--     publish --to-event callback_start the path is measured as CARET does.
 -- grain: one row per path and response time
--- param: from VARCHAR = NULL       Topic where flows start; every source when NULL
--- param: to VARCHAR = NULL         Topic where flows end; wherever they end when NULL
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas (default: any)
+-- param: to VARCHAR = NULL  Topics or nodes where flows end, in the same form (default: any)
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
 --     output
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and most chains per length
+-- param: max_paths BIGINT {1..} = 1000   Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT            Run
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
 -- column: count BIGINT             Response times: inputs for 'all', else outputs
@@ -27,7 +29,8 @@
 -- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
 --     never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR             Nodes and topics
+-- column: path VARCHAR [path]  Nodes and topics
+-- brief: path, response, count, median_ns, p95_ns, max_ns, p99_ns, mean_ns, min_ns
 -- note: clocks
 -- needs: main.flow_path, main.end_to_end
 WITH input AS (

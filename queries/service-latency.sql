@@ -1,28 +1,28 @@
 -- name: service-latency
 -- title: Latency of services by service and client
--- description: How long calls of services took, in all and by part. The round trip is measured on
---     the client's clock alone, from the sending of the request to the take of the response; the
---     ways there and back compare the clocks of client and service, and are negative where those
---     are apart (and by microseconds with Fast DDS, which reports a request after writing it).
---     Every part is measured where both its ends were traced. A request that nobody was seen to
---     take is counted with the only service of that name, if there is one.
+-- description: How long service calls took, in total and by part. The round trip is measured on the
+--     client's clock alone, from the sending of the request to the take of the response. The times
+--     there and back compare the clocks of client and service, and are negative if these are apart
+--     (and by microseconds with Fast DDS, which reports a request after writing it). Every part is
+--     measured if both its ends were traced. A request that no service was seen to take is counted
+--     with the only service of that name, if there is one.
 -- grain: one row per service and client
 -- column: run_id BIGINT               Run
 -- column: service_name VARCHAR        Service
--- column: server VARCHAR              Node of the service; NULL: not known
--- column: client VARCHAR              Node of the client; NULL: not known
+-- column: server VARCHAR [node]  Node of the service; empty: not known
+-- column: client VARCHAR [node]  Node of the client; empty: not known
 -- column: requests BIGINT             Requests sent or taken in the time window
 -- column: answered BIGINT             Requests whose response the client took
 -- column: not_taken BIGINT            Requests that no service was seen to take
--- column: not_answered BIGINT         Requests that were taken, without any sign of a response
+-- column: not_answered BIGINT         Requests that were taken, with no sign of a response
 -- column: not_received BIGINT         Requests whose response was sent, but not seen to be taken
 -- column: negative BIGINT             Requests or responses that were taken before they were sent
--- column: request_median_ns BIGINT [ns]   Median from the sending of the request to its take
+-- column: request_median_ns BIGINT [ns]   Median time from the sending of the request to its take
 -- column: wait_median_ns BIGINT [ns]      Median time from its take to the service callback
 -- column: callback_median_ns BIGINT [ns]  Median duration of the service callback
 -- column: reply_median_ns BIGINT [ns]     Median time from the end of the service callback to the
---     sending of the response; negative where the callback sends it itself
--- column: response_median_ns BIGINT [ns]  Median from the sending of the response to its take
+--     sending of the response; negative if the callback sends it itself
+-- column: response_median_ns BIGINT [ns]  Median time from the sending of the response to its take
 -- column: round_trip_min_ns BIGINT [ns]     Shortest round trip
 -- column: round_trip_median_ns BIGINT [ns]  Median round trip
 -- column: round_trip_mean_ns BIGINT [ns]    Mean round trip
@@ -32,6 +32,9 @@
 -- column: service_id BIGINT           Identity of the service
 -- column: client_id BIGINT            Identity of the client
 -- column: is_internal BOOLEAN         ROS uses the service for itself
+-- brief: service_name, client, round_trip_median_ns, round_trip_p95_ns, round_trip_max_ns,
+--     requests, answered, server, not_taken, not_answered, not_received, callback_median_ns,
+--     wait_median_ns, request_median_ns, response_median_ns, reply_median_ns
 -- note: clocks
 -- needs: main.request, main.response, main.callback_instance, main.service, main.client,
 --     main.node, main.process

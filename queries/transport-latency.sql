@@ -1,14 +1,14 @@
 -- name: transport-latency
 -- title: Latency from publication to take by topic and subscription
--- description: How long messages took from the end of their publication to their take, which
---     includes the time for which the receiving executor was busy with other callbacks. When a
---     message arrived is not in a trace, so that time is given as bounds, those of executor-wait;
+-- description: How long messages took from the end of their publication to their take. That
+--     includes the time for which the receiving executor was busy with other callbacks. A trace
+--     does not say when a message arrived, so this time is given as bounds, those of executor-wait;
 --     the rest was the network or an idle executor. A negative latency means that the clocks of two
---     hosts are apart. Takes without a known publication are counted, not measured.
+--     hosts are apart. Takes without a known publication are counted, but not measured.
 -- grain: one row per topic, receiving node and subscription
 -- column: run_id BIGINT             Run
--- column: topic_name VARCHAR        Topic
--- column: subscriber VARCHAR        Node that received
+-- column: topic_name VARCHAR [topic]  Topic
+-- column: subscriber VARCHAR [node]  Node that received
 -- column: takes BIGINT              Messages received in the time window
 -- column: linked BIGINT             Takes whose publication is known
 -- column: ambiguous BIGINT          Links with more than one candidate
@@ -16,13 +16,15 @@
 -- column: min_ns BIGINT [ns]        Shortest latency
 -- column: median_ns BIGINT [ns]     Median latency
 -- column: mean_ns BIGINT [ns]       Mean latency
--- column: busy_mean_min_ns BIGINT [ns]  Of the mean, executor busy, at least
--- column: busy_mean_max_ns BIGINT [ns]  Of the mean, executor busy, at most
+-- column: busy_mean_min_ns BIGINT [ns]  Part of the mean for which the executor was busy, at least
+-- column: busy_mean_max_ns BIGINT [ns]  Part of the mean for which the executor was busy, at most
 -- column: p95_ns BIGINT [ns]        95 % of the latencies are at most this
 -- column: p99_ns BIGINT [ns]        99 % of the latencies are at most this
 -- column: max_ns BIGINT [ns]        Longest latency
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, busy_mean_min_ns, busy_mean_max_ns,
+--     takes, linked, negative, ambiguous, mean_ns, p99_ns, min_ns
 -- note: clocks
 -- needs: main.take, main.link_transport, main.callback_instance, main.executor_wait,
 --     main.subscription, main.node, main.process

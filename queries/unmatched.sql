@@ -1,9 +1,8 @@
 -- name: unmatched
--- title: Messages without their other side, each with its reason
+-- title: Takes without a publication, and messages that were not taken, each with its reason
 -- description: Every take whose publication is not known, and every message that a subscription of
---     its topic did not take, in the order of time. The query delivery counts them.
+--     its topic did not take, in order of time. The query delivery counts them.
 -- grain: one row per take without a publication, or publication and subscription without a take
--- param: topic VARCHAR = NULL     Only this topic
 -- param: side VARCHAR {take|publication} = NULL   Only takes without a publication, or only
 --     publications without a take
 -- param: reason VARCHAR {before_subscription|subscription_ended|receiver_gap|take_failed|
@@ -12,10 +11,10 @@
 --     = NULL  Only this reason
 -- column: run_id BIGINT           Run
 -- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
--- column: side VARCHAR            'publication' or 'take': what there is
--- column: topic_name VARCHAR      Topic
--- column: publisher VARCHAR       Node that published; NULL: not known
--- column: subscriber VARCHAR      Node that took, or should have taken
+-- column: side VARCHAR            'publication' or 'take': the side that is known
+-- column: topic_name VARCHAR [topic]  Topic
+-- column: publisher VARCHAR [node]  Node that published; empty: not known
+-- column: subscriber VARCHAR [node]  Node that took, or should have taken
 -- column: status VARCHAR          'skipped', 'lost', 'unconnected', 'unknown', as in delivery;
 --     'orphan': a take without a publication
 -- column: reason VARCHAR          Why the other side is missing
@@ -24,6 +23,7 @@
 -- column: take_id BIGINT          Identity of the take
 -- column: subscription_id BIGINT  Identity of the subscription
 -- column: is_internal BOOLEAN     ROS uses the topic for itself
+-- brief: at_ns, topic_name, side, status, reason, subscriber, publisher, publication_id, take_id
 -- needs: main.stat_delivery, main.stat_orphan, main.publication, main.publisher, main.take,
 --     main.subscription, main.node, main.process
 WITH missing AS (
@@ -73,7 +73,6 @@ LEFT JOIN process_node AS bp ON b.process_id = bp.process_id
 WHERE list_contains($runs, m.run_id)
     AND m.at_ns >= $start_ns
     AND m.at_ns < $end_ns
-    AND ($topic IS NULL OR coalesce(s.topic_name, b.topic_name) = $topic)
     AND ($side IS NULL OR m.side = $side)
     AND ($reason IS NULL OR m.reason = $reason)
 ORDER BY m.run_id, m.at_ns, m.side, m.publication_id, m.take_id, m.subscription_id

@@ -1,33 +1,36 @@
 -- name: waits
 -- title: Waits of callbacks, one by one
--- description: For every callback instance the time since the end of the publication of its message
---     (or since the timer was due, or the request was sent), how much of it the executor was busy
---     with other callbacks, as bounds, and with which. Those nested in others have no wait of
---     their own.
+-- description: For every callback instance: the time since the end of the publication of its
+--     message (or since the timer was due, or the request was sent), for how much of it the
+--     executor was busy with other callbacks, as bounds, and with which. Instances nested in others
+--     are left out.
 -- grain: one row per callback instance that is not nested in another
--- param: callback_id BIGINT = NULL  Only instances of this callback, see executor-wait
--- param: min_busy_ns BIGINT {0..} = 0  Only where the executor may have been busy that
+-- param: callback_id BIGINT = NULL  Only instances of this callback_id (query executor-wait lists
+--     them)
+-- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
 --     long [ns]
 -- column: run_id BIGINT             Run
 -- column: start_ns BIGINT [epoch ns]  Start of the callback
--- column: node VARCHAR              Node of the callback
--- column: callback VARCHAR          What triggers it
+-- column: node VARCHAR [node]  Node of the callback
+-- column: callback VARCHAR [callback]  What triggers it
 -- column: since VARCHAR             Where the wait begins: 'publication', 'stamp', 'request' or
---     'timer'; NULL: not known
+--     'timer'; empty: not known
 -- column: wait_ns BIGINT [ns]       From there to the start of the callback
 -- column: busy_min_ns BIGINT [ns]   Executor busy with others meanwhile, at least
 -- column: busy_max_ns BIGINT [ns]   Executor busy with others meanwhile, at most
 -- column: rest_min_ns BIGINT [ns]   Network, idle or overhead, at least
 -- column: rest_max_ns BIGINT [ns]   Network, idle or overhead, at most
--- column: meanwhile VARCHAR         What ran meanwhile and how long, the longest first, with
---     its node where it is another
+-- column: meanwhile VARCHAR         What ran meanwhile and for how long, the longest first, with
+--     its node if it is another one
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- column: callback_instance_id BIGINT  Identity of the callback instance
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
+-- slowest: wait_ns
+-- brief: start_ns, node, callback, wait_ns, busy_max_ns, meanwhile, busy_min_ns, since,
+--     rest_max_ns, rest_min_ns, callback_instance_id
 -- note: clocks
--- needs: main.executor_wait, main.executor_interference, main.callback_instance,
---     main.callback_label
+-- needs: main.executor_wait, main.executor_interference, main.callback_label
 WITH waited AS (
     SELECT
         run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
@@ -40,16 +43,11 @@ WITH waited AS (
         AND coalesce(busy_max_ns, busy_min_ns) >= $min_busy_ns
 ),
 pair AS (
-    SELECT
-        i.callback_instance_id,
-        w.callback_id,
-        r.callback_id AS meanwhile_id,
-        sum(i.overlap_ns) AS overlap_ns
-    FROM main.executor_interference AS i
-    JOIN waited AS w ON i.callback_instance_id = w.callback_instance_id
-    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
-    WHERE i.overlap_ns > 0
-    GROUP BY i.callback_instance_id, w.callback_id, r.callback_id
+    -- Of bursts there are far more pairs than rows of the answer: summed up before they are joined.
+    SELECT callback_instance_id, meanwhile_callback_id, sum(overlap_ns) AS overlap_ns
+    FROM main.executor_interference
+    WHERE list_contains($runs, run_id) AND overlap_ns > 0
+    GROUP BY callback_instance_id, meanwhile_callback_id
 ),
 meanwhile AS (
     SELECT
@@ -57,11 +55,12 @@ meanwhile AS (
         string_agg(
             CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
             || printf('%s %.3f ms', o.label, p.overlap_ns / 1e6),
-            ', ' ORDER BY p.overlap_ns DESC, p.meanwhile_id
+            ', ' ORDER BY p.overlap_ns DESC, p.meanwhile_callback_id
         ) AS names
     FROM pair AS p
-    JOIN main.callback_label AS l ON p.callback_id = l.callback_id
-    JOIN main.callback_label AS o ON p.meanwhile_id = o.callback_id
+    JOIN waited AS w ON p.callback_instance_id = w.callback_instance_id
+    JOIN main.callback_label AS l ON w.callback_id = l.callback_id
+    JOIN main.callback_label AS o ON p.meanwhile_callback_id = o.callback_id
     GROUP BY p.callback_instance_id
 )
 SELECT

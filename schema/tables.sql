@@ -12,7 +12,7 @@ CREATE TABLE store.definition (
 CREATE TABLE store.run (
     run_id          BIGINT PRIMARY KEY,          -- Identity of the run
     name            VARCHAR NOT NULL,            -- Name given by the user, or the name of the first trace directory
-    created_at      TIMESTAMP WITHOUT TIME ZONE NOT NULL, -- When the run was ingested, UTC
+    created_at      TIMESTAMP NOT NULL,          -- When the run was ingested, UTC
     msgflow_version VARCHAR NOT NULL,            -- Version of msgflow that ingested the run
     derivation_hash VARCHAR NOT NULL,            -- SHA-256 of the SQL that derived the links
     start_ns        BIGINT,                      -- First event of any trace [epoch ns]

@@ -55,7 +55,7 @@ said AS (
         coalesce(v.reason, v.status, 'no row') AS said,
         CASE
             WHEN v.reason = 'receiver_gap' THEN CASE WHEN d.is_in_hole THEN 'events are missing' END
-            WHEN v.reason = 'unknown' AND d.is_unclear THEN 'events are missing'
+            WHEN v.reason = 'unknown' AND d.unclear IS NOT NULL THEN d.unclear
             ELSE d.undecided
         END AS undecided
     FROM truth_drop AS d
@@ -72,7 +72,8 @@ said AS (
         v.reason,
         CASE
             -- The take is there; what would tell its message is not.
-            WHEN v.reason = 'unknown' AND t.is_unclear AND NOT t.is_decided
+            WHEN v.reason = 'unknown' AND NOT t.is_decided
+                AND (t.unclear IS NOT NULL OR t.cause = 'recorded')
                 THEN 'the link is not decided'
             -- Where a gap may hide the better partner, a message in a ring buffer has no link.
             WHEN v.reason = 'receiver_gap' AND t.is_in_hole AND NOT t.is_decided

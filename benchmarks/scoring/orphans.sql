@@ -36,7 +36,8 @@ orphan AS (
 matched AS (
     SELECT
         o.take_id, o.reason, any_value(m.truth) AS truth, bool_or(m.is_undecided) AS is_undecided,
-        bool_or(m.is_in_hole) AS is_in_hole, bool_or(m.has_absent) AS has_absent
+        bool_or(m.is_in_hole) AS is_in_hole, bool_or(m.is_beside_hole) AS is_beside_hole,
+        bool_or(m.has_absent) AS has_absent, bool_or(m.is_unnamed) AS is_unnamed
     FROM orphan AS o
     JOIN truth_time AS t
         ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
@@ -51,6 +52,11 @@ SELECT
         -- Taken from a ring buffer, with a hole in between.
         WHEN m.truth = 'recorded' AND m.reason = 'publisher_gap' AND m.is_in_hole
             THEN 'events are missing'
+        WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_beside_hole
+            THEN 'events are missing'
+        -- Whoever publishes anything may have sent a message of a topic that is not known.
+        WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_unnamed
+            THEN 'initialisation is missing'
         WHEN m.is_undecided AND m.reason IN ('ambiguous', 'unknown') THEN 'the link is not decided'
         -- One of them was recorded, and another one that was not may have sent it.
         WHEN m.reason = 'unknown' AND m.has_absent THEN 'several publishers'

@@ -1,6 +1,10 @@
 -- What became of the messages of a simulation, and what of that the trace decides. Nothing is
 -- excused but by a hole (see holes.sql) in the very time that the reason is about.
 
+-- Whether takes have an event of their own (not before Humble).
+CREATE OR REPLACE TEMP TABLE truth_layout AS
+SELECT coalesce(bool_or(event = 'ros2:rmw_take'), false) AS has_take FROM simulated_declared;
+
 -- Each message and subscription of its topic, on the clock of the subscription: when it could be
 -- taken at the earliest (NULL: the trace does not tell how far the clocks are apart); since when
 -- nothing of its publisher was; and when a later message of its publisher was, as the trace tells.
@@ -77,32 +81,34 @@ ASOF LEFT JOIN taken AS n
     AND coalesce(p.publisher_handle, 0) = coalesce(n.publisher_handle, 0)
     AND p.sent_ns < n.sent_ns;
 
--- Pairs of which the trace may not tell what became of them: the take may be in a hole; it may be
--- one of those that are recorded, but whose message the trace does not tell; or whether the two
--- knew each other shows in a hole only.
+-- Pairs of which the trace may not show what became of them, and why: nothing joins the clocks of
+-- the two hosts; the take may be in a hole, or whether the two knew each other shows in a hole only;
+-- or the take may be one of those whose message the trace does not show.
 CREATE OR REPLACE TEMP TABLE truth_excuse AS
 WITH unidentified AS (
     SELECT t.subscription_id, coalesce(t.dequeue_ns, t.rmw_ns) AS taken_ns
     FROM truth_link AS l
     JOIN simulated_take AS t ON l.to_id = t.take_id::VARCHAR
     JOIN truth_link AS r ON r.kind = 'take' AND l.to_id = r.to_id
-    WHERE l.kind = 'transport' AND NOT l.is_decided AND r.is_decided
+    WHERE l.kind = 'transport' AND NOT l.is_decided
+        AND (r.is_decided OR (SELECT NOT has_take FROM truth_layout))
 )
 SELECT
     p.publication_id, p.subscription_id,
     coalesce(
         bool_or(p.arrival_ns IS NULL OR h.end_ns > p.arrival_ns) FILTER (h.host IS NOT NULL), false
     ) AS is_in_hole,
-    bool_or(h.host IS NOT NULL OR p.arrival_ns IS NULL)
-    OR bool_or(
-        (p.subscription_id, p.publication_id) IN (
+    CASE
+        WHEN bool_or(p.arrival_ns IS NULL) THEN 'clocks are apart'
+        WHEN bool_or(h.host IS NOT NULL) THEN 'events are missing'
+        WHEN (p.subscription_id, p.publication_id) IN (
             SELECT (a.subscription_id, a.publication_id)
             FROM truth_pair AS a
             JOIN unidentified AS u
                 ON a.subscription_id = u.subscription_id
                 AND u.taken_ns BETWEEN a.arrival_ns AND a.until_ns
-        )
-    ) AS is_unclear
+        ) THEN 'takes of unknown messages'
+    END AS unclear
 FROM truth_pair AS p
 LEFT JOIN truth_hole AS h
     ON p.host = h.host AND coalesce(p.pid = h.pid, true)
@@ -161,7 +167,7 @@ nameless AS (
 )
 SELECT
     u.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
-    u.reason, u.is_internal, x.is_in_hole, x.is_unclear,
+    u.reason, u.is_internal, x.is_in_hole, x.unclear,
     CASE
         WHEN (p.host, p.pid) IN (SELECT (host, pid) FROM unnamed)
             OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
@@ -220,7 +226,7 @@ SELECT
     t.publication_id::VARCHAR AS publication_id, s.host, s.pid, s.subscription_handle, s.life,
     coalesce(any_value(u.cause), 'recorded') AS cause,
     bool_or(x.is_in_hole) AS is_in_hole,
-    bool_or(x.is_unclear) AS is_unclear,
+    any_value(x.unclear) AS unclear,
     bool_or(coalesce(l.is_decided, false)) AS is_decided
 FROM simulated_take AS t
 JOIN truth_pair AS s
@@ -277,6 +283,19 @@ absent AS (
     WHERE s.topic_name IN (FROM shared_topic)
         OR EXISTS (FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\')
 ),
+-- Stamped while events of the host were lost: what says who sent it may be missing.
+beside_hole AS (
+    SELECT t.take_id
+    FROM simulated_take AS t
+    JOIN sent AS s ON t.publication_id = s.publication_id
+    -- The stamp is of another clock than the hole.
+    JOIN truth_hole AS h
+        ON s.host = h.host
+        AND s.stamped_ns + 1_000_000 > h.begin_ns AND s.stamped_ns - 1_000_000 < h.end_ns
+),
+unnamed AS (
+    SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+),
 decided AS (
     SELECT to_id, bool_or(is_decided) AS is_decided
     FROM truth_link
@@ -295,7 +314,8 @@ hidden AS (
 SELECT
     t.take_id::VARCHAR AS take_id,
     CASE
-        WHEN t.method = 'callback_only' THEN 'no event'
+        WHEN t.method = 'callback_only' OR NOT y.has_take AND t.method <> 'ring_buffer'
+            THEN 'no event'
         WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
         -- What there is of a packet that is cut may have been read.
         WHEN k.cause = 'truncation' AND u.cause IS NOT NULL THEN concat('taken or sent, ', u.cause)
@@ -306,8 +326,11 @@ SELECT
     k.cause IS NULL AND u.cause IS NULL AND t.method <> 'callback_only' AND NOT d.is_decided
         AS is_undecided,
     t.take_id IN (FROM hidden) AS is_in_hole,
+    t.take_id IN (FROM beside_hole) AS is_beside_hole,
+    (t.host, t.pid) IN (FROM unnamed) AS is_unnamed,
     t.publication_id IN (FROM absent) AS has_absent
 FROM simulated_take AS t
+CROSS JOIN truth_layout AS y
 JOIN simulated_transport AS x ON t.take_id = x.take_id
 JOIN sent AS s ON t.publication_id = s.publication_id
 LEFT JOIN decided AS d ON t.take_id::VARCHAR = d.to_id

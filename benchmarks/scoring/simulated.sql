@@ -187,9 +187,9 @@ twin AS (
             IS DISTINCT FROM (b.publisher_handle, b.host, b.pid)
     GROUP BY a.publication_id
 ),
-message AS (
+asked AS (
     SELECT
-        t.publication_id, t.take_id,
+        t.publication_id, t.take_id, t.publication_host,
         CASE
             WHEN t.method = 'ring_buffer' THEN 'derive.link_transport_ring_buffer'
             WHEN is_rmw_stamped OR is_dds_stamped THEN 'derive.link_transport_exact'
@@ -234,6 +234,16 @@ message AS (
     JOIN recorded AS p ON p.kind = 'publication' AND t.publication_id::VARCHAR = p.id
     JOIN recorded AS r ON r.kind = 'take' AND t.take_id::VARCHAR = r.id
     JOIN simulated_publication AS s ON t.publication_id = s.publication_id
+),
+-- By time alone messages are told together: fewer of a host than these may agree by chance.
+message AS (
+    SELECT
+        publication_id, take_id, needs,
+        is_decided AND (
+            needs <> 'derive.link_transport_nearest'
+            OR count(*) FILTER (is_decided) OVER (PARTITION BY publication_host, needs) >= 8
+        ) AS is_decided
+    FROM asked
 ),
 -- Nothing pairs across a gap: no hole of the CPUs on which the thread was seen while a callback
 -- ran, or of its process, lies within it; nor any behind its start, where it is not seen to end.

@@ -20,11 +20,15 @@ from msgflow.cli import (
     info,
     ingest,
     links,
+    paths,
     query,
     report,
+    runs,
     simulate,
     sql,
+    targets,
     ui,
+    verify,
 )
 from msgflow.cli.root import RootGroup
 from msgflow.version import __version__
@@ -47,11 +51,15 @@ app.command("graph")(graph.command)
 app.command("ui")(ui.command)
 app.command("report")(report.command)
 app.command("compare")(compare.command)
+app.command("verify")(verify.command)
+app.add_typer(targets.app, name="targets")
 app.command("events")(events.command)
 app.command("sql")(sql.command)
 app.command("info")(info.command)
 app.command("check")(check.command)
+app.add_typer(runs.app, name="runs")
 app.add_typer(links.app, name="links")
+app.add_typer(paths.app, name="paths")
 app.add_typer(clocks.app, name="clocks")
 app.add_typer(export.app, name="export")
 app.add_typer(db.app, name="db")

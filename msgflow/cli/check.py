@@ -38,9 +38,10 @@ def command(
     ] = CheckFormat.TABLE,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Tell what is wrong with a recording, with cause and cure; exit code 1 when there are errors.
+    """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
-    Warnings alone leave the exit code at 0.
+    With warnings only, the exit code is 0. An audit of the database that failed
+    when the run was ingested (msgflow db check) is a finding too.
     """
     from msgflow.cli.output import count, print_lines, print_status
     from msgflow.database import Database

@@ -12,14 +12,15 @@ from msgflow.cli.options import (
     FormatOption,
     OutputOption,
     RunOption,
+    WideOption,
 )
 
-app = typer.Typer(help="Bring the clocks of several hosts together.")
+app = typer.Typer(help="Synchronise the clocks of several hosts.")
 
 
 @app.callback()
 def group() -> None:
-    """Bring the clocks of several hosts together."""
+    """Synchronise the clocks of several hosts."""
 
 
 @app.command("apply")
@@ -35,7 +36,7 @@ def apply(
     run: RunOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Correct the clocks of a run in place of any correction before; reads no trace."""
+    """Correct the clocks of a run, replacing any earlier correction; reads no trace."""
     from msgflow.cli.output import print_note, print_runs, print_status
     from msgflow.database import Database
 
@@ -64,29 +65,31 @@ def apply(
 def show(
     run: RunOption = None,
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the clocks and how their times are corrected: the query clocks."""
+    """List the clocks and their corrections (the query clocks)."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
         result = opened.query("clocks", run=run)
-    print_result(result, form, output)
+    print_result(result, form, output, wide=wide)
 
 
 @app.command("pairs")
 def pairs(
     run: RunOption = None,
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Count the messages and packets that tell how far clocks are apart: the query clock-pairs."""
+    """Count the messages and packets that clocks are corrected by (the query clock-pairs)."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
         result = opened.query("clock-pairs", run=run)
-    print_result(result, form, output)
+    print_result(result, form, output, wide=wide)

@@ -9,15 +9,20 @@ import typer
 
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
+    OUTPUT,
     SELECTION,
     DatabaseOption,
     FormatOption,
     InternalOption,
     OutputOption,
+    WideOption,
 )
 from msgflow.errors import ExitCode
+from msgflow.export.formats import Format
 
 _METHOD = "How it is estimated"
+# On a terminal: paths are long.
+_MOST_ROWS = 10
 
 
 class Thing(StrEnum):
@@ -38,14 +43,14 @@ class Case(StrEnum):
 
 
 def command(
-    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Run to compare with: name or id")],
-    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="Run that is compared with it")],
+    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Baseline run: name or id")],
+    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="Run to compare with it")],
     what: Annotated[
         Thing,
         typer.Option(
             "--what",
-            help="Latency end to end by path, duration by callback, or from publication to take by"
-            " topic",
+            help="End-to-end latency of paths, duration of callbacks, or time from publication to"
+            " take of topics",
             rich_help_panel=SELECTION,
         ),
     ] = Thing.PATHS,
@@ -75,7 +80,7 @@ def command(
             "--skip-first",
             metavar="SECONDS",
             min=0,
-            help="Leave out the begin of each run, where the system warms up",
+            help="Skip the first SECONDS of each run (warm-up)",
             rich_help_panel=SELECTION,
         ),
     ] = 0.0,
@@ -95,7 +100,7 @@ def command(
             "--max-paths",
             metavar="N",
             min=1,
-            help="Most paths, shortest first, and most chains per length",
+            help="Maximum number of paths, shortest first; also the limit on chains of each length",
             rich_help_panel=SELECTION,
         ),
     ] = 1_000,
@@ -105,14 +110,26 @@ def command(
         typer.Option(
             "--fail-on",
             metavar="CONDITION",
-            help="Exit with 1 where run B exceeds run A by more: 'p95>5%', 'median>2ms', of median,"
-            " mean, p95, p99, max; or where less arrives: 'share<-1%'; several may be given",
+            help="Exit with 1 if run B exceeds run A by more than that: 'p95>5%', 'median>2ms'"
+            " (median, mean, p95, p99 or max), or if less arrives: 'share<-1%'; may be repeated",
+        ),
+    ] = None,
+    only_different: Annotated[
+        bool | None,
+        typer.Option(
+            "--only-different/--all",
+            help="One row for each path, callback or topic: those that differ, or all",
+            show_default="on a terminal those that differ; else every statistic",
+            rich_help_panel=OUTPUT,
         ),
     ] = None,
     confidence: Annotated[
         float,
         typer.Option(
-            "--confidence", metavar="SHARE", help="Of the intervals", rich_help_panel=_METHOD
+            "--confidence",
+            metavar="SHARE",
+            help="Confidence level of the intervals",
+            rich_help_panel=_METHOD,
         ),
     ] = 0.95,
     resamples: Annotated[
@@ -120,26 +137,28 @@ def command(
         typer.Option(
             "--resamples",
             metavar="N",
-            help="Resamples that the intervals are from",
-            show_default="1000, or 20 / (1 - confidence)",
+            help="Number of resamples for the intervals; 0 for no intervals",
+            show_default="1000, or 20 / (1 - confidence) if that is more",
             rich_help_panel=_METHOD,
         ),
     ] = None,
     seed: Annotated[
         int,
-        typer.Option("--seed", help="Of the resampling", rich_help_panel=_METHOD),
+        typer.Option("--seed", help="Random seed", rich_help_panel=_METHOD),
     ] = 0,
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Compare run B with run A: medians, means, percentiles, and whether it may be chance.
 
-    low and high enclose the difference with the given confidence, as far as chance within these two
-    recordings goes. The verdict is that B is longer or shorter where they have one sign. It does
-    not tell how much the same system differs when it is started again.
+    low and high enclose the difference with the given confidence. If both have
+    the same sign, the verdict is that B is longer or shorter. This concerns
+    chance within these two recordings only: it does not say how much the same
+    system differs when it is started again.
     """
-    from msgflow.cli.output import print_error, print_result
+    from msgflow.cli.output import is_screen, print_error, print_result
     from msgflow.database import Database
     from msgflow.query.compare import parse_conditions
 
@@ -160,7 +179,11 @@ def command(
             max_depth=max_depth,
             max_paths=max_paths,
         )
-    print_result(comparison.result, form, output)
+    result = comparison.result
+    is_table = form in (None, Format.TABLE) and output is None
+    if only_different is not None or (is_table and not wide and is_screen()):
+        result = comparison.changes(only_different=only_different is not False)
+    print_result(result, form, output, wide=wide, most_rows=_MOST_ROWS)
     failures = comparison.failures(fail_on or [])
     for failure in failures:
         print_error(f"{failure.condition}: {failure.reason} — {failure.subject}")

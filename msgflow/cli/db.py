@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import typer
 
-from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption, FormatOption, OutputOption
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    DatabaseOption,
+    FormatOption,
+    OutputOption,
+    WideOption,
+)
 from msgflow.errors import ExitCode
 
-app = typer.Typer(help="Look after a database file.")
+app = typer.Typer(help="Check, upgrade and describe a database file.")
 
 
 @app.callback()
 def group() -> None:
-    """Look after a database file."""
+    """Check, upgrade and describe a database file."""
 
 
 @app.command("upgrade")
 def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
-    """Bring a database to the schema and the views of this msgflow."""
+    """Upgrade a database to the schema and views of this version of msgflow."""
     from msgflow.cli.output import count, print_status
     from msgflow.db.migrate import upgrade as upgrade_database
 
@@ -33,13 +39,18 @@ def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
 @app.command("check")
 def check(
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Audit the content; exit code 1 when a check finds an error."""
+    """Audit the database itself: whether its tables agree with each other.
+
+    What is wrong with a recording, with cause and cure, is shown by `msgflow check`. The exit code
+    is 1 when an audit finds an error.
+    """
     import pyarrow
 
-    from msgflow.cli.output import print_result
+    from msgflow.cli.output import is_screen, print_note, print_result
     from msgflow.database import Database
     from msgflow.query.result import QueryResult
 
@@ -53,7 +64,12 @@ def check(
             "description": pyarrow.array([result.description for result in results], "string"),
         }
     )
-    print_result(QueryResult(table), form, output)
+    is_short = form is None and output is None and not wide and is_screen()
+    columns = "check,severity,offending_rows" if is_short else None
+    print_result(QueryResult(table), form, output, wide=wide, columns=columns)
+    for result in results:
+        if is_short and result.row_count:
+            print_note(f"{result.name} does not hold: {result.description}")
     if any(result.row_count and result.severity == "error" for result in results):
         raise typer.Exit(ExitCode.FAILED)
 
@@ -61,6 +77,7 @@ def check(
 @app.command("schema")
 def schema(
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -70,4 +87,4 @@ def schema(
 
     with Database(database) as opened:
         result = opened.schema()
-    print_result(result, form, output)
+    print_result(result, form, output, wide=wide)

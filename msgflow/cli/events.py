@@ -45,7 +45,7 @@ def command(
         typer.Option(
             "--start",
             metavar="TIME",
-            help="First time to list: 2.5s from the begin of the trace, epoch ns, or ISO time",
+            help="Start of the listing: 2.5s from the start of the trace, epoch ns, or ISO time",
             rich_help_panel=SELECTION,
         ),
     ] = None,
@@ -54,21 +54,21 @@ def command(
         typer.Option(
             "--end",
             metavar="TIME",
-            help="Time at which the listing ends, written likewise",
+            help="End of the listing, in the same formats as --start",
             rich_help_panel=SELECTION,
         ),
     ] = None,
     count: Annotated[
         bool,
         typer.Option(
-            "--count", help="Print how often each event occurs instead", rich_help_panel=OUTPUT
+            "--count", help="Print only how often each event occurs", rich_help_panel=OUTPUT
         ),
     ] = False,
     form: Annotated[
         EventFormat | None,
         typer.Option(
             "--format",
-            help="How to write them",
+            help="Output format",
             show_default="by the suffix of PATH, else text, parquet for a directory",
             rich_help_panel=OUTPUT,
         ),
@@ -85,14 +85,15 @@ def command(
             rich_help_panel=OUTPUT,
         ),
     ] = None,
-    reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
+    reader: Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")] = (
         Reader.AUTO
     ),
-    strict: Annotated[bool, typer.Option("--strict", help="End at the first damage")] = False,
+    strict: Annotated[bool, typer.Option("--strict", help="Stop at the first damage")] = False,
 ) -> None:
-    """List the events of traces in order of time, whatever they are.
+    """List the events of any CTF traces in order of time.
 
-    A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and fields.
+    A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and
+    fields.
     """
     from msgflow import trace
     from msgflow.cli.output import count as counted

@@ -31,7 +31,9 @@ app = typer.Typer(help="Write the content of a database to files.")
 _DirectoryArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing")]
 _ViewsArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="VIEW", help="All public views if none (msgflow db schema)"),
+    typer.Argument(
+        metavar="VIEW", help="Public views to export, see msgflow db schema (default: all)"
+    ),
 ]
 _RunOption = Annotated[
     str,
@@ -56,11 +58,13 @@ def parquet(
     force: _ForceOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write public views to DIR/VIEW/run_id=ID/data.parquet, all of them or none.
+    """Write public views to DIR/VIEW/run_id=ID/data.parquet.
 
-    Each file tells view, schema revision and version of msgflow in its metadata.
+    If anything fails, nothing is written. The metadata of each file have the view,
+    the schema revision and the version of msgflow.
 
-    A time window cuts what happened (a link, where its cause did); objects stay.
+    A time window selects what happened in it (links by their cause); objects are
+    always written.
     """
     from msgflow.database import Database
 
@@ -88,11 +92,12 @@ def csv(
     force: _ForceOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write public views to DIR/VIEW.csv, all of them or none.
+    """Write public views to DIR/VIEW.csv. If anything fails, nothing is written.
 
-    Text stands in quotes, a missing value is an empty field without.
+    Text is quoted; a missing value is an empty field without quotes.
 
-    A time window cuts what happened (a link, where its cause did); objects stay.
+    A time window selects what happened in it (links by their cause); objects are
+    always written.
     """
     from msgflow.database import Database
 
@@ -127,12 +132,13 @@ def perfetto(
     skip_first: SkipFirstOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, which reads it in the browser).
+    """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, in the browser).
 
-    Callbacks, publications, takes, requests and responses on the tracks of their threads, states
-    of executors, arrows for all links, counters for rates and for messages not yet taken.
+    Each thread is a track with its callbacks, publications, takes, requests and
+    responses. Also: executor states, arrows for all links, gaps, and counters for
+    rates and for messages not yet taken.
 
-    It needs the package perfetto: msgflow's extra of that name.
+    Needs the package perfetto (msgflow's extra of that name).
     """
     from msgflow.cli.output import count, print_runs, print_status
     from msgflow.database import Database
@@ -151,13 +157,13 @@ def perfetto(
 def series(
     output: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="FILE.csv or FILE.parquet, replaced when it exists"),
+        typer.Argument(metavar="FILE", help="FILE.csv or FILE.parquet; replaced if it exists"),
     ],
     what: Annotated[
         What,
         typer.Option(
             "--what",
-            help="Latency of paths, duration of callbacks, or latency from publication to take of"
+            help="Latency of paths, duration of callbacks, or time from publication to take of"
             " topics",
             rich_help_panel=SELECTION,
         ),
@@ -177,7 +183,7 @@ def series(
     ] = Times.RELATIVE,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write measured values side by side: a row per moment, a column per path or other thing.
+    """Write measured values side by side: one row per moment, one column per path.
 
     PlotJuggler and spreadsheets draw such files: the first column is the time.
     """

@@ -47,8 +47,8 @@ def command(
         typer.Option(
             "--at",
             metavar="TIME",
-            help="First message on the topic at or after: 2.5s from the start of the run, epoch ns,"
-            " or ISO time",
+            help="First message on the topic at or after TIME: seconds from the start of the run,"
+            " ISO time, or epoch ns (16 digits or more)",
             show_default="its first message",
             rich_help_panel=_START,
         ),
@@ -83,7 +83,7 @@ def command(
         Direction,
         typer.Option(
             "--direction",
-            help="What it caused, what it was caused by, or both",
+            help="Follow what it caused, what caused it, or both",
             rich_help_panel=SELECTION,
         ),
     ] = Direction.BOTH,
@@ -93,7 +93,7 @@ def command(
             "--depth",
             metavar="N",
             min=0,
-            help="Most messages in a row, each way",
+            help="Maximum number of messages in a row, each way",
             rich_help_panel=SELECTION,
         ),
     ] = 32,
@@ -104,7 +104,8 @@ def command(
             metavar="N",
             min=1,
             max=10_000,
-            help="Most publications, takes, callback instances, requests and responses",
+            help="Maximum number of publications, takes, callback instances, requests and"
+            " responses",
             rich_help_panel=SELECTION,
         ),
     ] = 1_000,
@@ -113,7 +114,7 @@ def command(
         bool,
         typer.Option(
             "--absolute",
-            help="Points in time (UTC), not the time since the begin of the flow",
+            help="Show points in time (UTC) instead of times since the first line",
             rich_help_panel=OUTPUT,
         ),
     ] = False,
@@ -132,22 +133,25 @@ def command(
         typer.Option(
             "--html",
             metavar="FILE.html",
-            help="Write its timeline into one file that any browser opens, and print nothing",
+            help="Write its timeline to one file for any browser, and print nothing",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Print the flow of one message: what it was caused by, and what it caused.
+    """Print the flow of one message: what caused it, and what it caused.
 
-    A line is a publication, a message taken with the callback instance it was for, a request, or a
-    response taken by its client.
+    A line is a publication, a taken message with its callback, a request, or a
+    response that its client took.
 
-    Times count from the first line. NA is what the trace does not show.
+    Times count from the first line. NA means that the trace does not show it.
     """
     from msgflow.cli.output import print_note, print_runs, print_status, print_text
     from msgflow.database import Database
+    from msgflow.export.formats import by_suffix
 
+    if form is None and output is not None and output.suffix:
+        form = by_suffix(output, {".txt": FlowFormat.TABLE, ".json": FlowFormat.JSON})
     if html is not None and html.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"a page has a name that ends with .html — {html}", "--html FILE.html")
     if html is not None and (output is not None or form is not None):
@@ -172,10 +176,7 @@ def command(
     if size is not None:
         print_status(f"{size:,} bytes written to {html}: open it in a browser")
         return
-    is_json = form is FlowFormat.JSON or (
-        form is None and output is not None and output.suffix.lower() == ".json"
-    )
-    if is_json:
+    if form is FlowFormat.JSON:
         print_text(lambda width, color: flow.to_json(), output)
     else:
         from msgflow.export.flow_tree import tree_text

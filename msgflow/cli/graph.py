@@ -30,7 +30,7 @@ def command(
         GraphFormat | None,
         typer.Option(
             "--format",
-            help="A language, or a picture",
+            help="A graph language, or a picture (svg)",
             show_default="by the suffix of FILE, else dot",
             rich_help_panel=OUTPUT,
         ),
@@ -40,9 +40,10 @@ def command(
 ) -> None:
     """Write the graph of nodes, topics and services, with rates and latencies.
 
-    Topics have their rate, arrows to receivers median and p95 from publication to take, arrows to
-    services those of the round trip. Dashed (periodic_async) and dotted (partial_sync) is what an
-    indirect link leads to; nodes of one executor stand together.
+    Topics show their rate. Arrows to receivers show median and p95 from
+    publication to take, arrows to services those of the round trip. Dashed
+    (periodic_async) and dotted (partial_sync) arrows lead to what an indirect
+    link causes. Nodes of one executor stand together.
     """
     from msgflow.cli.output import print_note, print_runs, print_text
     from msgflow.database import Database

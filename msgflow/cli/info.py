@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     DatabaseOption,
     InternalOption,
     RunOption,
+    WideOption,
 )
 
 if TYPE_CHECKING:
@@ -37,15 +38,16 @@ def command(
     run: RunOption = None,
     internal: InternalOption = False,
     form: Annotated[
-        InfoFormat, typer.Option("--format", help="How to write it", rich_help_panel=OUTPUT)
+        InfoFormat, typer.Option("--format", help="Output format", rich_help_panel=OUTPUT)
     ] = InfoFormat.TABLE,
+    wide: WideOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
 
     Each section is a named query, `msgflow query info-topics` for instance.
     """
-    from msgflow.cli.output import print_lines, print_note
+    from msgflow.cli.output import is_screen, print_lines, print_note, screen_width
     from msgflow.database import Database
 
     with Database(database) as opened:
@@ -55,7 +57,10 @@ def command(
             )
             for section in SECTIONS
         }
-    lines = _json(results) if form is InfoFormat.JSON else _sections(results, form)
+    if form is InfoFormat.TABLE and is_screen() and not wide:
+        lines = _for_screen(results, screen_width())
+    else:
+        lines = _json(results) if form is InfoFormat.JSON else _sections(results, form)
     print_lines(lines)
     for section, result in results.items():
         for note in result.notes:
@@ -71,6 +76,22 @@ def _json(results: dict[str, QueryResult]) -> Iterator[str]:
         comma = "," if position < len(results) else ""
         yield f"  {json.dumps(section)}: [{rows}]{comma}"
     yield "}"
+
+
+def _for_screen(results: dict[str, QueryResult], width: int) -> Iterator[str]:
+    from msgflow.query.present import present
+    from msgflow.query.screen import screen_lines
+    from msgflow.query.wrapping import wrap
+
+    for position, (section, result) in enumerate(results.items()):
+        if position:
+            yield ""
+        yield section.upper()
+        shown = present(result, width)
+        yield from screen_lines(shown, width)
+        notes = shown.notes if len(result) else ("none",)
+        for note in notes:
+            yield from wrap(f"({note})", width)
 
 
 def _sections(results: dict[str, QueryResult], form: InfoFormat) -> Iterator[str]:

@@ -38,20 +38,22 @@ def command(
         typer.Option("--name", help="Name of the run", show_default="from the path"),
     ] = None,
     replace: Annotated[
-        bool, typer.Option("--replace", help="Replace the run that holds these traces already")
+        bool, typer.Option("--replace", help="Replace the run that already holds these traces")
     ] = False,
     host: Annotated[
         list[str] | None,
         typer.Option(
             "--host",
             metavar="NAME=PATH",
-            help="Name the host of the traces below PATH; may be repeated, also with one name, and"
+            help="Name the host of the traces below PATH; may be repeated, with the same name too;"
             " the deepest PATH counts",
         ),
     ] = None,
     keep_staging: Annotated[
         Path | None,
-        typer.Option("--keep-staging", metavar="DIR", help="Keep the events as read, as Parquet"),
+        typer.Option(
+            "--keep-staging", metavar="DIR", help="Keep the raw events, as Parquet files in DIR"
+        ),
     ] = None,
     links: Annotated[
         Path | None,
@@ -62,21 +64,23 @@ def command(
         typer.Option(
             "--clock-sync",
             metavar="none|messages|FILE",
-            help="Bring the clocks of several hosts together: by their messages (and the network"
+            help="Synchronise the clocks of several hosts: by their messages (and the network"
             " packets of kernel traces), or by offsets in a file",
         ),
     ] = "none",
-    reader: Annotated[Reader, typer.Option("--reader", help="What decodes the traces")] = (
+    reader: Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")] = (
         Reader.AUTO
     ),
     strict: Annotated[
         bool,
-        typer.Option("--strict", help="Refuse damaged traces, keep nothing"),
+        typer.Option("--strict", help="Refuse damaged traces instead of keeping what can be read"),
     ] = False,
     ignore: Annotated[
         list[str] | None,
         typer.Option(
-            "--ignore", metavar="PATTERN", help="Leave out events of these names, such as 'dds:*'"
+            "--ignore",
+            metavar="PATTERN",
+            help="Skip events with these names, such as 'dds:*'; may be repeated",
         ),
     ] = None,
     memory_limit: Annotated[
@@ -84,12 +88,12 @@ def command(
         typer.Option(
             "--memory-limit",
             metavar="SIZE",
-            help="Most memory for the database, such as 2GB; more makes large traces faster",
+            help="Maximum memory for the database, such as 2GB; more makes large traces faster",
             show_default="grows with need",
         ),
     ] = None,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print errors and lost work only")
+        bool, typer.Option("--quiet", "-q", help="Print only errors, and work that was lost")
     ] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:

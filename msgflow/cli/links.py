@@ -14,15 +14,16 @@ from msgflow.cli.options import (
     FormatOption,
     OutputOption,
     RunOption,
+    WideOption,
 )
 from msgflow.errors import UsageError
 
-app = typer.Typer(help="Declare how nodes use the messages that they keep.")
+app = typer.Typer(help="Declare indirect links: how nodes use messages that they keep.")
 
 
 @app.callback()
 def group() -> None:
-    """Declare how nodes use the messages that they keep."""
+    """Declare indirect links: how nodes use messages that they keep."""
 
 
 @app.command("apply")
@@ -31,7 +32,7 @@ def apply(
     run: RunOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Declare the links of a file and derive all links of the run anew; reads no trace."""
+    """Declare the links of a file and derive all links of the run again, without the trace."""
     from msgflow.cli.output import count, print_note, print_runs, print_status
     from msgflow.database import Database
 
@@ -57,7 +58,7 @@ def suggest(
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Print candidates found in the data as a file to review; nothing is applied."""
+    """Print candidates found in the data, as a file to review; nothing is applied."""
     from msgflow.cli.output import count, print_note, print_runs, print_text
     from msgflow.database import Database
     from msgflow.links import suggest_links
@@ -88,13 +89,14 @@ def suggest(
 def list_links(
     run: RunOption = None,
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the declared links with what came of them: the query indirect-links."""
+    """List the declared links and what they explain (the query indirect-links)."""
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     with Database(database) as opened:
         result = opened.query("indirect-links", run=run)
-    print_result(result, form, output)
+    print_result(result, form, output, wide=wide)

@@ -11,6 +11,7 @@ from msgflow.export.formats import Format
 from msgflow.query.times import Times
 
 DEFAULT_DATABASE = Path("msgflow.duckdb")
+DEFAULT_PATHS = "paths.yaml"
 
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
@@ -34,7 +35,8 @@ StartOption = Annotated[
     typer.Option(
         "--start",
         metavar="TIME",
-        help="Begin of the time window: 2.5s from the start of the run, epoch ns, or ISO time",
+        help="Start of the time window: seconds from the start of the run, 100ms, ISO time,"
+        " or epoch ns (16 digits or more)",
         rich_help_panel=SELECTION,
     ),
 ]
@@ -43,7 +45,7 @@ EndOption = Annotated[
     typer.Option(
         "--end",
         metavar="TIME",
-        help="End of the time window, written likewise",
+        help="End of the time window, in the same formats as --start",
         rich_help_panel=SELECTION,
     ),
 ]
@@ -53,7 +55,7 @@ SkipFirstOption = Annotated[
         "--skip-first",
         metavar="SECONDS",
         min=0,
-        help="Leave out the begin of the run, where the system warms up",
+        help="Skip the first SECONDS of the run (warm-up)",
         rich_help_panel=SELECTION,
     ),
 ]
@@ -61,7 +63,7 @@ InternalOption = Annotated[
     bool,
     typer.Option(
         "--internal",
-        help="Show what ROS does for itself too (/rosout, /parameter_events, …)",
+        help="Also show what ROS does for itself (/rosout, /parameter_events, …)",
         rich_help_panel=SELECTION,
     ),
 ]
@@ -82,6 +84,24 @@ TimesOption = Annotated[
         help="Points in time: ns since the epoch, seconds since it, seconds since the start of the"
         " run (relative), or UTC as text (iso); with all but ns, durations are in seconds",
         show_default="ns; tables have units",
+        rich_help_panel=OUTPUT,
+    ),
+]
+WideOption = Annotated[
+    bool,
+    typer.Option(
+        "--wide",
+        help="On a terminal, show all columns and rows, however wide",
+        rich_help_panel=OUTPUT,
+    ),
+]
+ColumnsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="A,B,…",
+        help="Only these columns, in this order",
+        show_default="all; on a terminal, those that fit and are not empty",
         rich_help_panel=OUTPUT,
     ),
 ]

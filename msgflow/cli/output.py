@@ -13,12 +13,15 @@ import typer
 
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
+from msgflow.query.present import MOST_ROWS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from msgflow.query.result import QueryResult
     from msgflow.query.window import Run
+
+_NARROWEST = 40
 
 
 def print_error(message: str, hint: str | None = None) -> None:
@@ -39,13 +42,24 @@ def print_status(text: str) -> None:
     typer.echo(_shown(text), err=True)
 
 
-def print_result(result: QueryResult, form: Format | None, path: Path | None) -> None:
+def print_result(
+    result: QueryResult,
+    form: Format | None,
+    path: Path | None,
+    *,
+    wide: bool = False,
+    columns: str | None = None,
+    most_rows: int | None = MOST_ROWS,
+) -> None:
     """Write a result to a file or stdout, and say on stderr what it leaves out.
 
     Args:
         result: the rows.
         form: what to write; chosen by the suffix of `path`, else a table, when None.
         path: file to write, replaced when it exists; stdout when None.
+        wide: show all columns and rows on a terminal too.
+        columns: names of those to write, separated by commas; all when None.
+        most_rows: how many rows a table on a terminal has; all when None.
 
     Raises:
         UsageError: Parquet on a terminal, a closed stdout, or a file that cannot be written.
@@ -53,6 +67,8 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
     from msgflow.atomic import replacing
 
     form = form or format_of(path)
+    if columns is not None:
+        result = result.with_columns([name.strip() for name in columns.split(",")])
     print_runs(result.runs)
     if path is not None:
         with replacing(path) as temporary, temporary.open("wb") as stream:
@@ -62,10 +78,38 @@ def print_result(result: QueryResult, form: Format | None, path: Path | None) ->
         stdout = data_stream()
         if form is Format.PARQUET and stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        write_result(result, form, terminal(stdout) if stdout.isatty() else stdout)
+        if form is Format.TABLE and stdout.isatty() and not wide:
+            _print_for_screen(result, columns is not None, most_rows)
+        else:
+            write_result(result, form, terminal(stdout) if stdout.isatty() else stdout)
     if path is None and not len(result):
         print_note("no rows")
     for note in result.notes:
+        print_note(note)
+
+
+def is_screen() -> bool:
+    """Tell whether stdout is a terminal.
+
+    Raises:
+        UsageError: stdout is closed.
+    """
+    return data_stream().isatty()
+
+
+def screen_width() -> int:
+    """Return how many cells a line of the terminal has, or the variable COLUMNS says."""
+    return max(_NARROWEST, shutil.get_terminal_size((100, 24)).columns)
+
+
+def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:
+    from msgflow.query.present import present
+    from msgflow.query.screen import screen_lines
+
+    width = screen_width()
+    shown = present(result, width, most_rows=most_rows, is_chosen=is_chosen)
+    print_lines(screen_lines(shown, width))
+    for note in shown.notes:
         print_note(note)
 
 
@@ -113,6 +157,8 @@ def print_lines(lines: Iterable[str]) -> None:
         stream = terminal(stream)
     for line in lines:
         stream.write(f"{line}\n".encode())
+    # What is said about them comes after them.
+    stream.flush()
 
 
 def count(number: int, thing: str) -> str:
@@ -177,5 +223,10 @@ def _shown(text: str) -> str:
 
 def _labelled(label: str, color: str, text: str) -> None:
     text = _shown(text)
+    if sys.stderr is not None and sys.stderr.isatty() and "\n" not in text:
+        from msgflow.query.wrapping import wrap
+
+        indent = " " * (len(label) + 2)
+        text = f"\n{indent}".join(wrap(text, screen_width() - len(indent)))
     styled = label if os.environ.get("NO_COLOR") else typer.style(label, fg=color, bold=True)
     typer.echo(f"{styled}: {text}", err=True)

@@ -26,7 +26,7 @@ class QueryGroup(TyperGroup):
 app = typer.Typer(
     cls=QueryGroup,
     subcommand_metavar="[NAME] [OPTIONS]",
-    help="Run a named query; `msgflow query NAME --help` tells what it means and takes.",
+    help="Run a named query; `msgflow query NAME --help` explains it.",
 )
 
 

@@ -11,6 +11,7 @@ from typer.core import TyperCommand
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     OUTPUT,
+    ColumnsOption,
     DatabaseOption,
     EndOption,
     FormatOption,
@@ -20,16 +21,28 @@ from msgflow.cli.options import (
     SkipFirstOption,
     StartOption,
     TimesOption,
+    WideOption,
 )
+from msgflow.cli.selecting import selecting_options
 from msgflow.errors import UsageError
+from msgflow.query.names import PLACE_PARAMETERS
+from msgflow.query.present import MOST_ROWS
+from msgflow.query.selection import KINDS
 
 if TYPE_CHECKING:
     from msgflow.query.header import Header, Param
 
 PARAMETERS = "Parameters"
-# Names that the command line gives to every query, so that no query may use them for itself.
+# Names that the command line gives to every query, so that no query may use them for itself. Via,
+# without and slowest it may: then it chooses by them before it adds up.
 COMMON_OPTIONS = frozenset(
     (
+        *KINDS,
+        "path",
+        "paths",
+        "limit",
+        "sort",
+        "where",
         "db",
         "end",
         "format",
@@ -41,9 +54,14 @@ COMMON_OPTIONS = frozenset(
         "show",
         "skip_first",
         "start",
+        "times",
+        "columns",
+        "wide",
     )
 )
 _OWN = "own_"
+# Of `Database.query`, by their options.
+_SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
 _ShowOption = Annotated[
     bool,
     typer.Option("--show", help="Print the SQL and run nothing", rich_help_panel=OUTPUT),
@@ -77,9 +95,9 @@ def build_command(header: Header) -> Any:
 
     def command(**given: Any) -> None:
         own = {
-            name.removeprefix(_OWN): value
+            name.removeprefix(_OWN): ",".join(value) if isinstance(value, list) else value
             for name, value in given.items()
-            if name.startswith(_OWN) and value is not None
+            if name.startswith(_OWN) and value is not None and value != []
         }
         if given["show"]:
             from msgflow.cli.output import print_lines
@@ -88,8 +106,14 @@ def build_command(header: Header) -> Any:
             return
         _run(header, own, given)
 
+    own_names = {param.name for param in header.params}
     parameters = [_option(param) for param in header.params]
     for name, annotation, default in (
+        *(
+            (name, annotation, None)
+            for name, annotation in selecting_options(header).items()
+            if name not in own_names
+        ),
         ("run", RunOption, None),
         ("start", StartOption, None),
         ("end", EndOption, None),
@@ -97,6 +121,8 @@ def build_command(header: Header) -> Any:
         ("internal", InternalOption, False),
         ("form", FormatOption, None),
         ("output", OutputOption, None),
+        ("columns", ColumnsOption, None),
+        ("wide", WideOption, False),
         ("times", TimesOption, None),
         ("show", _ShowOption, False),
         ("list_queries", _ListOption, False),
@@ -136,11 +162,19 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
             end=given["end"],
             skip_first=given["skip_first"],
             internal=given["internal"],
+            **{word: given[word] for word in _SELECTING if given.get(word)},
             **own,
         )
     if times is not None:
         result = result.with_times(times)
-    print_result(result, form, given["output"])
+    print_result(
+        result,
+        form,
+        given["output"],
+        wide=given["wide"],
+        columns=given["columns"],
+        most_rows=given.get("limit") or given.get("slowest") or MOST_ROWS,
+    )
 
 
 def _option(param: Param) -> Parameter:
@@ -155,6 +189,8 @@ def _option(param: Param) -> Parameter:
         rich_help_panel=PARAMETERS,
     )
     kind: Any = bool if param.type == "BOOLEAN" else str
+    if param.name in PLACE_PARAMETERS:
+        kind = list[str]
     return Parameter(
         f"{_OWN}{param.name}",
         Parameter.KEYWORD_ONLY,

@@ -53,7 +53,7 @@ def command(
         typer.Option(
             "--path",
             metavar="TEXT",
-            help="Only paths with this text in them: a topic, or a node",
+            help="Only paths that contain this text: a topic, or a node",
             rich_help_panel=SELECTION,
         ),
     ] = None,
@@ -62,14 +62,13 @@ def command(
         typer.Option(
             "--max-size",
             metavar="SIZE",
-            help="Most bytes of the file, as 20MB; what does not fit is left out, which the page"
-            " says",
+            help="Maximum size of the file; what does not fit is left out, and the page says so",
             rich_help_panel=OUTPUT,
         ),
     ] = "20MB",
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write the pages of a run into one file that any browser opens, without a server."""
+    """Write the pages of a run to one file that any browser opens, without a server."""
     from msgflow.cli.output import print_note, print_runs, print_status
     from msgflow.database import Database
 

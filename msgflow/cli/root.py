@@ -6,16 +6,20 @@ import errno
 import os
 import sys
 import traceback
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
 
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.stop import STOP
+from msgflow.cli.tilde import with_home
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.query.interrupt import Terminated
 from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # What the libraries below say of values, and how we do.
@@ -26,8 +30,8 @@ _LEAKED = (
     ("Input should be ", "it has to be "),
 )
 COMMANDS = (
-    "ingest", "query", "flow", "graph", "ui", "report", "compare", "sql", "info", "check", "events",
-    "links", "clocks", "export", "db", "simulate",
+    "ingest", "query", "flow", "graph", "ui", "report", "compare", "verify", "sql", "info", "check",
+    "events", "targets", "runs", "links", "paths", "clocks", "export", "db", "simulate",
 )  # fmt: skip
 
 
@@ -56,10 +60,11 @@ class RootGroup(TyperGroup):
         STOP.end_with(code)
         sys.exit(int(code))
 
-    def _run(self, *args: Any, **options: Any) -> ExitCode:
+    def _run(self, args: Sequence[str] | None = None, **options: Any) -> ExitCode:
         options["standalone_mode"] = False
         try:
-            return ExitCode(super().main(*args, **options) or 0)
+            words = with_home(sys.argv[1:] if args is None else args)
+            return ExitCode(super().main(words, **options) or 0)
         except KeyboardInterrupt as error:
             return _code_of(error)
         except typer.Abort:

@@ -35,20 +35,22 @@ def command(
     _: Annotated[
         bool,
         typer.Option(
-            "--list", callback=_list, is_eager=True, help="Name the systems there are, and end"
+            "--list", callback=_list, is_eager=True, help="List the available systems and exit"
         ),
     ] = False,
     factor: Annotated[
-        float, typer.Option("--factor", min=0, help="Length, as a multiple of the scenario's own")
+        float,
+        typer.Option("--factor", min=0, help="Length, as a multiple of the scenario's default"),
     ] = 1,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random numbers")] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Random seed")] = 0,
     layout: Annotated[
         str | None,
         typer.Option(
             "--layout",
             metavar="NAME",
-            help="Release of ROS 2, as galactic or jazzy, also with instrumented DDS, as "
-            "humble-fastdds; the scenario's own by default",
+            help="Release of ROS 2 to imitate, such as jazzy, or humble-fastdds for an instrumented"
+            " DDS",
+            show_default="that of the scenario",
             autocompletion=lambda: _layouts(),
         ),
     ] = None,
@@ -58,7 +60,7 @@ def command(
             "--start-late",
             metavar="SECONDS",
             min=0,
-            help="Recording starts that late: no initialisation events",
+            help="Start recording after SECONDS: no initialisation events",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
@@ -66,7 +68,8 @@ def command(
         bool,
         typer.Option(
             "--dual-session",
-            help="A snapshot has the initialisation events from before the late start",
+            help="Also record a snapshot session with the initialisation events that --start-late"
+            " misses",
             rich_help_panel=_RECORDING,
         ),
     ] = False,
@@ -74,8 +77,8 @@ def command(
         tuple[float, float] | None,
         typer.Option(
             "--pause",
-            metavar="BEGIN END",
-            help="Nothing is recorded between these times, in seconds",
+            metavar="START END",
+            help="Record nothing between these two times, in seconds",
             rich_help_panel=_RECORDING,
         ),
     ] = None,
@@ -84,8 +87,7 @@ def command(
         typer.Option(
             "--rotate",
             metavar="SECONDS",
-            help="The trace goes on in a further chunk of the archive from this time on; may be "
-            "repeated",
+            help="Start a new chunk of the trace at this time; may be repeated",
             rich_help_panel=_RECORDING,
         ),
     ] = None,
@@ -100,7 +102,7 @@ def command(
             metavar="SHARE",
             min=0,
             max=1,
-            help="Share of the packets behind which events are lost",
+            help="Share of packets after which events are lost",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
@@ -111,7 +113,7 @@ def command(
             metavar="SHARE",
             min=0,
             max=1,
-            help="Share of the packets that are missing",
+            help="Share of packets that are missing",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
@@ -121,7 +123,7 @@ def command(
             "--cut",
             metavar="STREAMS",
             min=0,
-            help="So many streams of each trace end in the middle of a packet",
+            help="Number of streams per trace to truncate mid-packet",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
@@ -130,7 +132,7 @@ def command(
         typer.Option(
             "--slew",
             metavar="PPM",
-            help="How much faster source stamps run than the clock of the trace",
+            help="Drift of source stamps against the clock of the trace (positive: faster)",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
@@ -139,7 +141,7 @@ def command(
         typer.Option(
             "--clock-offset",
             metavar="SECONDS",
-            help="How far each host's clock is ahead of that of the host before it",
+            help="How far each host's clock is ahead of the previous host's",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,
@@ -148,7 +150,7 @@ def command(
         typer.Option(
             "--clock-drift",
             metavar="PPM",
-            help="How much faster each host's clock runs than that of the host before it",
+            help="How much faster each host's clock runs than the previous host's",
             rich_help_panel=_RECORDING,
         ),
     ] = 0,

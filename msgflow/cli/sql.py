@@ -8,7 +8,13 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption, FormatOption, OutputOption
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    DatabaseOption,
+    FormatOption,
+    OutputOption,
+    WideOption,
+)
 from msgflow.errors import UsageError
 from msgflow.text_file import read_text
 
@@ -20,12 +26,17 @@ def command(
         str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
     ] = None,
     file: Annotated[
-        Path | None, typer.Option("-f", "--file", metavar="FILE", help="Read the statements here")
+        Path | None,
+        typer.Option("-f", "--file", metavar="FILE", help="Read the statements from FILE"),
     ] = None,
     limit: Annotated[
-        int, typer.Option("--limit", min=0, metavar="ROWS", help="Most rows to print; 0 for all")
+        int,
+        typer.Option(
+            "--limit", min=0, metavar="ROWS", help="Maximum number of rows to print; 0 for all"
+        ),
     ] = DEFAULT_LIMIT,
     form: FormatOption = None,
+    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -39,7 +50,7 @@ def command(
     statements = _statements(text, file)
     with Database(database) as opened:
         result = opened.sql(statements, limit=limit or None)
-    print_result(result, form, output)
+    print_result(result, form, output, wide=wide)
 
 
 def _statements(text: str | None, file: Path | None) -> str:

@@ -20,21 +20,22 @@ def command(
             metavar="NUMBER",
             min=0,
             max=65535,
-            help="Port of 127.0.0.1; 0 takes any that is free",
-            show_default="8642, or any that is free",
+            help="Port on 127.0.0.1; 0 for any free one",
+            show_default="8642, else any free one",
         ),
     ] = None,
     memory_limit: Annotated[
         str,
-        typer.Option("--memory-limit", metavar="SIZE", help="Most memory that queries take"),
+        typer.Option("--memory-limit", metavar="SIZE", help="Maximum memory for queries"),
     ] = "300MB",
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Show the database in the browser: timeline, paths, graph, executors, comparison.
 
-    The address has a token, without which nothing is shown. Only this machine is answered; from
-    another one, open the same address behind ssh -L. Ctrl-C ends it. While it runs, the file can be
-    read by others, and not be written.
+    The printed address contains a token; without it, nothing is shown. The
+    server answers this machine only: from another one, open the same address
+    through ssh -L. Ctrl-C stops it. While it runs, other programs can read the
+    database, but not write to it.
     """
     from msgflow.cli.output import print_note, print_status
     from msgflow.view.server import serve

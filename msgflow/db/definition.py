@@ -2,16 +2,12 @@
 
 A file from elsewhere can hold any SQL under our names, which would run with the first query. DuckDB
 renders definitions its own way, and what it read from a file not as what was just created: hence
-they are compared with those of a new file. To make one takes a third of a second, so what came out
-is kept in the user's cache, by the version of DuckDB and the files of `schema/`.
+they are compared with those of a new file, which are kept in the user's cache.
 """
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
 import json
-import os
 import shlex
 import tempfile
 from functools import cache
@@ -20,9 +16,8 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db import objects
+from msgflow.db import cache as cache_of_user
 from msgflow.errors import DatabaseError
-from msgflow.resources import resource_directory
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -30,7 +25,7 @@ if TYPE_CHECKING:
 # By kind and name: the SHA-256 of the definition.
 Definitions = dict[str, str]
 
-_MOST_CACHED = 16
+_KIND = "definitions"
 
 # Keys are left out: where they stand in the statement differs, and none has SQL in it.
 _RENDERED = r"""
@@ -113,50 +108,19 @@ def expected() -> Mapping[str, str]:
 
 
 def _made() -> Definitions:
-    from msgflow.db.connection import STORAGE_VERSION  # which needs this module
+    from msgflow.db.create import write_new  # which needs this module
 
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
         path = Path(directory) / "new.duckdb"
-        config: dict[str, str | bool | int | float | list[str]] = {
-            "storage_compatibility_version": STORAGE_VERSION
-        }
-        with duckdb.connect(str(path), config=config) as con:
-            con.execute("CREATE SCHEMA store; CREATE SCHEMA derive")
-            con.execute(_tables())
-            for header in objects.views():
-                con.execute(objects.create_statement(header))
+        write_new(path)
         with duckdb.connect(str(path), read_only=True) as con:
             return rendered(con)
 
 
-def _tables() -> str:
-    return (resource_directory("schema") / "tables.sql").read_text(encoding="utf-8")
-
-
-def _cache_file() -> Path:
-    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
-    root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
-    key = hashlib.sha256(f"{objects.definition_hash()}\0{_tables()}\0{_RENDERED}".encode())
-    return root / "msgflow" / f"definitions-{duckdb.__version__}-{key.hexdigest()[:32]}.json"
-
-
 def _cached() -> Definitions | None:
-    try:
-        found = json.loads(_cache_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError, RuntimeError):  # the last: there is no home directory
-        return None
-    is_whole = isinstance(found, dict) and all(isinstance(hash_, str) for hash_ in found.values())
-    return found if is_whole else None
+    content = cache_of_user.read(_KIND, _RENDERED)
+    return None if content is None else dict(json.loads(content))
 
 
 def _keep(definitions: Definitions) -> None:
-    # Only a convenience: where nothing can be written, it is made again next time.
-    with contextlib.suppress(OSError, RuntimeError):
-        path = _cache_file()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.with_suffix(f".{os.getpid()}.part")
-        aside.write_text(json.dumps(definitions), encoding="utf-8")
-        aside.replace(path)
-        kept = sorted(path.parent.glob("definitions-*"), key=lambda old: old.stat().st_mtime)
-        for old in kept[:-_MOST_CACHED]:
-            old.unlink()
+    cache_of_user.keep(_KIND, _RENDERED, json.dumps(definitions).encode())

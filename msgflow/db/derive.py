@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
+from msgflow.db.tables import SCHEMA, metadata
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,14 +79,7 @@ def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 
 
 def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
-    columns = ", ".join(
-        row[0]
-        for row in con.execute(
-            "SELECT column_name FROM duckdb_columns() WHERE schema_name = 'store' "
-            "AND database_name = current_database() AND table_name = ? ORDER BY column_index",
-            [name],
-        ).fetchall()
-    )
+    columns = ", ".join(metadata.tables[f"{SCHEMA}.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     con.execute(
         f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_source(name)}",

@@ -1,4 +1,4 @@
-"""Creates databases and brings old ones up to date: Alembic for tables, then the views anew."""
+"""Puts new databases in place, and brings old ones up to date: Alembic for tables, then views."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from msgflow.db.connection import (
     require_current,
     require_known,
 )
+from msgflow.db.create import write_new
 from msgflow.db.definition import require_ours
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
@@ -69,12 +70,7 @@ def _replace_by_new(path: Path) -> None:
     try:
         with database_errors(path), workspace(path) as directory:
             fresh = directory / "new.duckdb"
-            con = open_file(fresh, read_only=False)
-            try:
-                _bring_to_head(con)
-                con.execute("CHECKPOINT")  # closing would fail silently, and leave a log behind
-            finally:
-                con.close()
+            write_new(fresh)
             os.replace(fresh, path)
     except OSError as error:
         raise DatabaseError(
@@ -138,9 +134,9 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
 
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection) -> None:
-    con.execute("CREATE SCHEMA IF NOT EXISTS store")
-    with sqlalchemy_connection(con) as connection:
-        _alembic_upgrade(connection)
+    if recorded_revision(con) != objects.head_revision():
+        with sqlalchemy_connection(con) as connection:
+            _alembic_upgrade(connection)
     con.begin()
     try:
         objects.apply(con)
@@ -183,16 +179,17 @@ def downgrade(con: duckdb.DuckDBPyConnection, revision: str) -> None:
         objects.drop(cursor)
         cursor.commit()
     with sqlalchemy_connection(con) as connection:
-        command.downgrade(_alembic_config(connection), revision)
+        command.downgrade(alembic_config(connection), revision)
 
 
 def _alembic_upgrade(connection: Connection) -> None:
     from alembic import command
 
-    command.upgrade(_alembic_config(connection), "head")
+    command.upgrade(alembic_config(connection), "head")
 
 
-def _alembic_config(connection: Connection) -> Config:
+def alembic_config(connection: Connection) -> Config:
+    """Return what Alembic needs to know to migrate the database of a connection."""
     from alembic.config import Config
 
     config = Config()

@@ -152,13 +152,13 @@ def drop(con: duckdb.DuckDBPyConnection) -> None:
 
 def _comment(con: duckdb.DuckDBPyConnection, header: Header) -> None:
     con.execute(
-        f"COMMENT ON VIEW {header.name} IS {_literal(header.description + ' ' + header.grain)}"
+        f"COMMENT ON VIEW {header.name} IS {literal(header.description + ' ' + header.grain)}"
     )
     for column in header.columns:
         unit = f" [{column.unit}]" if column.unit else ""
         con.execute(
             f'COMMENT ON COLUMN {header.name}."{column.name}" IS '
-            f"{_literal(column.description + unit)}"
+            f"{literal(column.description + unit)}"
         )
 
 
@@ -166,5 +166,6 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"'
 
 
-def _literal(text: str) -> str:
+def literal(text: str) -> str:
+    """Return a text as a constant of SQL."""
     return "'" + text.replace("'", "''") + "'"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 
 from msgflow.db.objects import SCHEMAS, views
-from msgflow.errors import QueryError
+from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import nearest
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ SELECT schema_name FROM duckdb_schemas()
 WHERE NOT internal AND database_name = current_database() AND NOT list_contains(?, schema_name)
 """
 _PARSED = "SELECT json_serialize_sql(?, skip_null := true, skip_empty := true)"
+_CONDITION_HINT = "such as --where \"p99_ns > 80e6 AND node LIKE '%planner'\""
 _HINT = "SELECT, FROM, WITH, VALUES, DESCRIBE, SUMMARIZE, SHOW and EXPLAIN of such read"
 
 
@@ -87,6 +88,50 @@ def reading_statements(con: duckdb.DuckDBPyConnection, text: str) -> list[str]:
         else:
             _require_reading(con, statement, kind)
     return [statement for _, statement in statements]
+
+
+def require_condition(con: duckdb.DuckDBPyConnection, text: str) -> None:
+    """Raise unless `text` is one expression of SQL that only reads.
+
+    Args:
+        con: connection to a current msgflow database.
+        text: what a user gave as a condition.
+
+    Raises:
+        UsageError: it is something else.
+    """
+    try:
+        statements = _split(con, f"SELECT {text}\n")
+    except duckdb.Error as error:
+        raise UsageError(
+            f"--where is no condition in SQL: {str(error).splitlines()[0]}", _CONDITION_HINT
+        ) from error
+    except QueryError as error:
+        raise UsageError(f"--where is no condition in SQL — {text}", _CONDITION_HINT) from error
+    tree = _parse(con, statements[0][1]) if len(statements) == 1 else None
+    if tree is None or not _is_expression(tree["node"]):
+        raise UsageError(f"--where is no condition in SQL — {text}", _CONDITION_HINT)
+    if any(part.get("class") == "PARAMETER" for part in _parts(tree)):
+        raise UsageError(f"--where takes no parameters — {text}", _CONDITION_HINT)
+    try:
+        _require_reading(con, statements[0][1], "SELECT")
+    except QueryError as error:
+        raise UsageError(f"--where may only read: {error.message}", error.hint) from error
+
+
+def _is_expression(node: dict[str, Any]) -> bool:
+    """Tell whether a query is a SELECT of one expression and nothing else."""
+    return (
+        node["type"] == "SELECT_NODE"
+        and len(node["select_list"]) == 1
+        and not node["select_list"][0].get("alias")
+        and node["from_table"]["type"] == "EMPTY"
+        and not any(
+            node.get(key)
+            for key in ("where_clause", "group_expressions", "having", "qualify", "modifiers")
+        )
+        and not node.get("cte_map", {}).get("map")
+    )
 
 
 def _split(con: duckdb.DuckDBPyConnection, text: str) -> list[tuple[str, str]]:

@@ -1,10 +1,8 @@
-"""Renders `schema/tables.sql`, the readable copy of the tables."""
+"""Renders `schema/tables.sql`, the tables as new databases have them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-
-from duckdb_engine import Dialect
 
 from msgflow.db.tables import metadata
 
@@ -23,12 +21,11 @@ def render() -> str:
 
 
 def _render_table(table: Table) -> str:
-    dialect = Dialect()
     columns = list(table.columns)
     names = max(len(column.name) for column in columns)
     lines = []
     for position, column in enumerate(columns):
-        kind = column.type.compile(dialect=dialect).upper().replace("BYTEA", "BLOB")
+        kind = column.type.compile()
         constraint = (
             " PRIMARY KEY" if column.primary_key else "" if column.nullable else " NOT NULL"
         )

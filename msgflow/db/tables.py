@@ -1,7 +1,8 @@
 """The one definition of the tables in schema `store`.
 
-`schema/tables.sql` is rendered from here for readers, the migrations are the frozen history of how
-files came to look like this, and the public views in schema `main` are what users read.
+`schema/tables.sql` is rendered from here, and new databases are made of it; the migrations are the
+frozen history of how older files come to look like this, and the public views in schema `main` are
+what users read.
 
 Every table has one comment that states its grain; every column one that states its meaning.
 Relations are declared in `info["references"]`: DuckDB's foreign keys would forbid replacing a run
@@ -12,7 +13,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from duckdb_engine.datatypes import UBigInteger
 from sqlalchemy import (
     TIMESTAMP,
     BigInteger,
@@ -24,9 +24,21 @@ from sqlalchemy import (
     String,
     Table,
 )
+from sqlalchemy.types import UserDefinedType
 
 if TYPE_CHECKING:
     from sqlalchemy.types import TypeEngine
+
+
+class UBigInteger(UserDefinedType[int]):
+    """UBIGINT; duckdb-engine has that, too, but takes as long to import as all of SQLAlchemy."""
+
+    cache_ok = True
+
+    def get_col_spec(self, **_: object) -> str:
+        """Return the name of the type in SQL."""
+        return "UBIGINT"
+
 
 SCHEMA = "store"
 metadata = MetaData(schema=SCHEMA)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from enum import StrEnum
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
 from msgflow.query.plain import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     import pyarrow as pa
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from msgflow.query.result import QueryResult
 
 _ROWS_AT_ONCE = 10_000
+Form = TypeVar("Form")
 
 
 class Format(StrEnum):
@@ -49,13 +50,21 @@ def format_of(path: Path | None) -> Format:
     """
     if path is None or not path.suffix:
         return Format.TABLE
+    return by_suffix(path, _SUFFIXES, "; spreadsheets open CSV, PlotJuggler CSV and Parquet")
+
+
+def by_suffix(path: Path, known: Mapping[str, Form], more: str = "") -> Form:
+    """Return the format that the suffix of a file asks for; `more` ends the hint of the error.
+
+    Raises:
+        UsageError: no format has this suffix.
+    """
     try:
-        return _SUFFIXES[path.suffix.lower()]
+        return known[path.suffix.lower()]
     except KeyError:
         raise UsageError(
             f"no format has this suffix — {path}",
-            f"end it with {', '.join(_SUFFIXES)}, or say --format;"
-            " spreadsheets open CSV, PlotJuggler CSV and Parquet",
+            f"end it with {', '.join(known)}, or say --format{more}",
         ) from None
 
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from msgflow.errors import UsageError
+from msgflow.export.formats import by_suffix
 from msgflow.query.human import printable
 from msgflow.query.plain import plain
 
@@ -48,15 +48,7 @@ def graph_format(path: Path | None) -> GraphFormat:
     Raises:
         UsageError: no format has this suffix.
     """
-    if path is None:
-        return GraphFormat.DOT
-    try:
-        return _SUFFIXES[path.suffix.lower()]
-    except KeyError:
-        raise UsageError(
-            f"no graph is written to a file of this name — {path}",
-            f"end it with {', '.join(_SUFFIXES)}, or say --format",
-        ) from None
+    return GraphFormat.DOT if path is None else by_suffix(path, _SUFFIXES)
 
 
 @dataclass(frozen=True)

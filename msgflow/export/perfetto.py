@@ -44,6 +44,7 @@ class PerfettoTrace:
         slices: callbacks, publications, takes, requests, responses and states of executors in it.
         arrows: links between them.
         values: values of counters.
+        gaps: stretches of a host in which something was not recorded.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class PerfettoTrace:
     slices: int
     arrows: int
     values: int
+    gaps: int
 
 
 def write_perfetto(
@@ -62,7 +64,7 @@ def write_perfetto(
         connection: to a database with the public views.
         path: the file; one that exists is replaced.
         run: the run.
-        window: (begin, end) in epoch ns; what begins in it is written.
+        window: (begin, end) in epoch ns; what begins in it is written, and of gaps what lies in it.
 
     Raises:
         UsageError: the package perfetto is not installed, or the file cannot be written.
@@ -80,7 +82,8 @@ def write_perfetto(
         slices, arrows = writer.slices(rows.SLICES)
         slices += writer.slices(rows.STATES)[0]
         values = writer.values()
-    return PerfettoTrace(path, run, slices, arrows, values)
+        gaps = writer.gaps()
+    return PerfettoTrace(path, run, slices, arrows, values, gaps)
 
 
 class _Writer:
@@ -99,7 +102,7 @@ class _Writer:
         self.bindings = {"run": run.run_id, "start_ns": window[0], "end_ns": window[1]}
         self.packets = perfetto_trace_pb2
 
-    def rows(self, sql: str) -> Iterator[Mapping[str, Any]]:
+    def rows(self, sql: str) -> Iterator[dict[str, Any]]:
         used = self.connection.extract_statements(sql)[0].named_parameters
         relation = self.connection.sql(sql, params={name: self.bindings[name] for name in used})
         with relation.to_arrow_reader(_AT_ONCE) as reader:
@@ -203,5 +206,30 @@ class _Writer:
             packet = self.event(row, self.packets.TrackEvent.TYPE_COUNTER)
             packet.track_event.double_counter_value = row["value"]
             self.builder.write_packet(packet)
+            count += 1
+        return count
+
+    def gaps(self) -> int:
+        """Write a track of gaps for each host that has any; return how many gaps."""
+        kind = self.packets.TrackEvent
+        count = 0
+        known = None
+        for row in self.rows(rows.GAPS):
+            if row["track"] != known:
+                known = row["track"]
+                track = self.track(known)
+                track.track_descriptor.name = row["track_name"]
+                self.builder.write_packet(track)
+            begin = self.event(row | {"at_ns": row["start_ns"]}, kind.TYPE_SLICE_BEGIN)
+            begin.track_event.name = row["name"]
+            begin.track_event.categories.append("gap")
+            if row["event_count"] is not None:
+                begin.track_event.debug_annotations.add(
+                    name="lost_events", int_value=row["event_count"]
+                )
+            self.builder.write_packet(begin)
+            self.builder.write_packet(
+                self.event(row | {"at_ns": row["end_ns"]}, kind.TYPE_SLICE_END)
+            )
             count += 1
         return count

@@ -19,6 +19,7 @@ from msgflow.db import migrate, objects
 from msgflow.db.check import run_checks
 from msgflow.db.connection import attach, open_memory, shut_in
 from msgflow.db.derive import derive
+from msgflow.db.runs import require_run_name
 from msgflow.db.spill import most_spilled
 from msgflow.db.store import delete, store
 from msgflow.db.workspace import creating, workspace
@@ -350,11 +351,8 @@ def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
         raise UsageError(
             "the path of a trace is empty", "msgflow ingest TRACE, or . for the current directory"
         )
-    if name is not None and not is_run_name(name):
-        raise UsageError(
-            f"a run cannot have a name that --run takes for something else — {name!r}",
-            "give a --name that is neither empty, nor 'all', nor a number",
-        )
+    if name is not None:
+        require_run_name(name)
 
 
 def _fallback_name(paths: Sequence[str | Path]) -> str:

@@ -135,11 +135,16 @@ def load_traces(
     if corrections:
         staging.empty(con)
         implausible = read(corrections)
-    for (trace_index, name), count in traces.event_counts.items():
-        con.execute(
-            "INSERT INTO staging.event_count VALUES (?, ?, ?, ?)",
-            [trace_index, name, name in catalogue.in_traces, count],
-        )
+    con.execute(
+        "INSERT INTO staging.event_count SELECT unnest(?::INTEGER[]), unnest(?::VARCHAR[]), "
+        "unnest(?::BOOLEAN[]), unnest(?::BIGINT[])",
+        [
+            [trace_index for trace_index, _ in traces.event_counts],
+            [name for _, name in traces.event_counts],
+            [name in catalogue.in_traces for _, name in traces.event_counts],
+            list(traces.event_counts.values()),
+        ],
+    )
     for trace in traces.traces:
         con.execute(
             "INSERT INTO staging.declared SELECT ?, unnest(?::VARCHAR[])",

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.links.file import DeclaredLink, LinksFile, Text
+    from msgflow.links.file import DeclaredLink, LinksFile
+    from msgflow.yaml_file import Text
 
 _NODES = """
 SELECT n.node_id, n.full_name, n.process_id, p.name, p.pid, h.hostname

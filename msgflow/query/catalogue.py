@@ -14,6 +14,56 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+# What people call what a query answers; without the s of a plural.
+_WORDS = {
+    "jitter": ("timers", "publication-rate"),
+    "rate": ("publication-rate",),
+    "frequency": ("publication-rate",),
+    "hz": ("publication-rate",),
+    "period": ("timers", "publication-rate"),
+    "timer": ("timers",),
+    "lateness": ("timers",),
+    "drop": ("delivery",),
+    "dropped": ("delivery",),
+    "los": ("delivery", "data-quality"),
+    "lost": ("delivery", "unmatched"),
+    "delivery": ("delivery",),
+    "blocking": ("interference",),
+    "blocked": ("interference", "waits"),
+    "preemption": ("interference",),
+    "latency": ("e2e-latency", "transport-latency", "service-latency"),
+    "latencie": ("e2e-latency", "transport-latency", "service-latency"),
+    "end-to-end": ("e2e-latency",),
+    "path": ("e2e-latency", "path-breakdown"),
+    "slow": ("critical-path", "flows"),
+    "slowest": ("critical-path", "flows"),
+    "bottleneck": ("critical-path", "path-breakdown"),
+    "dd": ("transport-latency", "path-breakdown"),
+    "network": ("transport-latency", "path-breakdown"),
+    "transport": ("transport-latency",),
+    "cpu": ("executor-usage",),
+    "utilisation": ("executor-usage",),
+    "utilization": ("executor-usage",),
+    "load": ("executor-usage",),
+    "duration": ("callback-duration",),
+    "runtime": ("callback-duration",),
+    "callback": ("callback-duration",),
+    "wcet": ("callback-duration",),
+    "queue": ("executor-wait", "delivery"),
+    "waiting": ("executor-wait", "waits"),
+    "age": ("data-age",),
+    "freshnes": ("data-age",),
+    "reaction": ("reaction-time",),
+    "service": ("service-latency",),
+    "topic": ("info-topics",),
+    "node": ("info-nodes",),
+    "host": ("info-hosts",),
+    "run": ("info-runs",),
+    "proces": ("info-processes",),
+    "diagnostic": ("info-diagnostics",),
+}
+
+
 @cache
 def query_names() -> tuple[str, ...]:
     """Return the names of all queries, sorted; reads no file."""
@@ -28,11 +78,19 @@ def load_query(name: str) -> Header:
         UsageError: there is no such query; the message names similar ones.
     """
     if name not in query_names():
-        near = [f"msgflow query {other}" for other in nearest(name, query_names())]
-        raise UsageError(
-            f"there is no such query — {name}", " or ".join(near) or "msgflow query --list"
-        )
+        raise UsageError(f"there is no such query — {name}", _meant(name))
     return read(resource_directory("queries") / f"{name}.sql")
+
+
+def _meant(name: str) -> str:
+    """Return the commands that somebody may have meant by a name that no query has."""
+    words = _WORDS.get(name.lower().removesuffix("s").replace("_", "-"))
+    if words is None:
+        views = resource_directory("schema") / "public"
+        if name.isidentifier() and (views / f"{name}.sql").is_file():
+            return f"it is a view: msgflow sql 'FROM {name}'"
+        words = tuple(nearest(name, query_names()))
+    return " or ".join(f"msgflow query {other}" for other in words) or "msgflow query --list"
 
 
 def load_queries() -> tuple[Header, ...]:
@@ -45,3 +103,19 @@ def nearest(name: str, known: Sequence[str]) -> list[str]:
     similar = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
     longer = [other for other in known if name and name in other and other not in similar]
     return (similar + longer)[:3]
+
+
+def column_named(name: str, columns: Sequence[str]) -> str:
+    """Return the column that a user means by `name`, which may lack the `_ns` at its end.
+
+    Raises:
+        UsageError: there is no such column; the message names similar ones.
+    """
+    for known in (name, f"{name}_ns"):
+        if known in columns:
+            return known
+    near = nearest(name, columns)
+    raise UsageError(
+        f"there is no such column — {name}",
+        f"did you mean {' or '.join(near)}" if near else f"the columns are {', '.join(columns)}",
+    )

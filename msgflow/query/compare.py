@@ -14,10 +14,11 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
 from msgflow.query.failure import is_of_the_file
 from msgflow.query.header import Header, read
+from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
-from msgflow.query.run import CUT_COLUMN, first_line, read_runs
-from msgflow.query.topics import require_topic
-from msgflow.query.window import MAXIMUM_NS, Run, choose_runs
+from msgflow.query.run import first_line, read_runs
+from msgflow.query.selection import CUT_COLUMN
+from msgflow.query.window import MAXIMUM_NS, Run, choose_one
 from msgflow.resources import resource_directory
 
 if TYPE_CHECKING:
@@ -101,6 +102,16 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         return self.result._repr_html_()
+
+    def changes(self, *, only_different: bool = True) -> QueryResult:
+        """Return a row for each path, callback or topic, the greatest change first.
+
+        Args:
+            only_different: leave out those of which no difference is shown.
+        """
+        from msgflow.query.changes import changes
+
+        return changes(self.result, only_different)
 
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
         """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
@@ -220,10 +231,10 @@ def compare(
     needed = least_resamples(confidence)
     if resamples is None:
         resamples = max(DEFAULT_RESAMPLES, needed)
-    if resamples < needed:
+    if resamples != 0 and resamples < needed:
         raise UsageError(
             f"the ends of an interval are not seen in so few resamples — {resamples}",
-            f"{needed} are needed for a confidence of {confidence:g}",
+            f"{needed} are needed for a confidence of {confidence:g}, or 0 for no intervals",
         )
     for name, limit in (("paths", max_paths), ("topics of a path", max_depth)):
         if limit < 1:
@@ -233,11 +244,11 @@ def compare(
     if what != "paths" and (from_topic is not None or to_topic is not None):
         raise UsageError(f"only paths start and end at topics, not {what}", "leave out the topics")
     runs = read_runs(connection)
-    first, second = _one(runs, run_a), _one(runs, run_b)
+    first, second = (
+        choose_one(runs, wanted, "each side of a comparison") for wanted in (run_a, run_b)
+    )
     for run in (first, second):
-        for topic in (from_topic, to_topic):
-            if topic is not None:
-                require_topic(connection, [run], topic)
+        require_places(connection, [run], {"from": from_topic, "to": to_topic})
     parameters = {
         "what": what,
         "run_a": first.run_id,
@@ -275,15 +286,6 @@ def _header() -> Header:
 def _choose(what: str, value: str, known: Sequence[str]) -> None:
     if value not in known:
         raise UsageError(f"{what}: no such choice — {value}", f"choose {' or '.join(known)}")
-
-
-def _one(runs: Sequence[Run], wanted: str | int) -> Run:
-    chosen = choose_runs(runs, wanted)
-    if not chosen:
-        raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
-    if len(chosen) > 1:
-        raise UsageError(f"one run is compared with another — {wanted}", "give a name or an id")
-    return chosen[0]
 
 
 def least_resamples(confidence: float) -> int:

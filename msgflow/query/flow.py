@@ -9,9 +9,9 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.failure import is_of_the_file
+from msgflow.query.names import require_names
 from msgflow.query.run import first_line, read_runs
-from msgflow.query.topics import require_topic
-from msgflow.query.window import MINIMUM_NS, Run, choose_runs, format_epoch, time_point
+from msgflow.query.window import MINIMUM_NS, Run, choose_one, format_epoch, time_point
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -85,29 +85,23 @@ def find_start(
     Raises:
         UsageError: no such run or topic, a time that cannot be read, or no message then.
     """
-    runs = choose_runs(read_runs(connection), run)
-    if len(runs) != 1:
-        many = f"{len(runs)} runs are chosen" if runs else "the database holds no run yet"
-        raise UsageError(
-            f"one message belongs to one run, but {many}",
-            "choose one with --run" if runs else "msgflow ingest TRACE",
-        )
-    require_topic(connection, runs, topic)
-    at_ns = MINIMUM_NS if at is None else time_point(at, runs, "--at")
-    bindings = {"run_id": runs[0].run_id, "topic": topic}
+    one = choose_one(read_runs(connection), run, "a message")
+    require_names(connection, (one,), "topic", [topic])
+    at_ns = MINIMUM_NS if at is None else time_point(at, (one,), "--at")
+    bindings = {"run_id": one.run_id, "topic": topic}
     found = connection.execute(_FIRST, bindings | {"at_ns": at_ns}).fetchall()
     if not found:
         ((last_ns,),) = connection.execute(_LAST, bindings).fetchall()
         if last_ns is None:
             raise UsageError(
                 f"the trace shows no message that was published on the topic — {topic}",
-                f"msgflow query info-topics --run {runs[0].run_id}",
+                f"msgflow query info-topics --run {one.run_id}",
             )
         raise UsageError(
             f"no message was published on {topic} at or after that time — {at}",
-            f"the last one was at {_place(last_ns, runs[0])}",
+            f"the last one was at {_place(last_ns, one)}",
         )
-    start_ns = runs[0].start_ns
+    start_ns = one.start_ns
     is_early = at is not None and start_ns is not None and at_ns < start_ns
     note = "the time of --at is before the run: this is the first message on the topic"
     return Start("publication", found[0][0], (note,) if is_early else ())

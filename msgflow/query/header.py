@@ -9,11 +9,15 @@
     -- param: case VARCHAR {first|last} = 'first'     Which rows count
     -- param: depth BIGINT {1..} = 32     How deep; at least 1
     -- column: median_ns BIGINT [ns]  Half of the flows took no longer
+    -- brief: path, median_ns
     -- note: clocks
     -- needs: flow_path, stat_end_to_end
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 `note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ.
+`brief` names the columns that a narrow terminal is to show, the most important first, `slowest` the
+one that `--slowest N` goes by. The unit of a column may also be what it names: 'node', 'topic',
+'callback', 'host' or 'path', for the options that choose rows by them.
 """
 
 from __future__ import annotations
@@ -39,7 +43,8 @@ _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<descrip
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
-    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "needs"
+    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "needs",
+    "brief", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
@@ -79,7 +84,8 @@ class Column:
     Attributes:
         name: column name.
         type: DuckDB type as `DESCRIBE` prints it.
-        unit: 'ns' for a duration, 'epoch ns' for a point in time, another unit, or None.
+        unit: 'ns' for a duration, 'epoch ns' for a point in time, another unit, what it names
+            ('node', 'topic', 'callback', 'host', 'path'), or None.
         description: one sentence.
     """
 
@@ -109,6 +115,8 @@ class Header:
         note: 'clocks' where rows compare times of several hosts, else None.
         body: the SQL below the header.
         path: the file.
+        brief: columns for where not all have a place, the most important first.
+        slowest: column by which rows are the slowest, else None.
     """
 
     name: str
@@ -125,6 +133,8 @@ class Header:
     note: str | None
     body: str
     path: Path
+    brief: tuple[str, ...] = ()
+    slowest: str | None = None
 
 
 @dataclass(frozen=True)
@@ -170,6 +180,10 @@ def parse(text: str, path: Path) -> Header:
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
     _check_names(columns, path)
+    for key in ("brief", "slowest"):
+        for name in _names(single.get(key, "")):
+            if name not in [column.name for column in columns]:
+                raise _error(path, 1, f"{key} names a column that there is not: {name!r}")
     return Header(
         name=single["name"],
         title=single.get("title", single["name"]),
@@ -178,13 +192,15 @@ def parse(text: str, path: Path) -> Header:
         kind=kind,
         params=params,
         columns=columns,
-        needs=tuple(part.strip() for part in single.get("needs", "").split(",") if part.strip()),
+        needs=_names(single.get("needs", "")),
         severity=single.get("severity"),
         cause=single.get("cause"),
         cure=single.get("cure"),
         note=note,
         body=body,
         path=path,
+        brief=_names(single.get("brief", "")),
+        slowest=single.get("slowest"),
     )
 
 
@@ -225,6 +241,10 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
     if not fields:
         raise _error(path, 1, "there is no header")
     return fields, "\n".join(lines[count:]).strip("\n") + "\n"
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
 def _param(field: _Field, path: Path) -> Param:

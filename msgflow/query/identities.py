@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 # Parameters that take an id, in every query that has them: what it is of, and what lists them.
 _IDENTITIES = {
-    "take_id": ("take", "msgflow query flows"),
-    "callback_id": ("callback", "msgflow query executor-wait"),
+    "flow": ("take", "take_id", "msgflow query flows"),
+    "callback_id": ("callback", "callback_id", "msgflow query executor-wait"),
 }
 
 
@@ -34,12 +34,12 @@ def require_identities(
     Raises:
         UsageError: the runs have no such thing.
     """
-    for key, (view, hint) in _IDENTITIES.items():
+    for key, (view, column, hint) in _IDENTITIES.items():
         number = bound.get(key)
         if number is None or not runs:
             continue
         known = connection.execute(
-            f"SELECT 1 FROM main.{view} WHERE {key} = $number AND list_contains($runs, run_id)",
+            f"SELECT 1 FROM main.{view} WHERE {column} = $number AND list_contains($runs, run_id)",
             {"number": number, "runs": [run.run_id for run in runs]},
         ).fetchall()
         if not known:

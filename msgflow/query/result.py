@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
+from msgflow.query.catalogue import column_named
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pyarrow as pa
 
     from msgflow.query.header import Header
@@ -83,6 +86,18 @@ class QueryResult:
                 f"there are no such times — {times}", f"choose one of {', '.join(Times)}"
             ) from None
         return replace(self, table=converted(self, form))
+
+    def with_columns(self, names: Sequence[str]) -> QueryResult:
+        """Return the rows with these columns only, in this order.
+
+        Args:
+            names: of columns; `_ns` at their end may be left out, as tables do.
+
+        Raises:
+            UsageError: there is no such column; the message names similar ones.
+        """
+        found = [column_named(name, self.columns) for name in names]
+        return replace(self, table=self.table.select(list(dict.fromkeys(found))))
 
     def to_arrow(self) -> pa.Table:
         """Return the rows as a pyarrow.Table."""

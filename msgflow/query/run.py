@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -10,14 +11,23 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import nearest
 from msgflow.query.clocks import clock_notes
 from msgflow.query.failure import is_of_the_file
+from msgflow.query.human import format_duration
 from msgflow.query.identities import require_identities
+from msgflow.query.names import PLACE_PARAMETERS, require_names, require_places
 from msgflow.query.result import QueryResult
-from msgflow.query.topics import require_topics
+from msgflow.query.selection import (
+    COUNTS,
+    CUT_COLUMN,
+    INTERNAL_COLUMN,
+    PLACE,
+    Selection,
+    selected,
+)
 from msgflow.query.value import described_type, parse_text
-from msgflow.query.window import Run, choose_runs, time_window
+from msgflow.query.window import Run, choose_runs, format_epoch, time_window
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import pyarrow as pa
 
@@ -25,8 +35,15 @@ if TYPE_CHECKING:
     from msgflow.query.value import Value
 
 RESERVED = ("runs", "start_ns", "end_ns")
-INTERNAL_COLUMN = "is_internal"
-CUT_COLUMN = "is_cut"
+_COLUMN = re.compile(r'Referenced column "([^"]*)"')
+# What a condition may be at fault for; the queries themselves are tested.
+_OF_CONDITIONS = (
+    duckdb.BinderException,
+    duckdb.ParserException,
+    duckdb.ConversionException,
+    duckdb.OutOfRangeException,
+    duckdb.InvalidInputException,
+)
 
 
 def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
@@ -47,6 +64,7 @@ def run_query(
     end: str | int | None = None,
     skip_first: float | None = None,
     internal: bool = False,
+    selection: Selection | None = None,
 ) -> QueryResult:
     """Run the query of `header`.
 
@@ -59,9 +77,11 @@ def run_query(
         end: its end, likewise.
         skip_first: seconds to leave out at the begin of the run.
         internal: show the rows of ROS's own topics and services too.
+        selection: which rows are wanted; all when None.
 
     Raises:
-        UsageError: a parameter, run, topic, id or time that does not exist or cannot be read.
+        UsageError: a parameter, run, name, id, column or time that does not exist or cannot be
+            read, or rows that the query does not have.
         QueryError: the database could not run it.
     """
     used = connection.extract_statements(header.body)[0].named_parameters
@@ -80,22 +100,36 @@ def run_query(
     }
     bindings = {name: value for name, value in reserved.items() if name in used}
     own = bind(header, parameters)
-    require_topics(connection, runs, own)
+    require_places(connection, runs, own)
     require_identities(connection, runs, own)
-    bindings |= own
+    selection = selection or Selection()
+    sql, chosen = selected(header, selection, internal)
+    for kind, names in selection.names().items():
+        require_names(connection, runs, kind, names)
+    bindings |= own | chosen
     try:
-        table = connection.sql(header.body, params=bindings).to_arrow_table()
+        table = connection.sql(sql, params=bindings).to_arrow_table()
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
+        if selection.where is not None and isinstance(error, _OF_CONDITIONS):
+            raise UsageError(
+                f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
+            ) from error
         raise QueryError(f"the query failed: {first_line(error)} — {header.name}") from error
-    notes = [] if runs else ["the database holds no run yet"]
+    table, total, hidden, cut = _without_counts(table)
     if not internal and INTERNAL_COLUMN in table.column_names:
-        table, hidden = _without_internal(table)
-        if hidden:
-            rows = "1 internal row is" if hidden == 1 else f"{hidden} internal rows are"
-            notes.append(f"{rows} hidden; --internal shows them")
-    notes += _cut(table)
+        table = table.drop_columns([INTERNAL_COLUMN])
+    notes = [] if runs else ["the database holds no run yet"]
+    if not start is end is skip_first is None:
+        notes += _beside(connection, runs, start_ns, end_ns)
+    if table.num_rows < total:
+        notes.append(f"{table.num_rows:,} of {total:,} rows")
+    if hidden:
+        rows = "1 internal row is" if hidden == 1 else f"{hidden} internal rows are"
+        notes.append(f"{rows} hidden; --internal shows them")
+    if cut:
+        notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
     if header.note == "clocks" and table.num_rows:
         notes += clock_notes(connection, runs)
     return QueryResult(table, header, runs, notes)
@@ -141,6 +175,8 @@ def first_line(error: Exception) -> str:
 
 def _fit(header: Header, param: Param, value: Value) -> Value:
     option = f"--{param.name.replace('_', '-')}"
+    if param.name in PLACE_PARAMETERS and isinstance(value, list | tuple):
+        value = ",".join(map(str, value))
     if isinstance(value, str):
         try:
             value = parse_text(value, param.type)
@@ -163,13 +199,31 @@ def _fit(header: Header, param: Param, value: Value) -> Value:
     return value
 
 
-def _cut(table: pa.Table) -> list[str]:
-    from pyarrow import compute
-
-    if CUT_COLUMN not in table.column_names or not compute.any(table[CUT_COLUMN]).as_py():
+def _beside(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], start_ns: int, end_ns: int
+) -> list[str]:
+    """Say so where a time window has nothing of any of the runs."""
+    rows = connection.execute(
+        "SELECT start_ns, end_ns FROM main.run WHERE list_contains($runs, run_id)",
+        {"runs": [run.run_id for run in runs]},
+    ).fetchall()
+    seen = [(first, last) for first, last in rows if first is not None and last is not None]
+    if any(first < end_ns and last >= start_ns for first, last in seen):
         return []
-    number = compute.sum(table[CUT_COLUMN]).as_py()
-    return [f"{number} of the rows are cut off by the limits of the query, see {CUT_COLUMN}"]
+    if len(runs) > 1:
+        return ["none of the runs has anything in this time window"]
+    nothing = "the run has nothing in this time window"
+    if not seen:
+        return [nothing]
+    ((first, last),) = seen
+    return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
+
+
+def _columns_hint(header: Header, error: Exception) -> str:
+    names = [column.name for column in header.columns]
+    found = _COLUMN.search(str(error))
+    near = nearest(found[1], names) if found else []
+    return f"did you mean {' or '.join(near)}" if near else f"the columns are {', '.join(names)}"
 
 
 def _parameters(header: Header) -> str:
@@ -178,10 +232,9 @@ def _parameters(header: Header) -> str:
     return f"its parameters are {', '.join(param.name for param in header.params)}"
 
 
-def _without_internal(table: pa.Table) -> tuple[pa.Table, int]:
-    from pyarrow import compute
-
-    is_internal = table[INTERNAL_COLUMN]
-    is_visible = compute.or_kleene(compute.is_null(is_internal), compute.invert(is_internal))
-    visible = table.filter(is_visible).drop_columns([INTERNAL_COLUMN])
-    return visible, table.num_rows - visible.num_rows
+def _without_counts(table: pa.Table) -> tuple[pa.Table, int, int, int]:
+    """Return the rows themselves, and how many there were, were hidden, and are cut off."""
+    total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
+    if table[PLACE][0].as_py() is None:
+        table = table.slice(0, 0)
+    return table.drop_columns([*COUNTS, PLACE]), total, hidden, cut

@@ -6,12 +6,12 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
+from msgflow.query.present import MOST_ROWS
 from msgflow.query.table import cells, table_lines
 
 if TYPE_CHECKING:
     from msgflow.query.result import QueryResult
 
-MOST_ROWS = 50
 _STYLE = "text-align: {}; white-space: pre-wrap"
 
 

@@ -16,6 +16,9 @@ MINIMUM_NS = -(2**63)
 MAXIMUM_NS = 2**63 - 1
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _INTEGER = re.compile(r"-?\d+")
+# What is less is no time since the epoch in nanoseconds: in 1970, it would be 12 days. As seconds
+# it would be 30 million years.
+LEAST_EPOCH_NS = 10**15
 # More digits than any id or time has, which Python would refuse to read.
 _MOST_DIGITS = 40
 _OFFSET = re.compile(
@@ -78,6 +81,25 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
     return tuple(found)
 
 
+def choose_one(runs: Sequence[Run], wanted: str | int | None, what: str) -> Run:
+    """Return the run that `wanted` means, for what can be of one only.
+
+    Args:
+        runs: all runs of the database.
+        wanted: what the user said, as of `choose_runs`.
+        what: what it is for, as in 'a graph'.
+
+    Raises:
+        UsageError: no such run, none at all, or several.
+    """
+    chosen = choose_runs(runs, wanted)
+    if not chosen:
+        raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+    if len(chosen) > 1:
+        raise UsageError(f"{what} is of one run — {wanted}", "give a name or an id")
+    return chosen[0]
+
+
 def _integer(text: str) -> int | None:
     return int(text) if len(text) <= _MOST_DIGITS and _INTEGER.fullmatch(text) else None
 
@@ -97,7 +119,8 @@ def time_window(
 
     Args:
         runs: the chosen runs; times relative to a start need exactly one.
-        start: epoch ns, an offset from the run's start ('2.5s', '+2.5', '100ms'), or ISO time.
+        start: an offset from the run's start ('2.5' seconds, '100ms'), ISO time, or epoch ns (an
+            integer, or a text of 16 digits or more).
         end: likewise.
         skip_first: seconds to leave out at the begin of the run, in place of `start`.
 
@@ -127,7 +150,8 @@ def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
     """Return the point in time, in epoch ns, that `text` means.
 
     Args:
-        text: epoch ns, an offset from the run's start ('2.5s', '+2.5', '100ms'), or ISO time.
+        text: an offset from the run's start ('2.5' seconds, '100ms'), ISO time, or epoch ns (an
+            integer, or a text of 16 digits or more).
         runs: the chosen runs; an offset needs exactly one.
         option: what errors call it, such as '--start'.
 
@@ -158,17 +182,17 @@ def _read(text: str | int, runs: Sequence[Run], option: str) -> int:
     if isinstance(text, int):
         return text
     text = text.strip()
-    if (time_ns := _integer(text)) is not None:
+    if (time_ns := _integer(text)) is not None and abs(time_ns) >= LEAST_EPOCH_NS:
         return time_ns
-    if (offset := _OFFSET.fullmatch(text)) and (offset["sign"] or offset["unit"]):
+    if offset := _OFFSET.fullmatch(text):
         return _run_start(runs, option) + _to_ns(offset["number"], offset["unit"] or "s")
     try:
         return _iso_ns(text)
     except ValueError:
         raise UsageError(
             f"cannot read the time of {option} — {text}",
-            f"{option} 2.5s (from the start of the run), {option} 1700000000000000000 (epoch ns)"
-            f" or {option} 2023-11-14T22:13:20Z",
+            f"{option} 2.5 (seconds from the start of the run), {option} 1700000000000000000"
+            f" (epoch ns) or {option} 2023-11-14T22:13:20Z",
         ) from None
 
 

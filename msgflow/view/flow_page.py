@@ -8,7 +8,9 @@ import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.atomic import replacing
+from msgflow.query.flow import STEPS_PER_MESSAGE
 from msgflow.view.columns import encode
+from msgflow.view.critical import critical_path
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Pages
 from msgflow.view.single_page import Parts, single_page
@@ -21,7 +23,11 @@ if TYPE_CHECKING:
     from msgflow.query.window import Run
 
 _BAR = ["row_key", "kind", "id", "start_at", "length", "flags"]
-_WANTED = {"forward": "is_effect", "backward": "is_cause"}
+# How much there is, whatever the limits.
+_COUNTS = {
+    direction: f"SELECT count(*) FROM main.flow_{direction}(?, ?)"
+    for direction in ("forward", "backward", "both")
+}
 
 
 def write_flow_page(
@@ -32,6 +38,7 @@ def write_flow_page(
     number: int,
     *,
     direction: str,
+    depth: int,
     limit: int,
 ) -> int:
     """Write the timeline of everything that a thing led to and came from; return its bytes.
@@ -43,16 +50,16 @@ def write_flow_page(
         kind: 'publication', 'take', 'callback_instance', 'request' or 'response'.
         number: its identity.
         direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
+        depth: most messages in a row, each way.
         limit: most vertices, those nearest in time; the page says how many there are beyond.
     """
     pages = Pages()
     params: dict[str, Any] = {"run": str(run.run_id)}
     extent = pages.extent(connection, params)
-    frame = {"run": run.run_id, "origin_ns": extent.origin_ns}
-    flow = run_page_query(connection, "flow", frame | {"kind": kind, "id": number, "limit": limit})
-    if direction in _WANTED:
-        flow = flow.filter(flow[_WANTED[direction]])
-    count = int(flow["vertex_count"][0].as_py()) if flow.num_rows else 0
+    frame: dict[str, Any] = {"run": run.run_id, "origin_ns": extent.origin_ns}
+    asked = {"kind": kind, "id": number, "direction": direction, "limit": limit}
+    flow = run_page_query(connection, "flow", frame | asked | {"steps": depth * STEPS_PER_MESSAGE})
+    ((count,),) = connection.execute(_COUNTS[direction], [kind, number]).fetchall()
     bars = flow.group_by(_BAR, use_threads=False).aggregate([])
     bars = bars.sort_by([(name, "ascending") for name in ("row_key", "start_at", "kind", "id")])
     begin = compute.min(bars["start_at"]).as_py() or 0
@@ -64,13 +71,20 @@ def write_flow_page(
     rows = run_page_query(connection, "row", frame)
     links = run_page_query(connection, "links", values | {"limit": 2**40})
     notes = []
-    if direction == "both" and count > bars.num_rows:
-        notes.append(f"{bars.num_rows:,} of {count:,} vertices of the flow are here (--limit).")
+    if count > bars.num_rows:
+        notes.append(
+            f"{bars.num_rows:,} of {count:,} vertices of the flow are here"
+            f" (--depth {depth}, --limit {limit})."
+        )
     parts = Parts()
     runs = run_page_query(connection, "run", {})
     parts.add("run", encode(runs.filter(compute.equal(runs["run_id"], run.run_id))))
     parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], bars["row_key"]))))
     parts.add("gap?", pages.answer(connection, "gap", params))
+    parts.add(
+        f"critical?id={number}&kind={kind}",
+        critical_path(connection, run, extent.origin_ns, kind, number),
+    )
     parts.add("detail?place=0", encode(bars))
     parts.add("links?place=0", encode(_between(links, bars)))
     parts.add("edge?", encode(edges.rename_columns(["to_kind", "to_id", *edges.column_names[2:]])))

@@ -17,8 +17,9 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.clocks import clock_notes
 from msgflow.query.compare import compare
 from msgflow.query.run import read_runs, run_query
-from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs
+from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_one
 from msgflow.view.columns import encode
+from msgflow.view.critical import critical_path
 from msgflow.view.page_query import page_query, run_page_query
 
 if TYPE_CHECKING:
@@ -163,15 +164,13 @@ class Pages:
 
     def extent(self, connection: duckdb.DuckDBPyConnection, params: Params) -> Extent:
         """Return the run that the page is about."""
-        runs = choose_runs(read_runs(connection), params.get("run"))
-        if len(runs) != 1:
-            raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+        run = choose_one(read_runs(connection), params.get("run"), "a page")
         ((start_ns, end_ns),) = connection.execute(
-            "SELECT start_ns, end_ns FROM main.run WHERE run_id = ?", [runs[0].run_id]
+            "SELECT start_ns, end_ns FROM main.run WHERE run_id = ?", [run.run_id]
         ).fetchall()
         if start_ns is None:
-            return Extent(runs[0], 0, 0)
-        return Extent(runs[0], start_ns, max(end_ns - start_ns, 0))
+            return Extent(run, 0, 0)
+        return Extent(run, start_ns, max(end_ns - start_ns, 0))
 
     def window(self, extent: Extent, params: Params) -> tuple[int, int]:
         """Return (begin, end) in epoch ns that the page asks for, within what is to be shown."""
@@ -210,6 +209,12 @@ class Pages:
             units=result.units,
         )
 
+    def _critical(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
+        extent = self.extent(connection, params)
+        chosen = None if params.get("from") is None else str(params["from"])
+        kind, number = _kind(params), _whole(params, "id")
+        return critical_path(connection, extent.run, extent.origin_ns, kind, number, chosen)
+
     def _finding(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
         findings = [asdict(found) for found in find(connection, [extent.run.run_id])]
@@ -221,9 +226,11 @@ class Pages:
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
+        # Intervals take longest: the page shows what was measured before it asks for them.
+        is_quick = bool(params.get("quick"))
         comparison = compare(
             connection, str(_whole(params, "other")), str(extent.run.run_id),
-            what=str(params.get("what", "paths")),
+            what=str(params.get("what", "paths")), resamples=0 if is_quick else None,
         )  # fmt: skip
         result = comparison.result
         return encode(
@@ -232,6 +239,7 @@ class Pages:
                 "notes": result.notes,
                 "a": comparison.run_a.name,
                 "b": comparison.run_b.name,
+                "is_quick": is_quick,
                 "columns": {
                     column.name: column.description
                     for column in (result.header.columns if result.header else ())
@@ -303,13 +311,10 @@ class Pages:
         return encode(run_page_query(connection, "edge", values), units=_units("edge"))
 
     def _flow(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        kind = params.get("kind")
-        if kind not in _KINDS:
-            raise UsageError(f"a flow begins with one of {', '.join(_KINDS)} — {kind}")
         extent = self.extent(connection, params)
-        values = {
+        values: Params = {
             "origin_ns": extent.origin_ns,
-            "kind": kind,
+            "kind": _kind(params),
             "id": _whole(params, "id"),
         }
         table = run_page_query(connection, "flow", values)
@@ -360,6 +365,7 @@ _ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]]
     "links": Pages._links,
     "edge": Pages._edge,
     "flow": Pages._flow,
+    "critical": Pages._critical,
 }
 _PLAIN = ("row", "gap", "path", "executor_share", "executor_node", "neighbour")
 _OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")
@@ -367,6 +373,13 @@ _OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")
 
 def _units(name: str) -> dict[str, str]:
     return {column.name: column.unit for column in page_query(name).columns if column.unit}
+
+
+def _kind(params: Params) -> str:
+    kind = params.get("kind")
+    if kind not in _KINDS:
+        raise UsageError(f"a flow begins with one of {', '.join(_KINDS)} — {kind}")
+    return str(kind)
 
 
 def _own(name: str, params: Params, given: Mapping[str, Any]) -> Params:

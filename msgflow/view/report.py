@@ -16,7 +16,7 @@ from pyarrow import compute
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.query.run import read_runs
-from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs, time_window
+from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_one, time_window
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # Of these the pages show every path's pictures; of more those with the slowest flows.
 MOST_PATHS = 200
+# Flows that the report tells the critical path of.
+MOST_CRITICAL = 6
 # Estimate of what a bar with its links takes in a file, once compressed.
 _BYTES_PER_BAR = 16
 _LEVEL_SHARE = 0.25
@@ -84,21 +86,22 @@ def write_report(
         UsageError: no such run or path, a window without events, or a size that is too small.
         QueryError: the database could not run a query.
     """
-    runs = choose_runs(read_runs(connection), run)
-    if len(runs) != 1:
-        raise UsageError(
-            "a report is about one run" if runs else "the database holds no run yet",
-            "choose one with --run" if runs else "msgflow ingest TRACE",
-        )
-    window = time_window(runs, start, end)
-    maker = _Maker(connection, str(runs[0].run_id), window, through, max_size, progress)
+    one = choose_one(read_runs(connection), run, "a report")
+    window = time_window((one,), start, end)
+    maker = _Maker(connection, str(one.run_id), window, through, max_size, progress)
     try:
         content, notes = maker.make(None if compare is None else str(compare))
     finally:
         maker.pages.close()
+    written = content.encode()
+    if len(written) > max_size:
+        raise UsageError(
+            f"the report takes {len(written):,} bytes, more than {max_size:,}",
+            "give a larger --max-size, or cut the report with --start, --end or --path",
+        )
     with replacing(path) as temporary:
-        temporary.write_text(content, encoding="utf-8")
-    return Report(path, len(content.encode()), runs[0], tuple(notes))
+        temporary.write_bytes(written)
+    return Report(path, len(written), one, tuple(notes))
 
 
 class _Maker:
@@ -155,7 +158,7 @@ class _Maker:
         chosen = self.paths()
         if compare is not None:
             self.progress("comparison")
-            self.compared(compare)
+            self.compared(compare, chosen)
         self.progress("timeline")
         head = self.timeline((begin, end), chosen)
         return single_page(self.parts, head), self.notes
@@ -164,7 +167,7 @@ class _Maker:
         table = run_page_query(self.connection, "run", {})
         wanted = [self.extent.run.run_id]
         if compare is not None:
-            (other,) = choose_runs(read_runs(self.connection), compare)
+            other = choose_one(read_runs(self.connection), compare, "the other side")
             if other.run_id == self.extent.run.run_id:
                 raise UsageError("a run is not compared with itself", "give another --compare")
             wanted.insert(0, other.run_id)
@@ -205,10 +208,26 @@ class _Maker:
             for name in ("path_histogram", "path_share", "path_point", "path_slowest"):
                 self.keep(name, path=number)
         self.keep("path_slowest", limit=1)
+        if numbers:
+            self.critical(worst.filter(compute.is_in(worst["path_id"], pa.array(numbers))), rows)
         return numbers
 
-    def compared(self, compare: str) -> None:
-        (other,) = choose_runs(read_runs(self.connection), compare)
+    def critical(self, slowest: pa.Table, paths: pa.Table) -> None:
+        """Keep what the slowest flows waited for: of few, as each takes as long as a query."""
+        topics = zip(paths["path_id"].to_pylist(), paths["topics"].to_pylist(), strict=True)
+        first = {path: names[0] for path, names in topics}
+        order = [("latency", "descending"), ("path_id", "ascending")]
+        begins = {
+            flow["take_id"]: first[flow["path_id"]]
+            for flow in reversed(slowest.sort_by(order).to_pylist())
+            if flow["take_id"] is not None
+        }
+        for take, topic in list(reversed(begins.items()))[:MOST_CRITICAL]:
+            content = self.answer("critical", kind="take", id=take, **{"from": topic})
+            self.parts.add(f"critical?id={take}&kind=take", content)
+
+    def compared(self, compare: str, chosen: list[int]) -> None:
+        other = choose_one(read_runs(self.connection), compare, "the other side")
         for what in ("paths", "callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
         params = {"run": str(other.run_id)}
@@ -223,6 +242,11 @@ class _Maker:
                 f"path_share?path={number}@{other.run_id}",
                 self.pages.answer(self.connection, "path_share", params | {"path": number}),
             )
+        # Whatever path is looked at, its distribution is there of both runs.
+        own = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
+        for number in own["path_id"].to_pylist()[:MOST_PATHS]:
+            if number not in chosen:
+                self.keep("path_share", path=number)
 
     def timeline(self, window: tuple[int, int], paths: list[int]) -> dict[str, Any]:
         """Keep bars, arrows and links; return the head that says which."""
@@ -318,9 +342,8 @@ class _Maker:
         room -= size
         each = window[1] - window[0]
         share = max(room, 0) / (count * _BYTES_PER_BAR)
-        number = _STRETCHES
-        length = max(int(each * share / number), 1)
-        middles = self.slow_moments()[:number] or [window[0] - origin + each // 2]
+        middles = self.slow_moments()[:_STRETCHES] or [window[0] - origin + each // 2]
+        length = max(int(each * share / len(middles)), 1)
         stretches: list[tuple[int, int]] = []
         for middle in sorted(middles):
             low = max(middle + origin - length // 4, window[0])
@@ -343,7 +366,8 @@ class _Maker:
         ]
         self.notes.append(
             f"The timeline of {count:,} bars does not fit into {self.max_size:,} bytes: single bars"
-            f" and flows are here for {len(stretches)} stretches around the slowest flows"
+            f" and flows are here for {len(stretches)}"
+            f" {'stretch' if len(stretches) == 1 else 'stretches'} around the slowest flows"
             f" ({held:,} bars), the rest in bins of {bin_ns / 1e6:.3f} ms. A larger --max-size, or"
             " --start and --end, keep more; msgflow ui has everything."
         )

@@ -27,7 +27,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Route
 
 from msgflow.db.connection import connect
-from msgflow.errors import DatabaseError, MsgflowError, UsageError
+from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 from msgflow.query.run import first_line
 from msgflow.view import assets
 from msgflow.view.pages import Pages
@@ -76,16 +76,64 @@ class Identity:
     size: int
 
 
+class Turns:
+    """Lets questions run together; one that then has too little memory is asked again, alone."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._running = 0
+        self._is_alone = False
+
+    def ask(self, question: Callable[[], bytes]) -> bytes:
+        """Return the answer.
+
+        Raises:
+            MsgflowError: what the question raises; of memory only where it has too little alone.
+        """
+        try:
+            with self._turn(alone=False):
+                return question()
+        except (duckdb.OutOfMemoryException, QueryError) as error:
+            if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+                raise
+        try:
+            with self._turn(alone=True):
+                return question()
+        except (duckdb.OutOfMemoryException, QueryError) as error:
+            if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+                raise
+            raise QueryError(
+                "this takes more memory than the server may use",
+                "start it with more: msgflow ui --memory-limit 2GB",
+            ) from error
+
+    @contextmanager
+    def _turn(self, *, alone: bool) -> Iterator[None]:
+        with self._changed:
+            self._changed.wait_for(lambda: not self._is_alone and not (alone and self._running))
+            self._running += 1
+            self._is_alone = alone
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._running -= 1
+                self._is_alone = False
+                self._changed.notify_all()
+
+
 class Shared:
     """The open database, shared by all requests, and opened anew when its file is another.
 
     Attributes:
         generation: counts how often that was.
+        turns: of questions.
     """
 
     def __init__(self, path: Path, memory_limit: str) -> None:
         self.path = path
         self.generation = 1
+        self.turns = Turns()
         self._memory_limit = memory_limit
         self._lock = threading.Lock()
         self._identity = _identity(path)
@@ -216,7 +264,8 @@ async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLim
             group.start_soon(watch, group.cancel_scope)
             content.append(
                 await anyio.to_thread.run_sync(
-                    lambda: pages.answer(cursor, name, params), limiter=limiter
+                    lambda: shared.turns.ask(lambda: pages.answer(cursor, name, params)),
+                    limiter=limiter,
                 )
             )
             group.cancel_scope.cancel()

@@ -1,7 +1,7 @@
 -- name: finding.audit_failed
 -- title: The database contradicts itself
 -- description: An audit of the content failed when the run was ingested. Results may be wrong.
--- cause: A mistake of msgflow, or input that it takes for something else.
+-- cause: A mistake in msgflow, or input that it misunderstands.
 -- cure: Run msgflow db check, and report what it prints together with the trace.
 -- grain: one row per audit
 -- severity: error

@@ -1,8 +1,8 @@
 -- name: finding.clock_jumps
 -- title: The clock of a host was set while recording
--- description: The stamps of messages jumped against the clock of the trace. Matching by equal
---     stamps is not affected; latencies measured by stamps are, and matching by time near the jump
---     may be.
+-- description: The clock that stamps messages jumped against the clock of the trace. Matching by
+--     equal stamps is not affected. Latencies measured by stamps are, and matching by time near the
+--     jump may be.
 -- cause: NTP or a user set the clock of the host (the trace follows a clock that cannot be set).
 -- cure: Let the clock settle before recording (chronyc waitsync), and slew instead of step.
 -- grain: one row per host

@@ -1,10 +1,10 @@
 -- name: finding.clocks_apart
 -- title: The clocks of two hosts are apart
--- description: Messages seem to be received before they were published. Latencies between the two
---     hosts are off by at least that much; links are right all the same, as they compare stamps.
+-- description: Messages seem to arrive before they were published. Latencies between the two hosts
+--     are wrong by at least that much. Links are right all the same, since they compare stamps.
 -- cause: The hosts were not synchronised while recording.
--- cure: Synchronise the clocks before recording (chrony, ptp4l), or correct them now:
---     msgflow clocks apply messages, or, where messages go one way only, msgflow clocks apply FILE.
+-- cure: Correct the clocks now: msgflow clocks apply messages, or msgflow clocks apply FILE if
+--     messages go one way only. Next time, synchronise the clocks before recording (chrony, ptp4l).
 -- grain: one row per pair of hosts
 -- severity: warning
 -- needs: main.link_transport, main.publication, main.take, main.process, main.host, derive.counted

@@ -1,10 +1,9 @@
 -- name: finding.clocks_not_together
 -- title: The clocks of two hosts were not brought together
--- description: How far the latencies between the two are wrong is not known: they are those of the
---     clocks as recorded.
--- cause: Nobody asked for it, or messages go one way only.
--- cure: Correct the clocks: msgflow clocks apply messages, or, where messages go one way only,
---     msgflow clocks apply FILE. If the hosts were synchronised while recording, nothing.
+-- description: Latencies between the two are as recorded. How wrong they are is not known.
+-- cause: No correction was asked for, or messages go one way only.
+-- cure: Correct the clocks: msgflow clocks apply messages, or msgflow clocks apply FILE if messages
+--     go one way only. If the hosts were synchronised while recording, do nothing.
 -- grain: one row per pair of hosts
 -- severity: warning
 -- needs: main.remote_latency, main.host, main.clock, derive.counted

@@ -1,11 +1,11 @@
 -- name: finding.damaged_trace
 -- title: Files of the trace are damaged
--- description: Parts of the files could not be read: packets cut off at the end, or bytes that make
---     no sense. The rest was kept.
+-- description: Parts of the files could not be read: packets that are cut off, or bytes that make
+--     no sense. Everything else was kept.
 -- cause: The recording machine lost power or space, the session was never stopped, or the files
 --     were copied while they were written.
--- cure: Stop the session before copying (lttng stop, lttng destroy), check free space, copy again
---     and compare sizes.
+-- cure: Stop the session before copying (lttng stop, lttng destroy), check the free space, copy
+--     again and compare sizes.
 -- grain: one row per damage, the first twenty of each trace, then one for the rest
 -- severity: error
 -- needs: main.diagnostic, main.trace

@@ -2,11 +2,11 @@
 -- title: The tracer discarded events
 -- description: Events were lost because the buffers were full. What happened in those gaps is
 --     missing, nothing is paired across them, and results near them are marked is_loss_affected.
---     A packet that was cut off, whose events nobody counted, is a damage of the trace. Where
---     packets are missing as well, nobody knows how many of the discarded events were in them:
---     these are not counted.
+--     Events of packets that were cut off are not counted here: that is damage of the trace. If
+--     packets are missing as well, it is not known how many of the discarded events were in them,
+--     and these are not counted either.
 -- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
---     take them away.
+--     empty them.
 -- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
 --     --num-subbuf=8 CHANNEL before the events are enabled (ros2 trace: --subbuffer-size-ust), with
 --     the size given above; or enable fewer events, or write to a faster disk.

@@ -1,9 +1,9 @@
 -- name: finding.ignored_events
 -- title: Events were left out on request
--- description: The run was ingested without events that its traces hold. What they tell is missing
---     in all results.
+-- description: The run was ingested without some of the events that its traces hold. What they show
+--     is missing from all results.
 -- cause: The option --ignore of msgflow ingest.
--- cure: Ingest again without it: msgflow ingest --replace TRACE.
+-- cure: Ingest again without the option: msgflow ingest --replace TRACE.
 -- grain: one row per run
 -- severity: warning
 -- needs: main.diagnostic, main.run

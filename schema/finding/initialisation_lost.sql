@@ -1,13 +1,13 @@
 -- name: finding.initialisation_lost
 -- title: Events of initialisation were lost
--- description: Objects were used whose creation is not in the trace, and events of the time when
---     their process was created are missing. They are placeholders without a name or with one
---     deduced from messages, so that topics and nodes are missing in results.
+-- description: Objects were used whose creation is not in the trace, and the trace lost events at
+--     the time when their process started. These objects are placeholders with no name, or with one
+--     deduced from messages. So topics and nodes are missing from results.
 -- cause: The buffers were full while the process started, which is when it records most; or packets
 --     of that time are missing.
--- cure: Record with larger sub-buffers (see what was discarded), or in discard mode where packets
---     were overwritten; or record initialisation into a snapshot session that runs all the time,
---     and ingest both.
+-- cure: Record with larger sub-buffers (see discarded_events), or in discard mode if packets were
+--     overwritten; or record initialisation into a snapshot session that runs all the time, and
+--     ingest both.
 -- grain: one row per process
 -- severity: warning
 -- needs: derive.unseen_creation, main.process, main.host

@@ -1,8 +1,9 @@
 -- name: finding.latency_uncertain
 -- title: The clocks of two hosts are not known well enough for the latencies between them
--- description: Most messages between the two took less than what their latency can be wrong by.
--- cause: Few messages one of the ways, or long ones, or none for a part of the recording.
--- cure: Record network packets as well (docs/semantics.md, Clocks), or synchronise the clocks
+-- description: Most messages between the two took less time than the possible error of their
+--     latency.
+-- cause: In one direction there are few messages, or slow ones, or none for part of the recording.
+-- cure: Record network packets as well (docs/clocks.md), or synchronise the clocks
 --     before recording (chrony, ptp4l) and leave them as recorded: msgflow clocks apply none.
 -- grain: one row per pair of hosts
 -- severity: warning
@@ -12,7 +13,7 @@ SELECT
     f.hostname || ' → ' || t.hostname AS subject,
     count(*) FILTER (WHERE abs(l.latency_ns) < l.uncertainty_ns) AS count,
     printf(
-        '%d of %s took less than the bound of its error, which is up to %.3f ms; the median took '
+        '%d of %s took less than the possible error, which is up to %.3f ms; the median took '
         || '%.3f ms',
         count(*) FILTER (WHERE abs(l.latency_ns) < l.uncertainty_ns),
         derive.counted(count(*), 'message'),

@@ -1,12 +1,12 @@
 -- name: finding.message_without_stamp
--- title: Messages cannot be followed, as they carry no stamp
--- description: Messages were handed to subscriptions without a stamp that says which publication
---     they are, and no gap of the trace explains it. Their flows begin there, and of the
+-- title: Messages cannot be followed, because they have no stamp
+-- description: Subscriptions got messages without a stamp, so that their publication cannot be
+--     identified, and no gap of the trace explains it. Their flows begin at the take. For
 --     publications of the topic it is not known whether these subscriptions took them.
--- cause: Loaned messages, and messages inside of a process before Iron, reach callbacks without an
---     event that tells of the message; or the events of taking (rmw_take) were not enabled.
--- cure: Enable all events of ROS (ros2:*); record with loaning or intra-process communication off
---     where these topics matter.
+-- cause: Loaned messages, and intra-process messages before Iron, reach callbacks without an event
+--     for the message; or the events of taking (rmw_take) were not enabled.
+-- cure: Enable all events of ROS (ros2:*). For topics that matter, record with loaned messages and
+--     intra-process communication off.
 -- grain: one row per topic
 -- severity: warning
 -- needs: main.stat_orphan, main.subscription, main.take, derive.counted

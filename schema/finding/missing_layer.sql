@@ -1,9 +1,9 @@
 -- name: finding.missing_layer
 -- title: A kind of event is missing altogether
--- description: The traces have no event of a kind that the others of the run call for, so that a
+-- description: The traces lack a kind of event that the other events of the run call for. So a
 --     whole part of the answers is empty.
--- cause: The event was not enabled in the session, or the installed ROS 2 or middleware does not
---     have it, although the metadata of the trace may promise it.
+-- cause: The event was not enabled in the session; or the installed ROS 2 or middleware does not
+--     have it, even if the metadata of the trace lists it.
 -- cure: Enable all events of ROS: lttng enable-event --userspace 'ros2:*' (ros2 trace does), and
 --     use a tracetools and a middleware that have them.
 -- grain: one row per run and kind

@@ -1,9 +1,9 @@
 -- name: finding.overlapping_traces
 -- title: Two traces hold the same events
--- description: Threads were recorded twice at the same time, by different sessions. What both hold
---     was read from one of them only: that with more events of the thread.
--- cause: Two tracing sessions ran at once with the same events, and both were given to one ingest.
--- cure: None needed, unless one of them is the better record: msgflow ingest --replace TRACE.
+-- description: Threads were recorded twice at the same time, by two sessions. Where both hold the
+--     same events, they were read from one session only: the one with more events of the thread.
+-- cause: Two tracing sessions with the same events ran at once, and both were given to one ingest.
+-- cure: None needed. To read one of them alone: msgflow ingest --replace TRACE.
 -- grain: one row per pair of traces
 -- severity: warning
 -- needs: main.diagnostic, main.trace

@@ -1,11 +1,10 @@
 -- name: finding.process_without_ros
--- title: A traced process shows nothing of ROS
--- description: The trace has events of the process, but none of ROS: no node, publisher,
---     subscription, service, client, timer or callback. What it does with messages is not known.
--- cause: It runs with a tracetools that was built without LTTng, or it is no ROS process at all.
--- cure: In its environment, ros2 run tracetools status must say that tracing is enabled; build
---     tracetools with LTTng installed where it does not. Start the process with the events of ROS
---     enabled.
+-- title: A traced process has no ROS events
+-- description: The trace has events of the process, but no node, publisher, subscription, service,
+--     client, timer or callback. What it does with messages is not known.
+-- cause: It runs with a tracetools that was built without LTTng, or it is not a ROS process.
+-- cure: In its environment, ros2 run tracetools status must say that tracing is enabled; if it does
+--     not, build tracetools with LTTng installed. Start the process with the events of ROS enabled.
 -- grain: one row per process
 -- severity: warning
 -- needs: main.process, main.host, main.node, main.publisher, main.subscription, main.callback,

@@ -1,12 +1,12 @@
 -- name: finding.publisher_not_traced
 -- title: Messages come from a publisher that is not traced, or events are missing
--- description: Messages were taken of which no publication is in the traces, although no gap of
---     the known publishers is declared at that time. Their flows begin at the take.
--- cause: A node on another host or in another container is not part of the recording, or it runs
---     with a tracetools without LTTng; or events or files of a publisher are missing of which the
---     trace does not say so.
--- cure: Trace every host and give all traces to one ingest; ros2 run tracetools status must say
---     that tracing is enabled, in the environment of every node.
+-- description: Messages were taken whose publication is not in the traces, although the known
+--     publishers have no gap at that time. Their flows begin at the take.
+-- cause: A node on another host or in another container is not part of the recording, or runs with
+--     a tracetools without LTTng; or events or files of a publisher are missing and the trace does
+--     not say so.
+-- cure: Trace every host and give all traces to one ingest. In the environment of every node, ros2
+--     run tracetools status must say that tracing is enabled.
 -- grain: one row per topic
 -- severity: warning
 -- needs: main.stat_orphan, main.subscription, derive.counted

@@ -1,9 +1,9 @@
 -- name: finding.started_late
 -- title: Tracing started after ROS
--- description: Objects were used whose creation is not in the trace. They are placeholders without
---     a name or with one deduced from messages, so that topics and nodes are missing in results.
---     Those of ROS itself do not count: /rosout is published on handles never initialised. Nor do
---     processes whose events of initialisation may have been lost (initialisation_lost).
+-- description: Objects were used whose creation is not in the trace. They are placeholders with no
+--     name, or with one deduced from messages. So topics and nodes are missing from results. Not
+--     counted: objects of ROS itself (/rosout is published on handles that are never initialised),
+--     and processes that may have lost these events (initialisation_lost).
 -- cause: The session was started after the nodes, or the events of initialisation were not enabled.
 -- cure: Start the session first: ros2 trace, or the Trace action at the head of the launch file; or
 --     record initialisation into a snapshot session that runs all the time, and ingest both.

@@ -1,12 +1,12 @@
 -- name: finding.stream_ends_early
 -- title: Streams end before their trace
--- description: The last packet of a CPU's stream, in whichever chunk or snapshot that is, ends more
---     than half a second before the last one of other CPUs: events of that CPU may be missing from
---     then on.
--- cause: Files are cut off (no space, power lost, copied while written), or the last buffers were
+-- description: The last packet of a CPU ends more than half a second before the last one of other
+--     CPUs, all chunks and snapshots of the recording considered. Events of that CPU may be missing
+--     from then on.
+-- cause: Files are cut off (disk full, power lost, copied while written), or the last buffers were
 --     not written.
--- cure: Stop the session before copying; check free space; compare the sizes of the files with the
---     originals.
+-- cure: Stop the session before copying, check the free space, and compare the sizes of the files
+--     with the originals.
 -- grain: one row per recording, by the trace that ends last
 -- severity: warning
 -- needs: store.packet, main.trace, derive.recording, derive.counted

@@ -4,8 +4,8 @@
 --     the topic. Their flows begin at the take, and what the process did last is missing.
 -- cause: The buffers of the process were not written when the session was destroyed or the process
 --     was killed, or files of the trace are cut off.
--- cure: Stop the session (lttng stop) before the nodes and before lttng destroy, and let nodes end
---     by themselves.
+-- cure: Stop the session (lttng stop) before the nodes and before lttng destroy, and let nodes shut
+--     down by themselves.
 -- grain: one row per topic
 -- severity: warning
 -- needs: main.stat_orphan, main.subscription, main.publisher, main.process, main.host, main.take,

@@ -1,10 +1,10 @@
 -- name: finding.tracing_paused
 -- title: Tracing was paused
 -- description: All streams of a trace are silent at once between packets. What happened meanwhile
---     is missing, and nothing is paired across the pauses.
+--     is missing, and nothing is paired across the pause.
 -- cause: The session was stopped and started again (lttng stop, lttng start), or the machine slept.
--- cure: Ingest one stretch at a time, or leave the pauses out with --start and --end; record
---     without stopping.
+-- cure: Record without stopping. For this recording: ingest one stretch at a time, or leave the
+--     pauses out with --start and --end.
 -- grain: one row per trace
 -- severity: warning
 -- needs: main.loss_interval, main.trace, derive.counted

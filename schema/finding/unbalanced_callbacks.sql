@@ -1,8 +1,8 @@
 -- name: finding.unbalanced_callbacks
 -- title: Callbacks without an end
--- description: Callback instances have no end although their thread went on afterwards, and no gap
---     in the record of the thread before the next callback instance explains it. Their durations
---     are not known; what they published is still linked.
+-- description: Callback instances have no end although their thread went on, and no gap in the
+--     record of the thread explains it. Their durations are not known. What they published is still
+--     linked.
 -- cause: The callback threw an exception that was caught further up, or the event callback_end is
 --     not enabled.
 -- cure: Enable ros2:callback_end; look at the callbacks (msgflow query callback-duration) for

@@ -1,7 +1,7 @@
 -- name: finding.uncertain_owner
--- title: What callbacks belong to was deduced, or is not known
--- description: Callbacks ran whose creation is not in the trace. To which timer, service or
---     subscription they belong was told from how the executor ran them, or cannot be told.
+-- title: The owner of callbacks was deduced, or is not known
+-- description: Callbacks ran whose creation is not in the trace. The timer, service or subscription
+--     that they belong to was deduced from how the executor ran them, or is not known.
 -- cause: The session was started after the nodes, or the events of initialisation were not enabled
 --     or lost.
 -- cure: Start the session first, or record initialisation into a snapshot session that runs all the

@@ -4,28 +4,31 @@
 --     without it: lists of what lies on them would cost the square of their length. No
 --     subscription comes twice in a chain: a bit for each one tells which were there.
 -- grain: one row per run and chain
--- needs: derive.flow_hop, store.publisher
+-- needs: derive.flow_hop, derive.is_among, store.publisher, store.subscription, store.node
 CREATE OR REPLACE MACRO derive.flow_chain(
     runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
 ) AS TABLE
 WITH RECURSIVE hop AS MATERIALIZED (
     SELECT
         h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id, h.is_cached,
-        p.topic_name,
         CASE
             WHEN h.from_subscription_id IS NOT NULL THEN false
             WHEN from_topic IS NULL THEN h.is_source
-            ELSE coalesce(p.topic_name = from_topic, false)
-        END AS is_start
+            ELSE derive.is_among(from_topic, p.topic_name, pn.full_name)
+        END AS is_start,
+        to_topic IS NOT NULL AND derive.is_among(to_topic, p.topic_name, sn.full_name) AS is_last
     FROM derive.flow_hop AS h
     JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
+    LEFT JOIN store.node AS pn ON p.node_id = pn.node_id
+    JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
+    LEFT JOIN store.node AS sn ON s.node_id = sn.node_id
     WHERE list_contains(runs, h.run_id)
 ),
--- Only what leads to the topic asked for is followed, so that nothing else is enumerated.
+-- Only what leads to the end asked for is followed, so that nothing else is enumerated.
 toward_end (subscription_id) AS (
     SELECT subscription_id
     FROM hop
-    WHERE to_topic IS NULL OR topic_name = to_topic
+    WHERE to_topic IS NULL OR is_last
     UNION
     SELECT h.from_subscription_id
     FROM toward_end AS l
@@ -42,8 +45,7 @@ place AS (
 useful AS MATERIALIZED (
     SELECT
         h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id,
-        h.is_cached, h.topic_name, h.is_start, l.place, l.nowhere,
-        to_topic IS NOT NULL AND h.topic_name IS NOT DISTINCT FROM to_topic AS is_last,
+        h.is_cached, h.is_start, h.is_last, l.place, l.nowhere,
         row_number() OVER (
             ORDER BY
                 h.run_id, h.from_subscription_id, h.publisher_id, h.subscription_id, h.route

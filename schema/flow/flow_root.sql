@@ -2,7 +2,7 @@
 -- description: Where the flow of each publication can be said to begin: with the callback instance
 --     of the timer (or other callback without a message) that published it or called the service
 --     that did, else with the publication itself. It is a source where no taken message led to it.
---     The route (derive.flow_caller) is that from a run that called; else it is empty.
+--     The route (derive.flow_caller) is that from an instance that called; else it is empty.
 -- grain: one row per publication on a topic of the application
 -- needs: store.publication, store.publisher, store.link_causal, store.callback_instance,
 --     derive.flow_caller

@@ -1,13 +1,13 @@
 -- name: derive.annotated_input
 -- kind: macro
 -- description: The message that each cache held when an output of an annotation was published: the
---     latest run of the input's callback (by effective end) that ended at or before the cut, or
---     nested inside the publishing run and before the publication. The input whose own run
---     publishes is none of these. When a node reads its caches is not in the trace, so every other
---     run that began before the publication, and ended after the one there at the cut began, could
---     have been it as well. A firing needs a message of every input: where none was there at the
---     cut, the last of those counts, and nothing is one more candidate. Nothing is linked across a
---     gap in the record of either thread.
+--     latest instance of the input's callback (by effective end) that ended at or before the
+--     cut, or nested inside the publishing instance and before the publication. The input whose
+--     own instance publishes is none of these. When a node reads its caches is not in the trace,
+--     so every other instance that began before the publication, and ended after the one there
+--     at the cut began, could have been it as well. A firing needs a message of every input:
+--     where none was there at the cut, the last of those counts, and nothing is one more
+--     candidate. Nothing is linked across a gap in the record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 -- param: wanted_kind VARCHAR  Kind of the annotations
@@ -27,7 +27,7 @@ firing AS MATERIALIZED (
     WHERE wanted_kind = 'partial_sync'
 ),
 -- All that a firing publishes is made of the same messages, but for those that come meanwhile in
--- runs nested in it.
+-- callback instances nested in it.
 demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.publication_id, b.callback_instance_id AS publishing_id,
@@ -47,7 +47,7 @@ demand AS MATERIALIZED (
     WHERE b.kind = wanted_kind AND b.subscription_id IS DISTINCT FROM i.subscription_id
         AND (wanted_kind = 'periodic_async' OR f.annotation_id IS NOT NULL)
 ),
--- The message of a run that fires is used by that firing.
+-- The message of a callback instance that fires is used by that firing.
 run AS MATERIALIZED (
     SELECT
         i.annotation_id, r.subscription_id, r.callback_instance_id, r.thread_id, r.start_event_id,
@@ -59,7 +59,7 @@ run AS MATERIALIZED (
         ON a.annotation_id = f.annotation_id AND r.callback_instance_id = f.callback_instance_id
     WHERE a.run_id = only_run AND a.kind = wanted_kind
 ),
--- Runs that end together (in a gap) are one moment: the last to begin stands for it.
+-- Instances that end together (in a gap) are one moment: the last to begin stands for it.
 ended AS (
     SELECT
         annotation_id, subscription_id, effective_end_event_id,
@@ -95,7 +95,7 @@ nested AS (
         AND d.read_event_id >= e.effective_end_event_id
     WHERE e.start_event_id > d.cut_event_id
 ),
--- Publications of one run share their cut.
+-- Publications of one callback instance share their cut.
 cut AS (
     SELECT DISTINCT
         annotation_id, subscription_id, thread_id, cut_event_id, emptied_event_id
@@ -112,8 +112,8 @@ at_cut AS MATERIALIZED (
         AND c.cut_event_id >= e.effective_end_event_id
     WHERE e.effective_end_event_id > c.emptied_event_id
 ),
--- Where all runs of an input are on the publishing thread, one after the other, no other could
--- have been the one that was there at the cut.
+-- Where all instances of an input are on the publishing thread, one after the other, no other
+-- could have been the one that was there at the cut.
 alone AS (
     SELECT run.annotation_id, run.subscription_id, min(run.thread_id) AS thread_id
     FROM run
@@ -143,7 +143,7 @@ there AS MATERIALIZED (
         AND d.subscription_id = a.subscription_id
         AND d.thread_id = a.thread_id
 ),
--- Runs in the order in which they began, with the one that ends last of all so far.
+-- Instances in the order in which they began, with the one that ends last of all so far.
 begun AS (
     SELECT
         annotation_id, subscription_id, start_event_id,

@@ -1,8 +1,8 @@
 -- name: derive.annotated_publication
 -- kind: macro
--- description: Publications by the outputs of annotations, with the run of a callback that they
+-- description: Publications by the outputs of annotations, with the callback instance that they
 --     were made in and its subscription. The cut, before which an input has to be there, is the
---     start of that run, else that of the publication itself.
+--     start of that instance, else that of the publication itself.
 -- grain: one row per annotation and publication by one of its outputs
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, derive.annotated_run, store.annotation,

@@ -1,7 +1,7 @@
 -- name: derive.annotated_run
 -- kind: macro
--- description: Runs of the callbacks of subscriptions that are inputs of annotations.
--- grain: one row per run of such a callback
+-- description: Instances of the callbacks of subscriptions that are inputs of annotations.
+-- grain: one row per instance of such a callback
 -- param: only_run BIGINT  Run to look at
 -- needs: store.annotation_input, store.callback_instance, store.callback, store.take
 CREATE OR REPLACE MACRO derive.annotated_run(only_run) AS TABLE

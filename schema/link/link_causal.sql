@@ -1,8 +1,8 @@
 -- name: derive.link_causal
 -- kind: macro
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
---     events where a gap touches its run of a callback, or its take, or its publication.
--- grain: one row per run of a callback, or take outside of any, and publication that it led to, and
+--     events where a gap touches its callback instance, or its take, or its publication.
+-- grain: one row per callback instance, or take outside of any, and publication that it led to, and
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, derive.link_causal_take_adjacent,

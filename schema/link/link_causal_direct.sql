@@ -1,10 +1,10 @@
 -- name: derive.link_causal_direct
 -- kind: macro
--- description: Publications inside a run of a callback on its thread, from its start to its
---     effective end; of nested runs the innermost. Order decides, not time. The last begin or end
---     of a callback before the publication tells which run that is: the one that began, unless it
---     was over, else the nearest run around it that was not.
--- grain: one row per publication made inside a run of a callback
+-- description: Publications inside a callback instance on its thread, from its start to its
+--     effective end; of nested ones the innermost. Order decides, not time. The last begin or end
+--     of a callback before the publication tells which one that is: the one that began, unless it
+--     was over, else the nearest one around it that was not.
+-- grain: one row per publication made inside a callback instance
 -- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.callback_instance
 CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE

@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: Publications that a thread makes after taking a message by hand (rclpy, rclc, wait
 --     sets), until its next take, also of a request or a response, as far as no callback is seen to
---     begin, no executor to go on and no gap in between. What is published inside a run of a
---     callback has that for its cause.
+--     begin, no executor to go on and no gap in between. What is published inside a callback
+--     instance has that for its cause.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, store.publication, store.take, store.request, store.response,

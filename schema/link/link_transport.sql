@@ -13,7 +13,7 @@
 -- needs: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.recording_gap, derive.exposed_trace,
 --     store.publication, store.publisher, store.take, store.subscription, store.node,
---     store.process, store.host, store.callback_instance
+--     store.process, store.host, store.callback, store.callback_instance
 CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
 WITH link AS (
     SELECT
@@ -79,10 +79,17 @@ intra_process AS (
     FROM store.publication
     WHERE run_id = only_run AND intra_ns IS NOT NULL AND publisher_id IS NOT NULL
 ),
+-- rclcpp makes a second callback for what comes out of a buffer; it may never get its turn.
 buffered AS (
-    SELECT DISTINCT subscription_id
+    SELECT subscription_id
     FROM store.take
     WHERE run_id = only_run AND method = 'ring_buffer' AND subscription_id IS NOT NULL
+    UNION
+    SELECT subscription_id
+    FROM store.callback
+    WHERE run_id = only_run AND subscription_id IS NOT NULL
+    GROUP BY subscription_id
+    HAVING count(*) > 1
 ),
 repeated AS (
     SELECT l.take_id

@@ -131,8 +131,8 @@ looked_for AS (
 ),
 within AS MATERIALIZED (
     SELECT
-        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.closes_ns, p.is_crowded,
-        m.source_timestamp_ns - p.opens_ns AS delay_ns,
+        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.clock_id, p.closes_ns,
+        p.is_crowded, m.source_timestamp_ns - p.opens_ns AS delay_ns,
         row_number() OVER (
             PARTITION BY p.publication_id, p.side ORDER BY m.source_timestamp_ns
         ) AS place
@@ -168,16 +168,25 @@ usual AS (
     WHERE w.place = 1 AND w.closes_ns IS NOT NULL
     GROUP BY w.publisher_id
 ),
+-- Of a publisher that was never seen to go on, what is usual on its host is expected.
+usual_of_clock AS (
+    SELECT clock_id, quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns
+    FROM within
+    WHERE place = 1 AND closes_ns IS NOT NULL
+    GROUP BY clock_id
+),
 plausible AS (
     SELECT
         w.publisher_id, w.source_timestamp_ns, w.publication_id, w.place, w.is_crowded,
         w.place = 2 AND w.delay_ns <= u.usual_ns AS is_rival
     FROM within AS w
     LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
+    LEFT JOIN usual_of_clock AS c ON w.clock_id = c.clock_id
     WHERE CASE
         WHEN w.closes_ns IS NOT NULL THEN coalesce(w.delay_ns <= u.limit_ns, true)
         ELSE w.delay_ns <= coalesce(
-            derive.clock_limit().usual_factor * u.usual_ns, derive.clock_limit().write_ns
+            derive.clock_limit().usual_factor * coalesce(u.usual_ns, c.usual_ns),
+            derive.clock_limit().write_ns
         )
     END
 ),

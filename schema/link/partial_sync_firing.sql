@@ -1,11 +1,11 @@
 -- name: derive.partial_sync_firing
 -- kind: macro
--- description: Firings of partially synchronous annotations: runs of a callback of an input that
---     publish on an output. All publications of a run are one firing; it empties the caches, at
---     some moment from the start of the run to its first publication. What was published last by
+-- description: Firings of partially synchronous annotations: callback instances of an input that
+--     publish on an output. All publications of one are one firing; it empties the caches, at some
+--     moment from the start of the instance to its first publication. What was published last by
 --     another firing, before it published first, is when they were emptied before; from the start
 --     of the last firing that had published when this one began, something may have been kept.
--- grain: one row per annotation and run of a callback of one of its inputs that fires it
+-- grain: one row per annotation and callback instance of one of its inputs that fires it
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.annotated_publication, store.annotation_input
 CREATE OR REPLACE MACRO derive.partial_sync_firing(only_run) AS TABLE

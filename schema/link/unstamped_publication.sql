@@ -4,7 +4,8 @@
 --     say what stamp a message got. A publication without one in another process lost an event.
 -- grain: one row per publication on a known topic, written by a process without stamps
 -- param: only_run BIGINT  Run to look at
--- needs: store.publication, store.publisher, store.process, store.host
+-- needs: store.publication, store.publisher, store.process, store.host,
+--     store.thread_break
 CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
 WITH unstamped AS (
     SELECT process_id
@@ -20,12 +21,15 @@ SELECT
     b.publisher_id,
     b.publication_id,
     coalesce(b.rmw_ns, b.rcl_ns) AS written_ns,
-    b.next_event_ns
+    -- Behind a gap nobody knows what the thread did next.
+    CASE WHEN k.resumed_ns <= b.next_event_ns IS NOT TRUE THEN b.next_event_ns END AS next_event_ns
 FROM store.publication AS b
 JOIN unstamped AS u ON b.process_id = u.process_id
 JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
 JOIN store.process AS o ON b.process_id = o.process_id
 JOIN store.host AS h ON o.host_id = h.host_id
+ASOF LEFT JOIN store.thread_break AS k
+    ON b.thread_id = k.thread_id AND coalesce(b.rmw_ns, b.rcl_ns) < k.resumed_ns
 WHERE b.run_id = only_run
     AND coalesce(b.rmw_ns, b.rcl_ns) IS NOT NULL
     AND p.topic_name IS NOT NULL

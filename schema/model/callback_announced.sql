@@ -1,7 +1,8 @@
 -- name: staging.callback_announced
 -- description: Callbacks without a known owner of which the executor said the same before every
---     run, with the timer or subscription that the handle means, if the trace names it. Without
---     a handle (NULL) the executor named none. And which tracepoints were enabled meanwhile.
+--     instance, with the timer or subscription that the handle means, if the trace names it.
+--     Without a handle (NULL) the executor named none. And which tracepoints were enabled
+--     meanwhile.
 -- grain: one row per such callback
 -- needs: staging.callback_trigger, staging.located, staging.subscription_known,
 --     staging.timer_use, staging.declared

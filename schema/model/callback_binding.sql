@@ -1,7 +1,7 @@
 -- name: staging.callback_binding
 -- description: Callback instances with their callback object and the take that they were called
 --     with. The callback_start directly follows the take's last layer on its thread, with no event
---     of the executor between the two; an rmw take is not for an intra-process run, nor a dequeue
+--     of the executor between the two; an rmw take is not for an intra-process call, nor a dequeue
 --     for another; the subscriptions agree where both are known.
 -- grain: one row per callback_start
 -- needs: staging.callback_run, staging.callback_known, staging.take_chain,

@@ -1,5 +1,5 @@
 -- name: staging.callback_instance
--- description: Callback instances, numbered in the order in which they began, with the run that
+-- description: Callback instances, numbered in the order in which they began, with the one that
 --     each is nested in.
 -- grain: one row per callback instance
 -- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take,
@@ -53,8 +53,8 @@ nested AS (
         AND n.depth - 1 = p.depth
         AND n.start_event_id > p.start_event_id
 ),
--- Runs with a gap inside, right before, or (never seen to end) right after; or with one of other
--- CPUs in their time, which the thread may have visited: two runs may look like one.
+-- Instances with a gap inside, right before, or (never seen to end) right after; or with one of
+-- other CPUs in their time, which the thread may have visited: two instances may look like one.
 exposed AS (
     SELECT callback_instance_id, thread_id, start_event_id, end_event_id, effective_end_event_id
     FROM numbered

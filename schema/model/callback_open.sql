@@ -1,7 +1,7 @@
 -- name: staging.callback_open
 -- description: Callback instances that were never seen to end. Apart, since they are few, which
 --     decides how what closes them is best looked for.
--- grain: one row per such run
+-- grain: one row per such callback instance
 -- needs: staging.callback_pair
 SELECT start_event_id, thread_id, previous_executor_event_id
 FROM staging.callback_pair

@@ -3,7 +3,7 @@
 --     before their end, and those never seen to end. The latter last, for what is inside them,
 --     until the first event of their thread that cannot be inside: the next begin or end of a
 --     callback, executor event, or event behind a gap of any CPU.
--- grain: one row per such run
+-- grain: one row per such callback instance
 -- needs: staging.callback_event, staging.callback_pair, staging.callback_open,
 --     staging.executor_event,
 --     staging.executor_first, staging.callback_gap, staging.thread

@@ -116,7 +116,7 @@ SELECT
     'empty_trace',
     'warning',
     1,
-    'not one event was recorded: ' || t.path
+    'no event was recorded: ' || t.path
 FROM staging.trace AS t
 -- A chunk of a recording may well be empty, and of a copy nothing is read.
 WHERE t.event_count = 0
@@ -143,7 +143,7 @@ SELECT
         )
     END
 FROM staging.loss_interval
--- What a packet lacks that was cut off is told as a damage.
+-- Events that are missing from a packet that was cut off are reported as damaged_trace.
 WHERE kind <> 'loss'
     OR event_count IS NOT NULL
     OR trace_id NOT IN (SELECT trace_index + 1 FROM staging.damage)
@@ -163,7 +163,7 @@ SELECT
     'damaged_trace',
     'data_loss',
     count(*),
-    'further damages of the same trace'
+    'further damage of the same trace'
 FROM damage
 WHERE number > 20
 GROUP BY trace_index
@@ -184,8 +184,8 @@ SELECT
     'open_callback',
     'info',
     count(*),
-    'callback instances that were never seen to end: the trace or the process ended, a callback '
-    || 'threw, or events were lost'
+    'callback instances without an end: the trace or the process ended, a callback threw, or '
+    || 'events were lost'
 FROM staging.callback_instance
 WHERE end_ns IS NULL
 GROUP BY trace_id
@@ -195,7 +195,7 @@ SELECT
     'unmatched_callback_end',
     'warning',
     count(*),
-    'ends of callbacks without a begin: tracing started inside a callback, or events were lost'
+    'ends of callbacks without a start: tracing started inside a callback, or events were lost'
 FROM unmatched_end
 GROUP BY trace_index
 UNION ALL
@@ -217,15 +217,15 @@ SELECT
     count(*),
     CASE o.name
         WHEN 'eliminated_owner' THEN
-            'callbacks that were told to be of timers or services since executors ran them without '
-            || 'a take, not seeing either initialised; subscriptions of loaned messages would look '
-            || 'like timers, in '
+            'callbacks attributed to timers or services by elimination: their initialisation was '
+            || 'not traced, and executors ran them without a take; subscriptions of loaned '
+            || 'messages would look like timers, in '
         WHEN 'unknown_owner' THEN
-            'callbacks that ran of which the trace does not tell what they belong to (no executor '
-            || 'events, takes that were not recorded, or loaned messages), in '
+            'callbacks whose timer, service or subscription is not known (no executor events, '
+            || 'takes that were not recorded, or loaned messages), in '
         ELSE
-            'ring buffers whose messages several callbacks were handed, or one those of several: '
-            || 'not seen to be made, and without a subscription, in '
+            'ring buffers without a known subscription: their creation was not traced, and several '
+            || 'callbacks got messages from one, or one callback from several, in '
     END || string_agg(DISTINCT l.label, ', ' ORDER BY l.label)
 FROM owner AS o
 JOIN process_label AS l ON o.process_id = l.process_id
@@ -237,7 +237,7 @@ SELECT
     'warning',
     o.event_count,
     printf(
-        'events of %d threads, over %.3f s, that the trace %s holds as well: left out',
+        'events of %d threads, over %.3f s, left out because the trace %s has them too',
         o.thread_count, o.length_ns / 1e9, s.path
     )
 FROM staging.left_out AS o
@@ -249,8 +249,8 @@ SELECT
     'info',
     count(*),
     printf(
-        'traces of one boot that are off the first one of it by %+.3f ms to %+.3f ms, as their '
-        || 'tracer measured its clock: brought to one time base',
+        'traces of one boot whose clock offset differs from the first one by %+.3f ms to %+.3f ms: '
+        || 'brought to one time base',
         -max(clock_correction_ns) / 1e6, -min(clock_correction_ns) / 1e6
     )
 FROM staging.source
@@ -262,8 +262,8 @@ SELECT
     'repeated_initialisation',
     'info',
     count(*),
-    'publishers and subscriptions initialised on the handle of one of the same topic: created '
-    || 'anew, or traced twice; the later one counts from then on: '
+    'publishers and subscriptions initialised on the handle of another one of the same topic: '
+    || 'created again, or traced twice; the later one counts from then on: '
     || string_agg(DISTINCT topic_name, ', ' ORDER BY topic_name)
 FROM initialised
 WHERE topic_name = previous_topic
@@ -274,8 +274,8 @@ SELECT
     'ambiguous_request',
     'warning',
     count(*),
-    'requests taken by a service that several of the same client and number could have been: they '
-    || 'are left without a sender'
+    'requests taken by a service for which several requests of the same client and number are '
+    || 'possible: they are left without a sender'
 FROM ambiguous_request
 HAVING count(*) > 0
 UNION ALL
@@ -284,8 +284,8 @@ SELECT
     'unknown_annotation_handle',
     'warning',
     count(*),
-    'inputs or outputs of declared indirect links that are no known subscription or publisher, in '
-    || string_agg(DISTINCT l.label, ', ' ORDER BY l.label)
+    'inputs or outputs of declared indirect links that are not known subscriptions or '
+    || 'publishers, in ' || string_agg(DISTINCT l.label, ', ' ORDER BY l.label)
 FROM staging.annotation AS a
 JOIN staging.annotation_object AS o ON a.event_id = o.event_id
 JOIN process_label AS l ON a.process_id = l.process_id
@@ -297,8 +297,8 @@ SELECT
     'no_network_packets',
     'info',
     1,
-    'the kernel trace has no network packets, which would tell how far the clocks of the hosts are '
-    || 'apart: enable net_dev_queue and net_if_receive_skb on every host'
+    'the kernel trace has no network packets, which would help to synchronise the clocks: enable '
+    || 'net_dev_queue and net_if_receive_skb on every host'
 FROM staging.source AS s
 ANTI JOIN staging.network_packet AS p ON s.trace_index + 1 = p.trace_id
 WHERE s.domain = 'kernel' AND (SELECT count(*) FROM staging.clock) > 1
@@ -310,8 +310,8 @@ SELECT
     u.number - l.ends,
     printf(
         'of %d network packets sent and %d received on %s, %d were seen on both ends; not used: '
-        || '%d that nothing tells from others, %d whose like was seen less than 2 s before or '
-        || 'after or sent by several hosts, %d whose other end was not seen or cannot be told',
+        || '%d that look like others, %d that were repeated within 2 s or sent by several hosts, '
+        || '%d whose other end was not seen or is not certain',
         u.sent, u.number - u.sent, u.hosts, l.links, u.unknown, u.repeated, u.single - l.ends
     )
 FROM packet_use AS u

@@ -1,6 +1,7 @@
 -- name: staging.link_response
 -- description: Responses and what they came from: the instance of the service callback that was
---     called with the request, and, where the response was sent later in another run, that one too.
+--     called with the request, and, where the response was sent later in another instance, that
+--     one too.
 -- grain: one row per response and callback instance that it came from
 -- needs: staging.response_origin, staging.sender_run, staging.callback_instance
 SELECT r.response_id, i.callback_instance_id

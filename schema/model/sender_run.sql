@@ -17,7 +17,7 @@ run AS (
 nesting AS (
     SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL
 ),
--- Whose run goes on after each event; where runs end at the begin of another, that one.
+-- Whose instance goes on after each event; where one ends at the begin of another, the other.
 edge AS (
     SELECT run.thread_id, start_event_id AS event_id, callback_instance_id, 0 AS rank
     FROM run

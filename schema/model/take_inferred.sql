@@ -2,7 +2,7 @@
 -- description: The subscription of messages that did not come through the middleware, where its
 --     initialisation was not traced: that of the ring buffer, else of the callback that was handed
 --     the message without a traced take. A callback that none was traced for is a subscription of
---     its own, a placeholder by its first run.
+--     its own, a placeholder by its first instance.
 -- grain: one row per such take or callback instance
 -- needs: staging.take_chain, staging.take_subscription, staging.callback_binding,
 --     staging.buffer_owner

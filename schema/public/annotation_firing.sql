@@ -1,8 +1,8 @@
 -- name: main.annotation_firing
--- description: Publications that annotations explain. One is complete where every input has a
---     message: one that an indirect link leads from, or the one that the publishing callback
---     instance was called with. Of partial_sync annotations, only what is published in callback
---     instances of their inputs; all publications of one are one firing.
+-- description: Publications that annotations explain. One is complete if every input has a message:
+--     either an indirect link comes from it, or the publishing callback instance was called with
+--     it. For partial_sync annotations: only publications from callback instances of the inputs.
+--     All publications of one such instance are one firing.
 -- grain: one row per annotation and publication that it applies to
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: annotation_id BIGINT  The annotation

@@ -1,6 +1,6 @@
 -- name: main.callback_group
--- description: Callback groups, where the trace tells of them (CARET): callbacks of one that is
---     mutually exclusive never run at the same time.
+-- description: Callback groups, where the trace has them (CARET). Callbacks of a mutually exclusive
+--     group never run at the same time.
 -- grain: one row per callback group of an executor
 -- column: callback_group_id BIGINT  Identity of the callback group
 -- column: run_id BIGINT  Run that the row belongs to

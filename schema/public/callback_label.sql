@@ -1,7 +1,7 @@
 -- name: main.callback_label
 -- description: What people call a callback: what triggers it, such as Timer(5 ms) or
---     Subscription(/scan), in the node that it belongs to. A timer of unknown period is told from
---     others by its handle.
+--     Subscription(/scan), and the node that it belongs to. Timers of unknown period are
+--     distinguished by their handles.
 -- grain: one row per callback object
 -- column: callback_id BIGINT  Identity of the callback
 -- column: run_id BIGINT  Run that the row belongs to

@@ -1,16 +1,16 @@
 -- name: main.clock_pair
--- description: What passed between hosts of two clocks and tells how far these are apart: messages
---     matched by their stamps alone, requests, responses, and network packets. The shortest ways
---     both there and back bound the error of a correction; a negative one shows clocks that are
---     apart.
+-- description: What passed between hosts of two clocks, and so shows how far these are apart:
+--     messages matched by their stamps alone, requests, responses, and network packets. The
+--     shortest delays in both directions bound the error of a correction. A negative one shows that
+--     the clocks are apart.
 -- grain: one row per pair of clocks and direction with messages or packets
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: from_clock_id BIGINT  Clock of the senders
 -- column: to_clock_id BIGINT  Clock of the receivers
 -- column: message_count BIGINT  Messages, requests and responses of ROS
 -- column: packet_count BIGINT  Network packets that kernel traces saw on both ends
--- column: shortest_message_ns BIGINT [ns]  Shortest way of a message, as corrected
--- column: shortest_packet_ns BIGINT [ns]  Shortest way of a packet, as corrected
+-- column: shortest_message_ns BIGINT [ns]  Shortest delay of a message, after correction
+-- column: shortest_packet_ns BIGINT [ns]  Shortest delay of a packet, after correction
 -- needs: derive.clock_way, store.clock, derive.corrected_ns
 WITH way AS (
     SELECT

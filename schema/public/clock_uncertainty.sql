@@ -1,8 +1,8 @@
 -- name: main.clock_uncertainty
--- description: How far the correction of a clock can be wrong at most, at any time: at the moments
---     here by as much as they say, and between two of them by what the straight line between both
---     says. Times of two clocks with the same reference can be compared to within the sum of both;
---     the reference has no error and no rows.
+-- description: How wrong the correction of a clock can be at most, at any time: at the moments
+--     listed here by uncertainty_ns, between two of them by what the straight line between them
+--     gives. Times of two clocks with the same reference can be compared to within the sum of both
+--     bounds. The reference itself has no error and no rows.
 -- grain: one row per clock and moment
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: clock_id BIGINT  The clock

@@ -2,28 +2,30 @@
 -- kind: macro
 -- description: How a run differs from another one, by path, callback or topic: what was measured in
 --     each, the difference with a bootstrap confidence interval, and how large the effect is.
---     Blocks of neighbouring values are resampled (circular block bootstrap), because values that
---     follow each other are alike; how long they are alike, and so the length of a block, is
---     estimated from the values of each run. An interval takes ten blocks in either run, and beyond
---     a quantile as much as five independent values; the maximum has none. The same seed gives the
---     same interval. What is estimated is how surely these two recordings differ: not how much a
---     system differs from itself when it is started again.
+--     Values that follow each other are alike, so blocks of neighbouring values are resampled
+--     (circular block bootstrap). The length of a block is estimated from the values of each run.
+--     An interval needs ten blocks in either run, and five independent values beyond a quantile;
+--     the maximum has no interval. The same seed gives the same interval. The interval says how
+--     surely these two recordings differ. It does not say how much a system differs from itself
+--     when it is started again.
 -- grain: one row per thing compared and statistic; things that only one run has, too
 -- param: what VARCHAR  'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (from
 --     publication to take)
 -- param: run_a BIGINT  Run that the other one is compared with
 -- param: run_b BIGINT  The other one
--- param: from_topic VARCHAR = NULL  Topic where paths start; every source when NULL
--- param: to_topic VARCHAR = NULL  Topic where paths end; wherever they end when NULL
+-- param: from_topic VARCHAR = NULL  Topics or nodes where paths start: names or globs, separated
+--     by commas; NULL: any
+-- param: to_topic VARCHAR = NULL  Topics or nodes where paths end, in the same form; NULL: any
 -- param: wanted_case VARCHAR = 'first'  Arrivals of paths: 'first' or 'last' of each root, 'newest'
 --     root of each arrival, or 'every_pair'
--- param: skip_ns BIGINT = 0  Time left out at the begin of each run
+-- param: skip_ns BIGINT = 0  Time left out at the start of each run
 -- param: confidence DOUBLE = 0.95  Share of intervals that would contain the true difference
--- param: resamples BIGINT = 1000  Resamples that the interval is from
--- param: seed BIGINT = 0  Of the random numbers
--- param: internal BOOLEAN = false  Also what ROS does for itself
+-- param: resamples BIGINT = 1000  Number of resamples for the interval
+-- param: seed BIGINT = 0  Random seed
+-- param: internal BOOLEAN = false  Include what ROS does for itself
 -- param: max_depth INTEGER = 32  Longest path, in topics
--- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
 -- column: a_ns BIGINT [ns]  Its value in run A
 -- column: b_ns BIGINT [ns]  Its value in run B
@@ -34,21 +36,21 @@
 -- column: verdict VARCHAR  'B is longer' or 'B is shorter', of these two recordings, where both
 --     ends have one sign; 'no difference shown', 'too few values' or 'too few independent values'
 --     for an interval, 'too few resamples', 'not estimated' (maximum), 'only in A' or 'only in B'
--- column: cliffs_delta DOUBLE  How often a value of B exceeds one of A, less how often it is the
---     other way round: -1 to 1, of all values
--- column: effect VARCHAR  'negligible', 'small', 'medium' or 'large'
+-- column: cliffs_delta DOUBLE  How often a value of B exceeds one of A, minus how often it is the
+--     other way round: -1 to 1
+-- column: effect VARCHAR  'negligible', 'small', 'medium' or 'large'; NULL: fewer than 20 values
 -- column: a_count BIGINT  Values of run A
 -- column: b_count BIGINT  Values of run B
--- column: a_independent BIGINT  How many independent values those of run A are worth for this
---     statistic: their number by the time, in values, for which they are alike; NULL where they
---     are alike for so long that it cannot be told
--- column: b_independent BIGINT  Likewise of run B
--- column: a_share DOUBLE  Share of the roots that reached the end, of the instances of a callback
---     that were seen to end, of the takes whose publication is known; in run A
--- column: b_share DOUBLE  Likewise in run B
--- column: a_loss_affected BIGINT  Of those roots, callback instances or takes, the ones with lost
---     events in their time: what is said of them may be wrong
--- column: b_loss_affected BIGINT  Likewise in run B
+-- column: a_independent BIGINT  How many independent values the values of run A are worth for this
+--     statistic: their number divided by how many in a row are alike; NULL if that cannot be
+--     estimated, since they are alike for too long
+-- column: b_independent BIGINT  The same for run B
+-- column: a_share DOUBLE  Share in run A of roots that reached the end, of callback instances that
+--     have an end, or of takes whose publication is known
+-- column: b_share DOUBLE  The same for run B
+-- column: a_loss_affected BIGINT  How many of those roots, callback instances or takes have a gap
+--     in their time, so that their values may be wrong
+-- column: b_loss_affected BIGINT  The same for run B
 -- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
 -- needs: main.run, main.flow_path, main.end_to_end, main.callback_instance, main.callback_label,
@@ -417,7 +419,7 @@ judged AS (
     SELECT
         p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_independent,
         p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.is_cut,
-        e.cliffs_delta,
+        CASE WHEN least(p.a_count, p.b_count) >= 20 THEN e.cliffs_delta END AS cliffs_delta,
         CASE
             WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
             WHEN p.b_count = 0 THEN 'only in A'

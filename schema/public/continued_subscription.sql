@@ -1,6 +1,7 @@
 -- name: main.continued_subscription
 -- kind: macro
--- description: Subscriptions at which flows go on: some message of theirs led to another one.
+-- description: Subscriptions at which flows go on: at least one of their messages led to another
+--     message.
 -- grain: one row per such subscription
 -- param: runs BIGINT[]  Runs to look at
 -- column: subscription_id BIGINT  The subscription

@@ -1,41 +1,51 @@
 -- name: main.critical_path
 -- kind: macro
 -- description: What one flow had to wait for, moment by moment: its parts (main.end_to_end_part),
---     in which waits are replaced by what they waited for, as far as the trace shows. While a
---     message or request waited for its callback, the callback instances that its executor was busy
---     with or that exclude the callback; in a cache, the timer until it was due, or the message
---     that completed the set, from the callback that published it. The pieces follow each other and
---     add up to the latency of the flow exactly; a part that is negative is one piece.
+--     with waits replaced by what they waited for, as far as the trace shows. While a message or
+--     request waited for its callback: the callback instances that its executor was busy with, or
+--     that exclude the callback. In a cache: the timer until it was due, or the message that
+--     completed the set, from the callback that published it. The pieces follow each other and add
+--     up to the latency of the flow exactly. A negative part is one piece.
 -- grain: one row per piece of the flow
 -- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR  Topic where flows start; every source when NULL
--- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
--- param: from_event VARCHAR  Event that starts the clock: 'callback_start' or 'publish'
--- param: to_event VARCHAR  Event that stops it: 'take', 'callback_start' or 'callback_end'
--- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
--- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
--- param: sink_take_id BIGINT = NULL  The longest flow that ends with this take; of all when NULL
+-- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas; NULL: any
+-- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
+-- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
+--     'publish'; others are an error
+-- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
+--     'callback_end'; others are an error
+-- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
+-- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
+--     NULL: any
+-- param: sink_take_id BIGINT = NULL  Longest flow that ends with this take; NULL: of all
 -- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
+--     chains of each length
+-- param: most_flows INTEGER = 1  How many of the longest flows
+-- param: at_quantile DOUBLE = NULL  In their place the flow with this quantile of the latency,
+--     0 to 1
+-- param: path_ids BIGINT[] = NULL  Only flows of these paths; NULL: all
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance' or 'publication'
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end of the path
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: hop BIGINT  Which message of the path it is, or leads to
+-- column: flow_rank BIGINT  Number of the flow, the longest first
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
 -- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
---     one) or 'undecided' (nothing tells when the message arrived); in a cache 'timer' (not due
+--     one) or 'undecided' (nothing shows when the message arrived); in a cache 'timer' (not due
 --     yet), 'unpublished' (the message that was waited for had not been published), or a part of
---     the way of that message
+--     that message's own flow
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
--- column: is_certain BOOLEAN  Of 'executor_busy' and 'blocked': what waited was ready by then;
---     false: it may have arrived during this piece. Else NULL
+-- column: is_certain BOOLEAN  For 'executor_busy' and 'blocked': what waited was ready by then;
+--     false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
 -- needs: main.end_to_end_part, main.executor_wait, derive.executor_meanwhile,
@@ -43,16 +53,22 @@
 --     derive.executor_size, derive.callback_exclusion, derive.process_clock, derive.corrected_ns,
 --     store.link_transport, store.link_causal
 CREATE OR REPLACE MACRO main.critical_path(
-    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
-    sink_take_id := NULL, max_depth := 32, max_paths := 1000
+    runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
+    to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
+    sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows := 1, at_quantile := NULL,
+    path_ids := NULL
 ) AS TABLE
+-- Here positions go on from flow to flow.
 WITH part AS MATERIALIZED (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part, from_ns,
-        to_ns, duration_ns, callback_instance_id, publication_id
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns,
+        to_ns, duration_ns, callback_instance_id, publication_id,
+        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
+        row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
     FROM main.end_to_end_part(
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
-        'longest', sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths
+        'longest', sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths,
+        most_flows := most_flows, at_quantile := at_quantile, path_ids := path_ids
     )
 ),
 waiting AS MATERIALIZED (
@@ -240,8 +256,8 @@ chosen AS (
 ),
 named AS (
     SELECT
-        p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.hop, p.part,
-        p.position, c.from_ns, c.to_ns,
+        p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.flow_rank, p.hop,
+        p.part, p.position, c.from_ns, c.to_ns,
         CASE
             WHEN c.activity IS NOT NULL THEN c.activity
             WHEN p.part NOT IN ('publish_to_take', 'request_to_take') THEN p.part
@@ -259,8 +275,8 @@ named AS (
 -- Neighbours that are the same thing become one.
 numbered AS (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, position, from_ns,
-        to_ns, activity, is_certain, callback_instance_id, publication_id,
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, position,
+        from_ns, to_ns, activity, is_certain, callback_instance_id, publication_id,
         row_number() OVER (PARTITION BY position ORDER BY from_ns)
         - row_number() OVER (
             PARTITION BY position, activity, is_certain, callback_instance_id, publication_id
@@ -275,8 +291,9 @@ SELECT
     root_id,
     take_id,
     latency_ns,
+    flow_rank,
     hop,
-    row_number() OVER (ORDER BY position, min(from_ns)) AS position,
+    row_number() OVER (PARTITION BY flow_rank ORDER BY position, min(from_ns)) AS position,
     part,
     activity,
     min(from_ns) AS from_ns,
@@ -287,5 +304,5 @@ SELECT
     publication_id
 FROM numbered
 GROUP BY
-    run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part, activity,
-    is_certain, callback_instance_id, publication_id, island
+    run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
+    activity, is_certain, callback_instance_id, publication_id, island

@@ -1,20 +1,25 @@
 -- name: main.end_to_end
 -- kind: macro
--- description: What became of every root of every path. A root that reached the sink has a row per
---     take there; one that did not has a single row that says why. Roots are callback instances of
---     timers that published, or publications (always with from_event 'publish'); the time window is
---     that of the roots. A message is lost between the first and the last that passed the same
---     step, and cut by the recording before and after.
+-- description: What became of every root of every path. A root that reached the sink has one row
+--     per take there; a root that did not has a single row with the reason. Roots are callback
+--     instances of timers that published, or publications (always with from_event 'publish'). The
+--     time window applies to roots. A message that stopped a root is lost if earlier and later ones
+--     passed the same step, else it is cut by the recording.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
 -- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR  Topic where flows start; every source when NULL
--- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
--- param: from_event VARCHAR  Event that starts the clock: 'callback_start' or 'publish'
--- param: to_event VARCHAR  Event that stops it: 'take', 'callback_start' or 'callback_end'
--- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
--- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
+-- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas; NULL: any
+-- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
+-- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
+--     'publish'; others are an error
+-- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
+--     'callback_end'; others are an error
+-- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
+-- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
+--     NULL: any
 -- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
+--     chains of each length
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance' or 'publication'
@@ -32,13 +37,14 @@
 -- column: is_last BOOLEAN  Last arrival of the root
 -- column: is_newest BOOLEAN  Newest root of the arrival
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
---     where it did not arrive, as long as the longest flow of the path took
--- needs: derive.flow_chain, derive.flow_root, derive.flow_transport, derive.flow_continuation,
---     main.publication, main.callback_instance, main.take, main.loss_interval, store.publisher,
---     store.undelivered
+--     if it did not arrive, as long as the longest flow of the path took
+-- needs: derive.known_word, derive.flow_chain, derive.flow_root, derive.flow_transport,
+--     derive.flow_continuation,
+--     main.publication, main.callback_instance, main.take, main.loss_interval, store.undelivered
 CREATE OR REPLACE MACRO main.end_to_end(
-    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
-    max_depth := 32, max_paths := 1000
+    runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
+    to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,
+    max_paths := 1000
 ) AS TABLE
 WITH RECURSIVE chain AS MATERIALIZED (
     SELECT
@@ -47,6 +53,8 @@ WITH RECURSIVE chain AS MATERIALIZED (
     FROM derive.flow_chain(
         runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
+    WHERE derive.known_word('from_event', from_event, ['callback_start', 'publish'])
+        AND derive.known_word('to_event', to_event, ['take', 'callback_start', 'callback_end'])
 ),
 lineage (path_id, prefix_id, depth, parent_path_id) AS (
     SELECT path_id, path_id, depth, parent_path_id FROM chain WHERE is_path
@@ -75,15 +83,15 @@ root AS MATERIALIZED (
         b.start_ns AS published_ns
     FROM derive.flow_root AS r
     JOIN main.publication AS b ON r.publication_id = b.publication_id
-    JOIN store.publisher AS p ON r.publisher_id = p.publisher_id
     LEFT JOIN main.callback_instance AS i
         ON from_event <> 'publish'
         AND r.root_kind = 'callback_instance'
         AND r.root_id = i.callback_instance_id
     WHERE list_contains(runs, r.run_id)
-        AND CASE WHEN from_topic IS NULL THEN r.is_source ELSE p.topic_name = from_topic END
-        AND coalesce(i.start_ns, b.start_ns) >= window_start_ns
-        AND coalesce(i.start_ns, b.start_ns) < window_end_ns
+        AND CASE WHEN from_topic IS NULL THEN r.is_source
+            ELSE r.publisher_id IN (SELECT publisher_id FROM chain WHERE depth = 1) END
+        AND coalesce(coalesce(i.start_ns, b.start_ns) >= window_start_ns, true)
+        AND coalesce(coalesce(i.start_ns, b.start_ns) < window_end_ns, true)
 ),
 transport AS MATERIALIZED (
     SELECT publication_id, publisher_id, take_id, subscription_id

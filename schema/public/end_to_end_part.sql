@@ -2,22 +2,32 @@
 -- kind: macro
 -- description: What the latency of each flow of each path (main.end_to_end) consists of. The parts
 --     of a flow follow each other without a gap from its start to its end, so their durations add
---     up to its latency exactly. A part is negative where the next began before it ended: clocks
---     of two hosts apart, a message taken before the publishing call returned, a callback that
---     published for an input whose own callback was still running.
+--     up to its latency exactly. A part is negative if the next one began before it ended: clocks
+--     of two hosts are apart, a message was taken before the publishing call returned, or a
+--     callback published for an input whose own callback was still running.
 -- grain: one row per flow that reached the sink and part
 -- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR  Topic where flows start; every source when NULL
--- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
--- param: from_event VARCHAR  Event that starts the clock: 'callback_start' or 'publish'
--- param: to_event VARCHAR  Event that stops it: 'take', 'callback_start' or 'callback_end'
--- param: window_start_ns BIGINT  Begin of the time window of roots, epoch ns
--- param: window_end_ns BIGINT  End of the time window of roots, epoch ns, exclusive
--- param: flow_case VARCHAR  Pairs of root and arrival: 'first', 'last', 'newest', 'every_pair', or
+-- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas; NULL: any
+-- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
+-- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
+--     'publish'; others are an error
+-- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
+--     'callback_end'; others are an error
+-- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
+-- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
+--     NULL: any
+-- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest',
+--     'every_pair', or
 --     'longest', the one flow of all that took longest
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
 -- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
+-- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
+--     chains of each length
+-- param: most_flows INTEGER = 1  Of 'longest', how many
+-- param: at_quantile DOUBLE = NULL  Of 'longest', in its place the flow with this quantile of the
+--     latency, 0 to 1
+-- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: flow_id BIGINT  Number of the flow in this result
@@ -25,8 +35,8 @@
 -- column: root_id BIGINT  Identity of the root
 -- column: take_id BIGINT  Take at the end of the path
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: hop BIGINT  Which message of the path it is, or leads to; behind the last for the
---     callback at the end
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than
+--     the last for the callback at the end
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
 --     publishes or calls), 'cache' (from the end of the callback to the callback instance that
@@ -41,12 +51,15 @@
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
--- needs: main.end_to_end, derive.flow_chain, main.publication, main.take, main.callback_instance,
+-- needs: derive.known_word, main.end_to_end, derive.flow_chain, main.publication, main.take,
+--     main.callback_instance,
 --     main.request, derive.flow_transport, derive.flow_caller, derive.flow_root,
 --     store.callback_instance, store.take, store.link_causal, store.link_request
 CREATE OR REPLACE MACRO main.end_to_end_part(
-    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns, flow_case,
-    sink_take_id := NULL, max_depth := 32, max_paths := 1000
+    runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
+    to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
+    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows := 1,
+    at_quantile := NULL, path_ids := NULL
 ) AS TABLE
 WITH RECURSIVE flow AS MATERIALIZED (
     SELECT
@@ -59,7 +72,10 @@ WITH RECURSIVE flow AS MATERIALIZED (
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
         max_depth := max_depth, max_paths := max_paths
     ) AS e
-    WHERE e.status = 'reached'
+    WHERE derive.known_word(
+            'flow_case', flow_case, ['first', 'last', 'newest', 'every_pair', 'longest']
+        )
+        AND e.status = 'reached'
         AND coalesce(e.take_id = sink_take_id, true)
         AND CASE flow_case
             WHEN 'first' THEN e.is_first
@@ -67,9 +83,17 @@ WITH RECURSIVE flow AS MATERIALIZED (
             WHEN 'newest' THEN e.is_newest
             ELSE true
         END
-    QUALIFY flow_case <> 'longest' OR row_number() OVER (
-        ORDER BY e.latency_ns DESC, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
-    ) = 1
+        AND (path_ids IS NULL OR list_contains(path_ids, e.path_id))
+    -- The quantile is one that occurred: so many flows took no longer.
+    QUALIFY CASE
+        WHEN flow_case <> 'longest' THEN true
+        WHEN at_quantile IS NULL THEN row_number() OVER (
+            ORDER BY e.latency_ns DESC, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+        ) <= most_flows
+        ELSE row_number() OVER (
+            ORDER BY e.latency_ns, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+        ) = greatest(1, ceil(at_quantile * count(*) OVER ()))
+    END
 ),
 chain AS MATERIALIZED (
     SELECT path_id, parent_path_id, depth, publisher_id, subscription_id, route

@@ -1,15 +1,17 @@
 -- name: main.executor_interference
--- description: What the threads of its executor ran while a callback instance waited. Overlaps of
---     one thread add up to the time for which it was busy; those of several threads run side by
---     side.
+-- description: What the threads of its executor ran while a callback instance waited. Overlaps on
+--     one thread add up to the time for which it was busy; overlaps on several threads may lie side
+--     by side in time.
 -- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: callback_instance_id BIGINT  Callback instance that waited
 -- column: meanwhile_id BIGINT  Callback instance that the executor was busy with
+-- column: meanwhile_callback_id BIGINT  Its callback
 -- column: executor_id BIGINT  Their executor
 -- column: thread_id BIGINT  Thread that was busy
--- column: overlap_ns BIGINT [ns]  From earliest_ns of the wait on (latest_ns where that is unknown)
--- column: certain_ns BIGINT [ns]  From latest_ns of the wait on
+-- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
+--     is unknown)
+-- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
 -- needs: derive.callback_ready, derive.executor_run, store.executor_thread
 WITH ready AS (
     SELECT
@@ -25,7 +27,7 @@ WITH ready AS (
     WHERE r.start_ns > coalesce(r.earliest_ns, r.latest_ns)
 ),
 run AS (
-    SELECT thread_id, callback_instance_id, start_ns, end_ns, position
+    SELECT thread_id, callback_instance_id, callback_id, start_ns, end_ns, position
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
@@ -52,6 +54,7 @@ SELECT
     p.run_id,
     p.callback_instance_id,
     r.callback_instance_id AS meanwhile_id,
+    r.callback_id AS meanwhile_callback_id,
     p.executor_id,
     p.thread_id,
     least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.from_ns) AS overlap_ns,

@@ -1,10 +1,10 @@
 -- name: main.executor_wait
--- description: How long callback instances waited in their executor, and what for. When exactly an
---     input arrived is not in a trace, so that time is given as bounds: it became ready between
---     earliest_ns and latest_ns. It could not start (busy) while all threads of the executor ran
---     callbacks, or one ran that it excludes; what else passed was the network, an idle executor,
---     or its own overhead. Callback instances nested in others are left out: these are served by an
---     executor inside of a callback.
+-- description: How long callback instances waited in their executor, and what for. A trace does not
+--     say when an input arrived, so that moment is given as bounds: it became ready between
+--     earliest_ns and latest_ns. It could not start (the executor was busy) while all threads of
+--     the executor ran callbacks, or one ran that excludes it. The rest of the time was the
+--     network, an idle executor, or its own overhead. Callback instances nested in others are left
+--     out: an executor inside a callback serves them.
 -- grain: one row per callback instance that is not nested in another
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: callback_instance_id BIGINT  Callback instance that waited
@@ -14,7 +14,7 @@
 -- column: since VARCHAR  What origin_ns is: 'publication' (its end), 'stamp' (of a message whose
 --     publication is not known, by the clock of its host), 'request' (sent), 'timer' (due);
 --     NULL: not known
--- column: origin_ns BIGINT [epoch ns]  Since when it can have been due
+-- column: origin_ns BIGINT [epoch ns]  Moment from which it can have been due
 -- column: earliest_ns BIGINT [epoch ns]  It was not ready before; NULL: not known
 -- column: latest_ns BIGINT [epoch ns]  It was ready by then
 -- column: start_ns BIGINT [epoch ns]  callback_start

@@ -1,5 +1,5 @@
 -- name: main.failed_take
--- description: Attempts to take from a subscription that took nothing.
+-- description: Attempts to take from a subscription that got nothing.
 -- grain: one row per attempt that took nothing
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: trace_id BIGINT  Trace it was recorded in

@@ -1,12 +1,12 @@
 -- name: main.flow_backward
 -- kind: macro
--- description: Everything that a publication, take, callback instance, request or response is
---     caused by, directly or through others, itself included.
+-- description: Everything that caused a publication, take, callback instance, request or response,
+--     directly or through other things, and the thing itself.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
--- param: max_depth INTEGER = NULL  Most steps; any number when NULL
+-- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- column: id BIGINT  Identity of the vertex

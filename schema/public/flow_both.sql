@@ -1,13 +1,13 @@
 -- name: main.flow_both
 -- kind: macro
 -- description: The flow of one message: everything that a publication, take, callback instance,
---     request or response causes and is caused by, itself included. What its causes lead to besides
---     is left out.
+--     request or response caused and was caused by, and the thing itself. Other effects of its
+--     causes are omitted.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
--- param: max_depth INTEGER = NULL  Most steps; any number when NULL
+-- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- column: id BIGINT  Identity of the vertex

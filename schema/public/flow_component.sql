@@ -1,12 +1,12 @@
 -- name: main.flow_component
 -- kind: macro
--- description: Everything that a publication, take, callback instance, request or response is
---     connected with in any direction, itself included.
+-- description: Everything that is connected with a publication, take, callback instance, request or
+--     response in any direction, and the thing itself.
 -- grain: one row per vertex
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
--- param: max_depth INTEGER = NULL  Most steps; any number when NULL
+-- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- column: id BIGINT  Identity of the vertex

@@ -5,7 +5,7 @@
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: from_kind VARCHAR  Cause: 'publication', 'take', 'callback_instance' or 'request'
 -- column: from_id BIGINT  Identity of the cause
--- column: to_kind VARCHAR  Effect: likewise, or 'response'
+-- column: to_kind VARCHAR  Effect: one of these, or 'response'
 -- column: to_id BIGINT  Identity of the effect
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' (from a request to its response),
 --     or the kind of the causal link

@@ -1,18 +1,20 @@
 -- name: main.flow_path
 -- kind: macro
 -- description: Chains of publishers and subscriptions that flows can take, with all their
---     beginnings (prefixes). No subscription comes twice in a chain. Where a call of a service led
---     to a publication, chains tell by whose call, through which services. A chain is a path where
---     it ends at the topic asked for, or where it is not continued. Chains longer than max_depth
---     and beyond max_paths are cut; is_cut says so of each chain that has more to it, or of all
---     chains of the run where it cannot be told which.
+--     beginnings (prefixes). No subscription comes twice in a chain. Where the call of a service
+--     led to a publication, the chain has the node that called and the services in between. A chain
+--     is a path if it ends at the topic asked for, or if nothing continues it. Chains longer than
+--     max_depth and beyond max_paths are cut. is_cut marks each chain that has more to it, or all
+--     chains of the run if it is not known which.
 -- grain: one row per run and chain
 -- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR  Topic where flows start; every source when NULL
--- param: to_topic VARCHAR  Topic where flows end; wherever they end when NULL
+-- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas; NULL: any
+-- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
 -- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Most paths, shortest first, and most chains per length
--- param: only_paths BOOLEAN = false  Leave out the chains that are no paths
+-- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
+--     chains of each length
+-- param: only_paths BOOLEAN = false  Leave out chains that are not paths
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Number of the chain in this result
 -- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
@@ -20,7 +22,7 @@
 -- column: publishers BIGINT[]  Publishers in order
 -- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: topics VARCHAR[]  Topics in order
--- column: routes BIGINT[][]  For each topic, empty where no service led to it: the node that called
+-- column: routes BIGINT[][]  For each topic, empty where no service led to it: the calling node
 --     (negative: its process; 0: not known), then the services in order (0: not known)
 -- column: path VARCHAR  Nodes and topics in order, services in brackets, for people
 -- column: publisher_id BIGINT  Last publisher
@@ -31,7 +33,8 @@
 -- needs: derive.flow_chain, derive.node_label, store.publisher, store.subscription, store.node,
 --     store.process, store.service
 CREATE OR REPLACE MACRO main.flow_path(
-    runs, from_topic, to_topic, max_depth := 32, max_paths := 1000, only_paths := false
+    runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000,
+    only_paths := false
 ) AS TABLE
 WITH RECURSIVE chain AS MATERIALIZED (
     SELECT

@@ -1,15 +1,15 @@
 -- name: main.flow_step
 -- kind: macro
 -- description: The picture of one message: what a publication, take, callback instance, request or
---     response causes, what it is caused by, or both, with times, names, and what is missing where
---     a branch ends. Vertices nearest to the start come first where a limit cuts the flow.
+--     response caused, what it was caused by, or both, with times, names, and what is missing where
+--     a branch ends. If a limit cuts the flow, the vertices nearest to the start are kept.
 -- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
 --     does), and one per subscription that did not get a message
 -- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: start_id BIGINT  Identity of the vertex to start from
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
--- param: max_depth INTEGER = 96  Most steps from the start; a message is three of them
--- param: max_vertices INTEGER = 1000  Most vertices
+-- param: max_depth INTEGER = 96  Maximum number of steps from the start; a message takes three
+-- param: max_vertices INTEGER = 1000  Maximum number of vertices
 -- param: internal BOOLEAN = false  Follow effects on ROS's own topics and services too
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: depth INTEGER  Steps from the start; negative: backward
@@ -19,16 +19,16 @@
 --     'not_taken' to a subscription that did not get the message
 -- column: wait_ns BIGINT [ns]  Time between cause and effect; NULL where the effect is part of the
 --     cause
--- column: candidate_count BIGINT  Causes that it could have been
+-- column: candidate_count BIGINT  Number of causes that are possible
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request', 'response', or
 --     'subscription' where the message was not taken
 -- column: id BIGINT  Identity of the vertex
--- column: start_ns BIGINT [epoch ns]  Begin of the publication or callback instance; the take; when
---     the request or response was sent (taken, where that is all there is)
+-- column: start_ns BIGINT [epoch ns]  Start of the publication or callback instance; the take; the
+--     sending of the request or response (the taking, if only that is known)
 -- column: end_ns BIGINT [epoch ns]  Its end; when the request or response was taken
--- column: node VARCHAR  Node, or process in brackets; of requests and responses that of the client,
---     ? where it is not known
+-- column: node VARCHAR  Node, or process in brackets; for requests and responses the client's node;
+--     ? if it is not known
 -- column: label VARCHAR  What it is: a topic or service, or what triggers the callback
 -- column: topic_name VARCHAR  Topic of the message
 -- column: symbol VARCHAR  Function of the callback

@@ -9,8 +9,8 @@
 -- column: annotation_id BIGINT  Annotation that declares it; NULL for direct links
 -- column: wait_ns BIGINT [ns]  From the end of the callback, or the take, to the publication; 0 for
 --     direct links
--- column: candidate_count BIGINT  Callback instances that it could have been; of an input of an
---     indirect link that had no message when the publishing one began, one more
+-- column: candidate_count BIGINT  Callback instances that it could have been; one more if it is the
+--     input of an indirect link and had no message when the publishing callback began
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
 -- needs: store.link_causal, main.callback_instance, main.publication, main.take
 SELECT

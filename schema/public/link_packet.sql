@@ -1,13 +1,13 @@
 -- name: main.link_packet
--- description: Network packets that kernel traces saw on both ends of their way, between hosts of
---     two clocks. A negative latency means that the clocks are apart.
+-- description: Network packets that kernel traces recorded at both ends, between hosts of two
+--     clocks. A negative latency means that the clocks are apart.
 -- grain: one row per network packet and clock that received it from another
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: sent_trace_id BIGINT  Trace of its sender
 -- column: received_trace_id BIGINT  Trace of its receiver
 -- column: sent_ns BIGINT [epoch ns]  Handed to the network device
 -- column: received_ns BIGINT [epoch ns]  Came from the network device
--- column: latency_ns BIGINT [ns]  From one to the other
+-- column: latency_ns BIGINT [ns]  From sent_ns to received_ns
 -- column: protocol VARCHAR  'tcp' or 'udp'
 -- column: source_address VARCHAR  IP address that it was sent from
 -- column: source_port INTEGER  Port that it was sent from

@@ -6,7 +6,7 @@
 -- column: publication_id BIGINT  Where the message came from
 -- column: take_id BIGINT  Where it was received
 -- column: method VARCHAR  'exact', 'exact_stamp', 'nearest' or 'ring_buffer'
--- column: candidate_count BIGINT  Publications that it could have been
+-- column: candidate_count BIGINT  Number of publications that are possible
 -- column: is_self_loop BOOLEAN  Received by the publishing node itself
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
 -- column: is_copy BOOLEAN  A ring buffer carries the same message: no callback gets this one

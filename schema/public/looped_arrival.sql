@@ -1,11 +1,11 @@
 -- name: main.looped_arrival
 -- kind: macro
--- description: Later takes at the end of a path, which visits no subscription twice: those that
---     descend from an arrival there, and are none. Every loop through a subscription lies among
---     those that it leads to and that lead to it.
+-- description: Later takes at the end of a path that are not arrivals, since a path visits no
+--     subscription twice, but that descend from an arrival there through a loop. Any loop through a
+--     subscription consists of subscriptions that it leads to and that lead back to it.
 -- grain: one row per path and take
 -- param: runs BIGINT[]  Runs to look at
--- param: arrivals BIGINT[][]  Arrivals of main.end_to_end: each path_id and take_id, once
+-- param: arrivals BIGINT[][]  Arrivals of main.end_to_end: each pair of path_id and take_id once
 -- column: path_id BIGINT  Path, as main.end_to_end numbers it
 -- column: take_id BIGINT  Take at the end of the path
 -- needs: derive.flow_transport, derive.flow_continuation, derive.continued_pair,

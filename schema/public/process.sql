@@ -4,13 +4,13 @@
 -- column: process_id BIGINT  Identity of the process life
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: host_id BIGINT  Host it ran on
--- column: pid INTEGER  Process id, virtual where the trace has no other
+-- column: pid INTEGER  Process id; the one inside its PID namespace if the trace has no other
 -- column: name VARCHAR  Name of the process (its first thread)
--- column: tracetools_version VARCHAR  Version that rcl_init stated; for display only
+-- column: tracetools_version VARCHAR  Version that rcl_init reported; for display only
 -- column: first_seen_ns BIGINT [epoch ns]  First event
 -- column: last_seen_ns BIGINT [epoch ns]  Last event
 -- column: pid_namespace BIGINT  PID namespace, where the trace has it
--- column: life INTEGER  Number of the life among those of one pid, from 1
+-- column: life INTEGER  Number of this life among those of the pid, from 1
 -- needs: store.process, derive.corrected_ns, derive.process_clock
 SELECT
     self.process_id,

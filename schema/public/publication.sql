@@ -14,7 +14,8 @@
 -- column: rcl_ns BIGINT [epoch ns]  rcl_publish
 -- column: rmw_ns BIGINT [epoch ns]  rmw_publish
 -- column: dds_ns BIGINT [epoch ns]  dds:write
--- column: source_timestamp_ns BIGINT [epoch ns]  Stamp that the middleware sent along, clock of ROS
+-- column: source_timestamp_ns BIGINT [epoch ns]  Stamp that the middleware gave to the message,
+--     clock of ROS
 -- column: is_loss_affected BOOLEAN  A gap right before or after it on its thread may hide a layer
 -- needs: store.publication, derive.corrected_ns, derive.process_clock
 SELECT

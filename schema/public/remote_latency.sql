@@ -1,6 +1,6 @@
 -- name: main.remote_latency
--- description: Messages between hosts of different clocks: how long they took, and how far that can
---     be wrong. Both errors, of the sender's and the receiver's clock, count.
+-- description: Messages between hosts of different clocks: how long they took, and how wrong that
+--     can be. The bound contains the errors of both clocks.
 -- grain: one row per message between two clocks
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: publication_id BIGINT  Where the message came from

@@ -1,5 +1,5 @@
 -- name: main.run
--- description: Ingests of traces that belong together. Nothing is ever linked across runs.
+-- description: Recordings: the traces that one ingest read. Nothing is ever linked across runs.
 -- grain: one row per ingest of traces that belong together
 -- column: run_id BIGINT  Identity of the run
 -- column: name VARCHAR  Name given by the user, or the name of the first trace directory

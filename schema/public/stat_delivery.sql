@@ -1,15 +1,15 @@
 -- name: main.stat_delivery
--- description: What became of every message at every subscription of its topic. Whether a message
---     was overwritten in the queue or lost on the way is told by the depth of the queue alone;
---     incompatible QoS, lifespan and best effort do not show in a trace. Of a ring buffer whose
---     subscription was not traced there is only what was taken from it. The copy by the middleware
---     of what a ring buffer carries is no delivery: no callback gets it.
+-- description: What became of every message at every subscription of its topic. Only the depth of
+--     the queue decides whether a message counts as overwritten or as lost on the way; incompatible
+--     QoS, lifespan and best effort do not show in a trace. If the subscription of a ring buffer
+--     was not traced, only what was taken from the buffer is listed. The middleware's copy of a
+--     message that a ring buffer carries is not a delivery: no callback gets it.
 -- grain: one row per publication and subscription of its topic
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: publication_id BIGINT  The message
 -- column: publisher_id BIGINT  Its publisher
--- column: subscription_id BIGINT  Who should have taken it
--- column: take_id BIGINT  Where it was taken; NULL: not, or not known
+-- column: subscription_id BIGINT  Subscription that should have taken it
+-- column: take_id BIGINT  Take of the message; NULL: it was not taken, or that is not known
 -- column: status VARCHAR  'delivered', 'skipped' (newer messages took its place), 'lost',
 --     'unconnected' (before or after the two were connected, as far as traced) or 'unknown'
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',

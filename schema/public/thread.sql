@@ -1,10 +1,10 @@
 -- name: main.thread
--- description: Threads, with the name that they had last.
+-- description: Threads, each with its last name.
 -- grain: one row per thread
 -- column: thread_id BIGINT  Identity of the thread
 -- column: run_id BIGINT  Run that the row belongs to
 -- column: process_id BIGINT  Process it lives in
--- column: tid INTEGER  Thread id, virtual where the trace has no other
+-- column: tid INTEGER  Thread id; the one inside its PID namespace if the trace has no other
 -- column: name VARCHAR  Name of the thread
 -- column: first_seen_ns BIGINT [epoch ns]  First event
 -- column: last_seen_ns BIGINT [epoch ns]  Last event

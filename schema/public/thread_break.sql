@@ -1,6 +1,6 @@
 -- name: main.thread_break
--- description: Where the record of a thread breaks: events of it may be missing before these
---     moments. No state of an executor reaches across one, and no pair of events that are not
+-- description: Where the record of a thread breaks: events of the thread may be missing before
+--     these moments. No executor state reaches across a break, and pairs of events that do are
 --     marked.
 -- grain: one row per gap in the record of a thread
 -- column: run_id BIGINT  Run that the row belongs to

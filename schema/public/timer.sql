@@ -1,5 +1,5 @@
 -- name: main.timer
--- description: Timers. Of one whose initialisation was not traced the period is not known.
+-- description: Timers. If the initialisation of a timer was not traced, its period is not known.
 -- grain: one row per timer
 -- column: timer_id BIGINT  Identity of the timer
 -- column: run_id BIGINT  Run that the row belongs to

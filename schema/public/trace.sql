@@ -1,5 +1,5 @@
 -- name: main.trace
--- description: CTF traces as they were read.
+-- description: CTF traces that were read.
 -- grain: one row per CTF trace read
 -- column: trace_id BIGINT  Identity of the trace
 -- column: run_id BIGINT  Run that the row belongs to
@@ -8,8 +8,8 @@
 -- column: uuid VARCHAR  UUID of the trace
 -- column: tracer VARCHAR  Tracer and its version
 -- column: domain VARCHAR  'ust' or 'kernel'
--- column: start_ns BIGINT [epoch ns]  First event or packet begin
--- column: end_ns BIGINT [epoch ns]  Last event or packet end
+-- column: start_ns BIGINT [epoch ns]  First event or start of a packet
+-- column: end_ns BIGINT [epoch ns]  Last event or end of a packet
 -- column: event_count BIGINT  Events read
 -- column: discarded_event_count BIGINT  Events that the tracer counted as discarded
 -- needs: store.trace, store.host, store.clock, derive.corrected_ns

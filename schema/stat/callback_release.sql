@@ -44,19 +44,44 @@ message AS (
 ),
 -- A timer is due at creation + k periods. Its creation is recorded a little after the first
 -- of these instants begins to count: a hundredth of the period is left for that.
-timer_next AS (
+timer_slot AS (
     SELECT
         i.callback_instance_id,
+        i.callback_id,
         i.start_ns,
         i.previous_start_ns,
+        i.depth,
         t.period_ns,
-        t.created_ns + t.period_ns * (
-            (i.previous_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns + 1
-        ) AS next_ns
+        t.created_ns,
+        (i.previous_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns AS slot
     FROM every_run AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id
     JOIN store.timer AS t ON c.timer_id = t.timer_id
-    WHERE i.previous_start_ns IS NOT NULL AND t.period_ns > 0 AND i.depth = 1
+    WHERE i.previous_start_ns IS NOT NULL AND t.period_ns > 0
+),
+-- A call shortly before such an instant was for it, or for one before it, almost a period late:
+-- then that instant is still to come.
+timer_next AS (
+    SELECT
+        callback_instance_id,
+        start_ns,
+        previous_start_ns,
+        period_ns,
+        created_ns + period_ns * CASE
+            WHEN previous_start_ns < created_ns + period_ns * slot
+                AND coalesce(earlier_slot, 0) + 1 < slot
+                THEN slot
+            ELSE slot + 1
+        END AS next_ns
+    FROM (
+        SELECT
+            *,
+            lag(slot) OVER (
+                PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
+            ) AS earlier_slot
+        FROM timer_slot
+    )
+    WHERE depth = 1
 ),
 timer_due AS (
     SELECT

@@ -43,6 +43,18 @@ stampless AS (
     GROUP BY process_id
     HAVING count(source_timestamp_ns) = 0
 ),
+-- Takes have no event of their own before Humble: no loss is why they have no stamp.
+stamping AS (
+    SELECT process_id
+    FROM store.process
+    WHERE host_id IN (
+        SELECT p.host_id
+        FROM store.take AS t
+        JOIN store.process AS p ON t.process_id = p.process_id
+        WHERE t.run_id = of_run AND t.source_timestamp_ns IS NOT NULL
+            AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
+    )
+),
 sending AS (
     SELECT topic_name, process_id, min(coalesce(created_ns, 0)) AS created_ns
     FROM store.publisher
@@ -169,6 +181,7 @@ SELECT
         WHEN k.has_gap THEN 'publisher_gap'
         WHEN k.is_before_tracing THEN 'before_tracing'
         WHEN o.stamp_ns IS NULL AND o.method <> 'ring_buffer' AND o.is_loss_affected
+            AND o.process_id IN (SELECT process_id FROM stamping)
             THEN 'receiver_gap'
         WHEN o.stamp_ns IS NULL THEN 'no_stamp'
         WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))

@@ -239,8 +239,8 @@ SELECT
         WHEN has_gap THEN 'receiver_gap'
         WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
             THEN 'subscription_ended'
-        WHEN has_failed_take THEN 'take_failed'
         WHEN has_unidentified_take THEN 'unknown'
+        WHEN has_failed_take THEN 'take_failed'
         WHEN is_before_first AND has_earlier_gap THEN 'unknown'
         WHEN is_before_first THEN 'before_discovery'
         WHEN waited_ns IS NOT NULL THEN 'not_delivered'

@@ -60,6 +60,8 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("--publication", "1", "--limit", "0"), "--limit"),
         (("--publication", "1", "--direction", "up"), "--direction"),
         (("--publication", "1", "--html", "a.txt"), ".html"),
+        (("--publication", "1", "-o", "a.xlsx"), "no format has this suffix — a.xlsx"),
+        (("--publication", "1", "-o", "a.csv"), ".txt, .json"),
         (("--publication", "1", "--html", "a.html", "--format", "json"), "--html"),
     ],
 )

@@ -41,7 +41,7 @@ def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
     assert json.loads(msgflow(*arguments, "--from", "/topic_a").stdout)
     unknown = msgflow(*arguments, "--from", "/topic_z")
     assert (unknown.exit_code, unknown.stdout) == (2, "")
-    assert "there is no such topic in the run — /topic_z" in unknown.stderr
+    assert "there is no such topic or node in the run — /topic_z" in unknown.stderr
     assert "/topic_a" in unknown.stderr.partition("hint: ")[2]
     for option in ("--max-depth", "--max-paths"):
         for least in ("0", "-1"):

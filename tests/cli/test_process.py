@@ -145,14 +145,14 @@ def test_an_interrupt_ends_a_query_with_code_130(small_database: Path) -> None:
     assert errors == "error: interrupted\n"
 
 
-def on_terminal(arguments: list[str]) -> bytes:
+def on_terminal(arguments: list[str], width: int = 40) -> bytes:
     """Return what a program writes to stdout when that is a terminal."""
     leader, follower = pty.openpty()
     process = subprocess.Popen(
         arguments,
         stdout=follower,
         stderr=subprocess.DEVNULL,
-        env=os.environ | {"COLUMNS": "40", "TERM": "xterm-256color"},
+        env=os.environ | {"COLUMNS": str(width), "TERM": "xterm-256color"},
     )
     os.close(follower)
     parts = []
@@ -169,12 +169,39 @@ def on_terminal(arguments: list[str]) -> bytes:
     return b"".join(parts).replace(b"\r\n", b"\n")
 
 
-@pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
+@pytest.mark.parametrize("form", ["json", "csv", "markdown", "table --wide"])
 def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: str) -> None:
-    arguments = command("query", "info-runs", "--db", small_database, "--format", form)
+    arguments = command("query", "info-runs", "--db", small_database, "--format", *form.split())
     piped = subprocess.run(arguments, capture_output=True, check=True).stdout
     assert piped
     assert on_terminal(arguments) == piped
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("query", "info-topics"),
+        ("query", "info-runs", "--run", "all"),
+        ("info",),
+        ("db", "schema"),
+        ("db", "check"),
+        ("sql", "FROM run, range(3) SELECT * EXCLUDE (created_at)"),
+        ("clocks", "show"),
+        ("links", "list"),
+    ],
+    ids=" ".join,
+)
+@pytest.mark.parametrize("width", [40, 80, 100])
+def test_a_table_fits_the_terminal(
+    small_database: Path, arguments: tuple[str, ...], width: int
+) -> None:
+    lines = on_terminal(command(*arguments, "--db", small_database), width).decode().splitlines()
+    assert max(map(len, lines), default=0) <= width
+    wide = on_terminal(command(*arguments, "--wide", "--db", small_database), width)
+    piped = subprocess.run(
+        command(*arguments, "--db", small_database), capture_output=True, check=True
+    ).stdout
+    assert wide == piped
 
 
 def test_parquet_is_not_written_to_a_terminal(small_database: Path) -> None:

@@ -114,7 +114,7 @@ def test_durations_and_times_are_for_people_in_tables_only(
     ("arguments", "code", "error", "hint"),
     [
         (("info-topic",), 2, "there is no such query — info-topic", "msgflow query info-topics"),
-        (("info-runs", "--limit", "3"), 2, "no such option: --limit", "info-runs --help"),
+        (("info-runs", "--limits", "3"), 2, "no such option: --limits", "info-runs --help"),
         (("info-runs", "--run", "x"), 2, "there is no such run — x", "morning (1), noon (2)"),
         (("info-runs", "--start", "1s"), 2, "no time window — info-runs", "leave out --start"),
         (

@@ -168,7 +168,7 @@ def test_a_number_that_comes_round_again_is_told_by_time(make: Make, ingest: Ing
     assert all(5 * SECOND < way < 5 * SECOND + 1_000_000 for (way,) in ways)
     unused = details(database)["network_packets_unused"]
     assert "of 7 network packets sent and 7 received on alpha and beta, 5 were seen" in unused
-    assert "4 whose like was seen" in unused
+    assert "4 that were repeated" in unused
 
 
 def test_clocks_are_told_by_numbers_that_all_come_again(make: Make, ingest: Ingest) -> None:
@@ -203,7 +203,7 @@ def test_numbers_that_come_again_regularly_tell_nothing(make: Make, ingest: Inge
     assert links(database) == []
     assert beta(database)["method"] == "messages"
     unused = details(database)["network_packets_unused"]
-    assert "400 whose other end was not seen or cannot be told" in unused
+    assert "400 whose other end was not seen or is not certain" in unused
 
 
 def test_headers_of_all_kinds(make: Make, ingest: Ingest) -> None:
@@ -234,8 +234,8 @@ def test_headers_of_all_kinds(make: Make, ingest: Ingest) -> None:
         ("udp", "fd00:0:0:0:0:0:0:1", 3, "fd00:0:0:0:0:0:0:2", 4, None, None),
     ]
     unused = details(database)["network_packets_unused"]
-    assert "10 that nothing tells from others, 4 whose like" in unused
-    assert "1 whose other end was not seen or cannot be told" in unused
+    assert "10 that look like others, 4 that were repeated" in unused
+    assert "1 whose other end was not seen or is not certain" in unused
 
 
 def test_one_host_is_said(make: Make, ingest: Ingest) -> None:

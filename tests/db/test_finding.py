@@ -77,7 +77,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "diagnostic": "trace_id,name,severity,count,detail\n"
             "1,empty_trace,warning,1,not one event\n"
         },
-        [("trace", 1, "not one event was recorded")],
+        [("trace", 1, "no event was recorded")],
     ),
     "ignored_events": (
         {"diagnostic": "name,severity,count,detail\nignored_events,info,9,dds:* (9)\n"},
@@ -223,7 +223,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             (
                 "alpha → beta",
                 2,
-                "2 of 3 messages took less than the bound of its error, which is up to 1.500 ms; "
+                "2 of 3 messages took less than the possible error, which is up to 1.500 ms; "
                 "the median took 1.100 ms",
             )
         ],

@@ -2,27 +2,46 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import duckdb
 import pytest
-from sqlalchemy.schema import CreateSchema
+from alembic import command
 
-from msgflow.db import derive, migrate, objects
+from msgflow.db import create, derive, migrate, objects
 from msgflow.db.connection import connect, open_file, recorded_revision
-from msgflow.db.tables import metadata
 from msgflow.errors import DatabaseError
 
-CATALOGUE = (
-    "SELECT table_name, column_name, data_type, is_nullable, comment FROM duckdb_columns() "
-    "WHERE schema_name = 'store' AND table_name <> 'alembic_version' "
-    "AND database_name = current_database() ORDER BY table_name, column_index"
-)
-KEYS = (
-    "SELECT table_name, constraint_column_names FROM duckdb_constraints() "
-    "WHERE schema_name = 'store' AND table_name <> 'alembic_version' "
-    "AND constraint_type = 'PRIMARY KEY' AND database_name = current_database() ORDER BY ALL"
-)
+# All that a schema is, row by row.
+SCHEMA = {
+    "tables": "SELECT schema_name, table_name, comment FROM duckdb_tables()",
+    "columns": (
+        "SELECT schema_name, table_name, column_index, column_name, data_type, is_nullable, "
+        "column_default, comment FROM duckdb_columns() WHERE NOT internal"
+    ),
+    "constraints": (
+        "SELECT schema_name, table_name, constraint_type, constraint_column_names "
+        "FROM duckdb_constraints()"
+    ),
+    "views": "SELECT schema_name, view_name, sql, comment FROM duckdb_views() WHERE NOT internal",
+    "macros": (
+        "SELECT schema_name, function_name, parameters, macro_definition FROM duckdb_functions() "
+        "WHERE NOT internal"
+    ),
+    "revision": "SELECT version_num FROM store.alembic_version",
+    "definition": "FROM store.definition",
+}
+
+
+def schema_of(path: Path) -> dict[str, list[object]]:
+    with connect(path, read_only=True) as con:
+        return {
+            name: con.execute(f"SELECT * FROM ({query}) ORDER BY ALL").fetchall()
+            for name, query in SCHEMA.items()
+        }
 
 
 @pytest.fixture
@@ -32,14 +51,67 @@ def database(tmp_path: Path) -> Path:
     return path
 
 
-def test_migrations_and_tables_agree(database: Path, tmp_path: Path) -> None:
-    other = open_file(tmp_path / "other.duckdb", read_only=False)
-    with migrate.sqlalchemy_connection(other) as connection:
-        connection.execute(CreateSchema("store"))
-        metadata.create_all(connection)
-    migrated = connect(database, read_only=True)
-    for query in (CATALOGUE, KEYS):
-        assert migrated.execute(query).fetchall() == other.execute(query).fetchall()
+@pytest.mark.parametrize("revision", sorted(objects.known_revisions() - {objects.head_revision()}))
+def test_a_file_of_any_revision_becomes_what_a_new_one_is(
+    database: Path, tmp_path: Path, revision: str
+) -> None:
+    old = tmp_path / "old.duckdb"
+    with open_file(old, read_only=False) as con:
+        con.execute("CREATE SCHEMA store")
+        with migrate.sqlalchemy_connection(con) as connection:
+            command.upgrade(migrate.alembic_config(connection), revision)
+        assert recorded_revision(con) == revision
+    with pytest.raises(DatabaseError, match=f"has schema revision {revision}"):
+        connect(old, read_only=True)
+    assert migrate.upgrade(old).before == revision
+    found, wanted = schema_of(old), schema_of(database)
+    for name in SCHEMA:
+        assert found[name], name
+        assert found[name] == wanted[name], name
+
+
+def test_a_new_database_is_the_same_with_and_without_a_cache(
+    database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    made = tmp_path / "made.duckdb"
+    create.write_new(made)
+    (kept,) = (tmp_path / "cache" / "msgflow").glob("database-*")
+    assert schema_of(made) == schema_of(database)
+
+    monkeypatch.setattr(create, "_statements", lambda: pytest.fail("made again"))
+    create.write_new(tmp_path / "copied.duckdb")
+    assert (tmp_path / "copied.duckdb").read_bytes() == made.read_bytes()
+    assert schema_of(tmp_path / "copied.duckdb") == schema_of(made)
+
+    monkeypatch.undo()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    whole = kept.read_bytes()
+    for number, damage in enumerate((b"", whole[:-1], whole[:5000] + b"x" + whole[5001:])):
+        kept.write_bytes(damage)
+        again = tmp_path / f"{number}.duckdb"
+        create.write_new(again)
+        assert schema_of(again) == schema_of(database)
+
+
+def test_a_new_database_needs_neither_alembic_nor_a_dialect(tmp_path: Path) -> None:
+    program = """
+import sys
+from pathlib import Path
+from msgflow.db import migrate
+migrate.create(Path(sys.argv[1]))
+assert migrate.upgrade(Path(sys.argv[1])).before is not None
+print(sorted({name.split(".")[0] for name in sys.modules} & {"alembic", "duckdb_engine"}))
+"""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "new.duckdb")],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )
+    assert done.stdout == "[]\n", done.stderr
 
 
 def test_a_new_database_has_every_view_with_comments(database: Path) -> None:

@@ -1,7 +1,8 @@
-"""The pictures of the README can be taken anew, and something is on them."""
+"""The pictures of README and documents can be taken anew, and something is on them."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -10,21 +11,32 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+IMAGES = ROOT / "docs" / "images"
 
 
 def colors(path: Path) -> int:
     """Return how many colours a picture has; a blank one has few."""
     images = pytest.importorskip("PIL.Image")
     with images.open(path) as picture:
-        assert picture.size == (1280, 800)
-        return len(picture.convert("RGB").getcolors(1280 * 800))
+        assert picture.width == 1280
+        return len(picture.convert("RGB").getcolors(picture.width * picture.height))
 
 
-def test_the_readme_shows_pictures_that_are_not_blank() -> None:
+def test_documents_show_all_pictures_and_none_is_blank() -> None:
+    shown = {
+        name
+        for document in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+        for name in re.findall(
+            r"^!\[[^\]]+\]\((?:docs/)?images/(\w+)\.png\)$",
+            document.read_text(encoding="utf-8"),
+            re.MULTILINE,
+        )
+    }
+    assert shown == {path.stem for path in IMAGES.glob("*.png")}
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for name in ("timeline", "graph"):
-        assert f"(docs/images/{name}.png)" in text
-        assert colors(ROOT / "docs" / "images" / f"{name}.png") > 100
+    assert all(f"(docs/images/{name}.png)" in text for name in ("timeline", "graph"))
+    for name in shown:
+        assert colors(IMAGES / f"{name}.png") > 100
 
 
 def test_they_can_be_taken_anew(tmp_path: Path) -> None:
@@ -33,7 +45,7 @@ def test_they_can_be_taken_anew(tmp_path: Path) -> None:
         pytest.skip("no Chromium here: apt install chromium")
     # By a process of its own: two of Playwright cannot be in one.
     subprocess.run([sys.executable, ROOT / "docs" / "screenshots.py", tmp_path], check=True)
-    files = [tmp_path / "timeline.png", tmp_path / "graph.png"]
+    files = sorted(tmp_path.glob("*.png"))
+    assert [file.name for file in files] == sorted(path.name for path in IMAGES.glob("*.png"))
     for file in files:
-        kept = ROOT / "docs" / "images" / file.name
-        assert 0.5 < colors(file) / colors(kept) < 2
+        assert 0.5 < colors(file) / colors(IMAGES / file.name) < 2

@@ -242,8 +242,8 @@ def test_the_message_is_the_first_at_or_after_a_time(small_database: Path) -> No
         assert database.flow("/chatter", run="morning").start.id == 1
         for at in (None, "0.5s", "500ms", 1_700_000_010_500_000_000, "2023-11-14T22:13:30.5Z"):
             assert database.flow("/chatter", at=at).start.id == 2
-        # A number without unit is epoch ns, which who wrote it may not have meant.
-        early = database.flow("/chatter", at="2")
+        # A whole number is epoch ns, which who wrote it may not have meant; as text it is seconds.
+        early = database.flow("/chatter", at=2)
         assert (early.start.id, len(early.notes)) == (2, 1)
         assert "before the run" in early.notes[0]
         with pytest.raises(UsageError) as raised:
@@ -261,7 +261,7 @@ def test_what_cannot_be_started_from_is_named(small_database: Path) -> None:
             ({"topic": "/chatter", "take_id": 1}, "starts from one thing"),
             ({"publication_id": 7}, "no such publication — 7"),
             ({"publication_id": 1, "at": "1s"}, "an identity tells"),
-            ({"topic": "/chatter", "run": "all"}, "2 runs are chosen"),
+            ({"topic": "/chatter", "run": "all"}, "a message is of one run"),
             ({"topic": "/chatter", "at": "noon"}, "cannot read the time of --at"),
             ({"topic": "/chatter", "direction": "up"}, "no such direction"),
             ({"topic": "/chatter", "depth": -1}, "depth"),

@@ -39,6 +39,7 @@ class Decoded:
 
     tracks: dict[int, Any] = field(default_factory=dict)
     slices: list[Slice] = field(default_factory=list)
+    gaps: list[Slice] = field(default_factory=list)
     arrows: set[tuple[int, int]] = field(default_factory=set)
     values: dict[int, list[tuple[int, float]]] = field(default_factory=lambda: defaultdict(list))
 
@@ -75,6 +76,12 @@ def decode(path: Path) -> Decoded:
         if event.type == event.TYPE_COUNTER:
             value = (packet.timestamp, event.double_counter_value)
             decoded.values[event.track_uuid].append(value)
+        elif "gap" in event.categories:
+            said = {note.name: note.int_value for note in event.debug_annotations}
+            one = Slice(event.track_uuid, event.name, packet.timestamp, packet.timestamp, said, 0)
+            assert not open_slices[event.track_uuid]
+            open_slices[event.track_uuid].append(one)
+            decoded.gaps.append(one)
         elif event.type == event.TYPE_SLICE_END:
             open_slices[event.track_uuid].pop().end = packet.timestamp
         else:
@@ -266,6 +273,47 @@ def test_a_window_has_what_begins_in_it(tmp_path: Path) -> None:
     assert len(decoded.slices) == sum(one.begin < middle for one in whole.slices)
     assert all(start <= one.begin < middle for one in decoded.slices)
     assert 0 < len(decoded.arrows) < len(whole.arrows)
+
+
+def test_gaps_are_slices_of_their_host(tmp_path: Path) -> None:
+    pytest.importorskip("perfetto.trace_builder.proto_builder")
+    simulate("pipeline", tmp_path / "trace", factor=0.1)
+    path = tmp_path / "run.duckdb"
+    ingest([tmp_path / "trace"], path)
+    with duckdb.connect(str(path)) as connection:
+        ((trace, host, name, begin),) = connection.execute(
+            "SELECT trace_id, host_id, hostname, r.start_ns FROM trace JOIN host USING (host_id)"
+            " CROSS JOIN run AS r ORDER BY trace_id LIMIT 1"
+        ).fetchall()
+        connection.executemany(
+            "INSERT INTO store.loss_interval BY NAME SELECT 1 AS run_id, ? AS trace_id, ? AS cpu,"
+            " ? AS kind, ? AS start_ns, ? AS end_ns, ? AS event_count",
+            [
+                (trace, cpu, kind, begin + start, begin + end, count)
+                for cpu, kind, start, end, count in (
+                    (0, "loss", 10, 20, 3),
+                    # Touches the one before, and the next lies within it.
+                    (1, "packets", 20, 50, 4),
+                    (2, "loss", 30, 40, None),
+                    (None, "pause", 51, 90, None),
+                )
+            ],
+        )
+    with open_db(path) as database:
+        written = database.export_perfetto(tmp_path / "run.pftrace")
+        cut = database.export_perfetto(tmp_path / "cut.pftrace", start=begin + 15, end=begin + 60)
+    decoded = decode(written.path)
+    track = host * 8 + 6
+    assert decoded.tracks[track].name == f"{name}: not recorded"
+    first, second = "not recorded: loss, packets", "not recorded: pause"
+    assert [(one.track, one.name, one.begin - begin, one.end - begin, one.notes)
+            for one in decoded.gaps] == [
+        (track, first, 10, 50, {"lost_events": 7}), (track, second, 51, 90, {}),
+    ]  # fmt: skip
+    assert written.gaps == 2
+    assert [(one.begin - begin, one.end - begin) for one in decode(cut.path).gaps] == [
+        (15, 50), (51, 60),
+    ]  # fmt: skip
 
 
 def test_without_the_package_it_is_said(

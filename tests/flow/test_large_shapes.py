@@ -34,7 +34,8 @@ def test_a_long_path(fresh_database: Path, tmp_path: Path) -> None:
     limit(con, "450MB")
     given = {"max_depth": LENGTH}
     (path,) = run_query(con, load_query("e2e-latency"), given).to_arrow().to_pylist()
-    parts = run_query(con, load_query("critical-path"), given).to_arrow().to_pylist()
+    full = given | {"detail": "full"}
+    parts = run_query(con, load_query("critical-path"), full).to_arrow().to_pylist()
     con.close()
     assert (path["roots"], path["reached"], path["is_cut"]) == (2, 2, False)
     # From the start of the first callback to the end of the last.
@@ -68,8 +69,17 @@ def test_a_burst(empty_database: Path, tmp_path: Path) -> None:
     analysis = Analysis(empty_database, tmp_path)
     con = analysis.build(system).connection
     limit(con, "450MB")
-    parts = run_query(con, load_query("critical-path"), {}).to_arrow().to_pylist()
+    full = {"detail": "full"}
+    parts = run_query(con, load_query("critical-path"), full).to_arrow().to_pylist()
+    (pair,) = run_query(con, load_query("interference"), {}).to_arrow().to_pylist()
+    waits = run_query(con, load_query("waits"), {}).to_arrow().to_pylist()
+    by_callback = run_query(con, load_query("executor-wait"), {}).to_arrow().to_pylist()
     analysis.close()
+    assert (pair["waits"], pair["instances"]) == (MESSAGES - 1, MESSAGES * (MESSAGES - 1) // 2)
+    assert pair["overlap_max_ns"] == sum(wait["busy_max_ns"] or 0 for wait in waits)
+    (hearer,) = (row for row in by_callback if row["node"] == "/hearer")
+    assert hearer["meanwhile"] == "Subscription(/a) 100 %"
+    assert hearer["busy_total_max_ns"] == pair["overlap_max_ns"]
     assert sum(part["duration_ns"] for part in parts) == parts[0]["latency_ns"]
     busy = [part["callback_instance_id"] for part in parts if part["activity"] == "executor_busy"]
     # The last message waited for the callbacks of all others.

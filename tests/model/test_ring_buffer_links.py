@@ -229,3 +229,22 @@ def test_the_copy_by_the_middleware_is_no_delivery(intra: Intra, analyse: Analys
         "SELECT count(*) FROM stat_delivery WHERE status <> 'delivered' AND publication_id IN "
         "(SELECT publication_id FROM link_transport WHERE is_copy)"
     ) == 1  # fmt: skip
+
+
+@pytest.mark.parametrize("is_reader", [True, False])
+def test_a_copy_for_a_reader_that_never_gets_its_turn(
+    intra: Intra, analyse: Analyse, *, is_reader: bool
+) -> None:
+    """Its second callback, for the buffer, shows that it reads one; nothing was taken from it."""
+    system = intra.system
+    if is_reader:
+        system.add("ros2:rclcpp_subscription_init", LISTENER, subscription_handle=0x20,
+                   subscription=0x3020)  # fmt: skip
+        system.subscription_callback(LISTENER, 0x3020, 0xCC)
+    intra.publish(0)
+    system.publish(TALKER, 0x10, 1)
+    system.take(LISTENER, 0x20, 1)
+    model = analyse(system)
+    assert model.rows("SELECT method, is_copy FROM link_transport") == [("exact", is_reader)]
+    delivered = "SELECT count(*) FROM stat_delivery WHERE status = 'delivered'"
+    assert model.value(delivered) == (0 if is_reader else 1)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import load_queries, load_query, nearest, query_names
+from msgflow.query.catalogue import _WORDS, load_queries, load_query, nearest, query_names
 
 
 def test_the_catalogue_is_the_folder() -> None:
@@ -30,3 +30,25 @@ def test_nearest_finds_slips_and_parts() -> None:
     assert nearest("e2e-latncy", known) == ["e2e-latency"]
     assert nearest("duration", known)[0] == "callback-duration"
     assert nearest("", known) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("jitter", "msgflow query timers or msgflow query publication-rate"),
+        ("drops", "msgflow query delivery"),
+        ("Blocking", "msgflow query interference"),
+        ("topics", "msgflow query info-topics"),
+        ("loss", "msgflow query delivery or msgflow query data-quality"),
+        ("executor_wait", "it is a view: msgflow sql 'FROM executor_wait'"),
+        ("../x/../node.", "msgflow query --list"),
+    ],
+)
+def test_words_for_what_a_query_answers(name: str, hint: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        load_query(name)
+    assert raised.value.hint == hint
+
+
+def test_every_word_leads_to_a_query() -> None:
+    assert {query for queries in _WORDS.values() for query in queries} <= set(query_names())

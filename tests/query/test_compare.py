@@ -202,6 +202,11 @@ def test_too_few_resamples_have_no_interval(fresh_database: Path) -> None:
             _rows(database, "after", resamples=1_000, confidence=0.99)
         (row, *_) = _rows(database, "after", confidence=0.99)
         assert row["verdict"] == "B is longer"
+        with pytest.raises(UsageError, match="so few resamples — -1"):
+            _rows(database, "after", resamples=-1)
+        (none, *_) = _rows(database, "after", resamples=0)
+        assert (none["verdict"], none["low_ns"]) == ("too few resamples", None)
+        assert (none["a_ns"], none["b_ns"]) == (row["a_ns"], row["b_ns"])
         text = "SELECT verdict, low_ns, high_ns FROM comparison('callbacks', 1, 2, resamples := 1)"
         assert database.sql(text).to_arrow().to_pylist()[0] == {
             "verdict": "too few resamples",
@@ -382,13 +387,13 @@ def test_runs_without_anything_in_common_are_refused(fresh_database: Path) -> No
             database.compare("before", "after")
         with pytest.raises(UsageError, match="there is no such run — never"):
             database.compare("before", "never")
-        with pytest.raises(UsageError, match="one run is compared with another"):
+        with pytest.raises(UsageError, match="each side of a comparison is of one run"):
             database.compare("before", "all")
         with pytest.raises(UsageError, match="no such choice — nodes"):
             database.compare("before", "after", what="nodes")
         with pytest.raises(UsageError, match="only paths start and end"):
             database.compare("before", "after", what="topics", from_="/a")
-        with pytest.raises(UsageError, match="no such topic"):
+        with pytest.raises(UsageError, match="no such topic or node"):
             database.compare("before", "after", from_="/a")
         with pytest.raises(UsageError, match="confidence"):
             database.compare("before", "after", confidence=95)

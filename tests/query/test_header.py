@@ -30,6 +30,8 @@ FULL = """\
 --     When
 -- needs: main.a,
 --     main.b
+-- brief: start_ns,
+--     median_ns
 -- severity: warning
 SELECT 1
 -- a comment of the body
@@ -64,6 +66,7 @@ def test_everything_is_parsed() -> None:
     )
     assert header.needs == ("main.a", "main.b")
     assert header.severity == "warning"
+    assert header.brief == ("start_ns", "median_ns")
     assert header.body == "SELECT 1\n-- a comment of the body\n"
 
 
@@ -121,6 +124,10 @@ def test_a_bad_line_is_named(line: str, message: str) -> None:
         ("-- description: x\nSELECT 1\n", "the header has no 'name'"),
         ("-- name: x\nSELECT 1\n", "the header has no 'description'"),
         ("-- name: x\n-- description: x\n\n", "there is no SQL below the header"),
+        (
+            "-- name: x\n-- description: x\n-- brief: a\nSELECT 1\n",
+            "brief names a column that there is not: 'a'",
+        ),
     ],
 )
 def test_an_incomplete_file_is_refused(text: str, message: str) -> None:

@@ -8,6 +8,7 @@ import pytest
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.header import Header, parse
 from msgflow.query.run import bind, run_query
+from msgflow.query.selection import make_selection
 from msgflow.query.value import Value
 
 PARAMS = """\
@@ -22,6 +23,9 @@ QUERY = """\
 -- name: example
 -- description: x
 -- param: channel VARCHAR = NULL  Only this one
+-- column: topic VARCHAR [topic]  Topic
+-- column: start_ns BIGINT [epoch ns]  When
+-- column: is_internal BOOLEAN  Hidden
 SELECT topic, start_ns, is_internal
 FROM message
 WHERE list_contains($runs, run_id)
@@ -36,6 +40,8 @@ def connection() -> duckdb.DuckDBPyConnection:
     con = duckdb.connect()
     con.execute("CREATE TABLE run AS SELECT 1 AS run_id, 'first' AS name, 100::BIGINT AS start_ns")
     con.execute("INSERT INTO run VALUES (2, 'second', 1000000000)")
+    con.execute("ALTER TABLE run ADD COLUMN end_ns BIGINT")
+    con.execute("UPDATE run SET end_ns = start_ns + 2000000000")
     con.execute(
         "CREATE TABLE message AS SELECT * FROM (VALUES "
         "(1, '/a', 100::BIGINT, false), (1, '/b', 200, false), (1, '/rosout', 300, true), "
@@ -87,6 +93,35 @@ def test_a_database_without_runs_gives_nothing_and_says_so(
     assert result.notes == ["the database holds no run yet"]
 
 
+@pytest.mark.parametrize(
+    ("run", "start", "end", "note"),
+    [
+        (
+            "second",
+            "3",
+            None,
+            "the run has nothing in this time window: it lasts 2.000 s, from 1970",
+        ),
+        ("second", None, 1_000_000_000, "the run has nothing in this time window"),
+        ("all", 3_000_000_001, None, "none of the runs has anything in this time window"),
+        ("second", 3_000_000_000, None, None),
+        ("second", None, 1_000_000_001, None),
+        ("all", 2_500_000_000, None, None),
+    ],
+)
+def test_a_window_without_data_is_said(
+    connection: duckdb.DuckDBPyConnection,
+    run: str,
+    start: str | int | None,
+    end: int | None,
+    note: str | None,
+) -> None:
+    result = run_query(connection, header(QUERY), {}, run=run, start=start, end=end, internal=True)
+    assert [said.startswith(note or "") for said in result.notes] == (
+        [] if note is None else [True]
+    )
+
+
 def test_a_query_without_a_window_refuses_one(connection: duckdb.DuckDBPyConnection) -> None:
     plain = header("-- name: example\n-- description: x\nSELECT 1 AS one\n")
     with pytest.raises(UsageError, match="no time window — example"):
@@ -100,6 +135,12 @@ def test_a_query_that_fails_is_named(connection: duckdb.DuckDBPyConnection) -> N
         run_query(connection, failing, {})
 
 
+NAMED = """\
+-- name: example
+-- description: x
+-- column: what VARCHAR [{kind}]  What
+SELECT '/a' AS what, $runs AS runs
+"""
 TOPICS = """\
 -- name: example
 -- description: x
@@ -119,6 +160,14 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
         "(1, NULL)"
     )
     connection.execute("INSERT INTO subscription VALUES (1, '/scan'), (1, '/camera')")
+    connection.execute("CREATE TABLE node AS SELECT 1 AS run_id, '/driver' AS full_name")
+    connection.execute("CREATE TABLE process AS SELECT 1 AS run_id, 'main' AS name, 812 AS pid")
+    connection.execute("CREATE TABLE service AS SELECT 1 AS run_id, '/reset' AS service_name")
+    connection.execute(
+        "CREATE TABLE callback_label AS"
+        " SELECT 1 AS run_id, '[main 812]' AS node, 'Timer(10 ms)' AS label"
+    )
+    connection.execute("CREATE TABLE host AS SELECT 1 AS run_id, 'robot' AS hostname")
     return connection
 
 
@@ -126,6 +175,8 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
     ("run", "given"),
     [
         ("first", {"from": "/camera", "to": "/scan"}),
+        ("first", {"from": "/cam*, /driver", "to": "[main 812]"}),
+        ("first", {"from": None, "to": "/reset"}),
         ("first", {"from": None}),
         ("all", {"from": "/lidar", "to": "/scan"}),
     ],
@@ -141,9 +192,14 @@ def test_topics_of_the_chosen_runs_will_do(
     ("run", "given", "message", "hint"),
     [
         ("first", {"from": "/camra"}, "in the run — /camra", "did you mean /camera"),
-        ("first", {"to": "xyz"}, "in the run — xyz", "the topics are /a, /b, /camera and 1 more"),
-        ("second", {"from": "/scan"}, "in the run — /scan", "the topics are /lidar"),
-        ("all", {"from_": "/none!"}, "in these runs — /none!", "the topics are"),
+        (
+            "first",
+            {"to": "/scan,xyz"},
+            "in the run — xyz",
+            "the topics and nodes are /a, /b, /camera and 3 more (msgflow query graph)",
+        ),
+        ("second", {"from": "/scan"}, "in the run — /scan", "the topics and nodes are /lidar"),
+        ("all", {"from_": "/none!"}, "in these runs — /none!", "the topics and nodes are"),
     ],
 )
 def test_topics_that_no_run_has_are_refused(
@@ -155,7 +211,7 @@ def test_topics_that_no_run_has_are_refused(
 ) -> None:
     with pytest.raises(UsageError) as raised:
         run_query(with_topics, header(TOPICS), given, run=run)
-    assert raised.value.message == f"there is no such topic {message}"
+    assert raised.value.message == f"there is no such topic or node {message}"
     assert hint in (raised.value.hint or "")
 
 
@@ -164,33 +220,56 @@ def test_takes_that_no_run_has_are_refused(connection: duckdb.DuckDBPyConnection
     connection.execute("CREATE TABLE take (take_id BIGINT, run_id BIGINT)")
     connection.execute("INSERT INTO take VALUES (7, 1), (8, 2)")
     query = header(
-        "-- name: example\n-- description: x\n-- param: take_id BIGINT = NULL  Take\n"
-        "SELECT $take_id AS id, $runs AS runs\n"
+        "-- name: example\n-- description: x\n-- param: flow BIGINT = NULL  Take\n"
+        "SELECT $flow AS id, $runs AS runs\n"
     )
     for run, given in (("first", 7), ("all", 8), ("first", None)):
-        (row,) = run_query(connection, query, {"take_id": given}, run=run).to_arrow().to_pylist()
+        (row,) = run_query(connection, query, {"flow": given}, run=run).to_arrow().to_pylist()
         assert row["id"] == given
     for run, number, where in (("first", 8, "the run"), ("all", 9, "these runs")):
         with pytest.raises(UsageError) as raised:
-            run_query(connection, query, {"take_id": number}, run=run)
+            run_query(connection, query, {"flow": number}, run=run)
         assert raised.value.message == f"there is no such take in {where} — {number}"
         assert "msgflow query flows" in (raised.value.hint or "")
 
 
-def test_the_parameter_topic_is_one(with_topics: duckdb.DuckDBPyConnection) -> None:
-    only = header(
-        "-- name: example\n-- description: x\n-- param: topic VARCHAR = NULL  x\nSELECT $topic\n"
-    )
-    assert len(run_query(with_topics, only, {"topic": "/lidar"})) == 1
-    with pytest.raises(UsageError, match="no such topic in the run — /nope"):
-        run_query(with_topics, only, {"topic": "/nope"})
+@pytest.mark.parametrize(
+    ("kind", "name", "message"),
+    [
+        ("topic", "/driver", "there is no such topic in the run — /driver"),
+        ("node", "/x*", "no node in the run fits — /x*"),
+        ("host", "robo", "there is no such host in the run — robo"),
+        ("callback", "Timer(9 ms)", "there is no such callback in the run — Timer(9 ms)"),
+    ],
+)
+def test_names_that_no_run_has_are_refused(
+    with_topics: duckdb.DuckDBPyConnection, kind: str, name: str, message: str
+) -> None:
+    with pytest.raises(UsageError) as raised:
+        run_query(
+            with_topics,
+            header(NAMED.format(kind=kind)),
+            {},
+            run="first",
+            selection=make_selection({kind: name}),
+        )
+    assert raised.value.message == message
+
+
+def test_a_pattern_may_be_a_name_with_brackets(
+    with_topics: duckdb.DuckDBPyConnection,
+) -> None:
+    """Of a process whose node is not known: as a pattern it would be one of these characters."""
+    query = header(NAMED.format(kind="node").replace("'/a'", "'[main 812]'"))
+    selection = make_selection({"node": "[main 812]"})
+    assert len(run_query(with_topics, query, {}, run="first", selection=selection)) == 1
 
 
 def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -> None:
     with_topics.execute("DELETE FROM publisher")
     with pytest.raises(UsageError) as raised:
         run_query(with_topics, header(TOPICS), {"to": "/lidar"})
-    assert raised.value.hint == "msgflow query info-topics"
+    assert raised.value.hint == "msgflow query graph"
     with_topics.execute("DELETE FROM run")
     assert len(run_query(with_topics, header(TOPICS), {"to": "/lidar"})) == 1
 

@@ -59,6 +59,10 @@ def test_a_name_of_several_runs_is_refused_with_their_ids() -> None:
     [
         ("2.5s", START + 2_500_000_000),
         ("+2.5", START + 2_500_000_000),
+        ("2.5", START + 2_500_000_000),
+        ("2", START + 2_000_000_000),
+        (2, 2),
+        (str(10**15), 10**15),
         ("+3", START + 3_000_000_000),
         ("100ms", START + 100_000_000),
         ("250us", START + 250_000),
@@ -67,7 +71,7 @@ def test_a_name_of_several_runs_is_refused_with_their_ids() -> None:
         ("0.000000001s", START + 1),
         (str(START + 5), START + 5),
         (START + 5, START + 5),
-        ("0", 0),
+        ("0", START),
         ("2023-11-14T22:13:20Z", START),
         ("2023-11-14 22:13:20", START),
         ("2023-11-14T23:13:20.123456789+01:00", START + 123_456_789),
@@ -78,6 +82,13 @@ def test_points_in_time(text: str | int, time_ns: int) -> None:
     assert time_window((FIRST,), end=text) == (MINIMUM_NS, time_ns)
 
 
+def test_numbers_too_small_to_be_times_are_seconds() -> None:
+    with pytest.raises(UsageError, match="out of range"):
+        time_window((FIRST,), start=str(10**15 - 1))
+    with pytest.raises(UsageError, match="but 3 are chosen"):
+        time_window(RUNS, start="2")
+
+
 def test_the_window_is_open_when_nothing_is_said() -> None:
     assert time_window(RUNS) == (MINIMUM_NS, MAXIMUM_NS)
 
@@ -86,7 +97,7 @@ def test_skipping_the_warm_up() -> None:
     assert time_window((FIRST,), skip_first=1.5) == (START + 1_500_000_000, MAXIMUM_NS)
 
 
-@pytest.mark.parametrize("text", ["soon", "2.5", "3 s", "-1s", "2023-13-01"])
+@pytest.mark.parametrize("text", ["soon", "2,5", "3 s", "-1s", "2023-13-01"])
 def test_what_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="cannot read the time of --start"):
         time_window((FIRST,), start=text)

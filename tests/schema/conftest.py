@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-
-from msgflow.db import objects
+from rules import derived
 
 RULES = (
     "clock_limit",
@@ -52,20 +51,12 @@ CREATE MACRO derive.clock_bound(of_run) AS TABLE FROM bound;
 @pytest.fixture
 def clocks() -> Iterator[duckdb.DuckDBPyConnection]:
     """How two clocks are compared, without a message between them."""
-    with duckdb.connect() as con:
-        con.execute(CLOCK_STAGE)
-        for header in objects.views():
-            if header.name.removeprefix("derive.") in CLOCKS:
-                con.execute(header.body)
+    with derived(CLOCK_STAGE, CLOCKS) as con:
         yield con
 
 
 @pytest.fixture
 def rules() -> Iterator[duckdb.DuckDBPyConnection]:
     """The macros alone, with nothing published or taken."""
-    with duckdb.connect() as con:
-        con.execute(STAGE)
-        for header in objects.views():
-            if header.name.removeprefix("derive.") in RULES:
-                con.execute(header.body)
+    with derived(STAGE, RULES) as con:
         yield con

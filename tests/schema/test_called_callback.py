@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-
-from msgflow.db import objects
+from rules import modelled
 
 STAGE = """
 CREATE SCHEMA staging;
@@ -26,10 +25,7 @@ CREATE TABLE staging.callback_known AS SELECT 2 AS event_id, 1 AS service_event_
 @pytest.fixture
 def staged() -> Iterator[duckdb.DuckDBPyConnection]:
     """One request, and directly behind it the run of a callback of its service."""
-    (rule,) = (each for each in objects.load("model") if each.name == "staging.request_callback")
-    with duckdb.connect() as con:
-        con.execute(STAGE)
-        con.execute(f"CREATE VIEW called AS {rule.body}")
+    with modelled(STAGE, "request_callback", "called") as con:
         yield con
 
 

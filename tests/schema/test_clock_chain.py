@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import duckdb
 import pytest
-
-from msgflow.db import objects
+from rules import derived
 
 RULES = ("clock_drift_limit", "corrected_ns", "recorded_ns", "clock_sync")
 SECOND = 10**9
@@ -29,11 +28,7 @@ Bounds = Sequence[tuple[int, int]]
 @pytest.fixture
 def chain() -> Iterator[duckdb.DuckDBPyConnection]:
     """Three clocks, nothing of which is known."""
-    with duckdb.connect() as con:
-        con.execute(STAGE)
-        for header in objects.views():
-            if header.name.removeprefix("derive.") in RULES:
-                con.execute(header.body)
+    with derived(STAGE, RULES) as con:
         yield con
 
 

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-
-from msgflow.db import objects
+from rules import derived
 
 MS = 1_000_000
 # What the rules look at, without the views and the store that it is told from.
@@ -92,11 +91,7 @@ class Delivery:
 
 @pytest.fixture
 def delivery() -> Iterator[Delivery]:
-    with duckdb.connect() as con:
-        con.execute(STAGE)
-        for header in objects.views():
-            if header.name.removeprefix("derive.") in RULES:
-                con.execute(header.body)
+    with derived(STAGE, RULES) as con:
         yield Delivery(con)
 
 
@@ -315,6 +310,28 @@ def test_an_attempt_failed_before_a_later_message_was_taken(
     assert delivery.reason(missing) == reason
 
 
+def test_a_take_without_a_message_leaves_open_what_failed(delivery: Delivery) -> None:
+    """Either may have been the attempt that took it."""
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(310 * MS, 320 * MS)
+    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [305 * MS])
+    taken = 315 * MS
+    delivery.con.execute(
+        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (99, ?, NULL)",
+        [taken],
+    )
+    # One with a stamp cannot be of a message with one.
+    delivery.con.execute(
+        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (98, ?, 7)",
+        [305 * MS],
+    )
+    with_stamp = "UPDATE derive.expected_arrival SET source_timestamp_ns = 5"
+    delivery.con.execute(with_stamp)
+    assert delivery.reason(missing) == "unknown"
+
+
 @pytest.mark.parametrize(
     ("taken", "reason"),
     [
@@ -370,3 +387,117 @@ def test_a_later_message_of_another_publisher_was_taken(
     missing = delivery.publish(300 * MS)
     delivery.publish(300 * MS + last, 310 * MS, publisher=2)
     assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("later", "start", "reason"),
+    [
+        pytest.param(0, 320 * MS + 1, "receiver_gap", id="at_the_same_time"),
+        pytest.param(1, 320 * MS + 1, "lost_in_transport", id="later"),
+        pytest.param(1, 320 * MS, "receiver_gap", id="later_but_taken_within_the_gap"),
+    ],
+)
+def test_a_later_message_of_the_publisher_shows_how_long_a_gap_matters(
+    delivery: Delivery, later: int, start: int, reason: str
+) -> None:
+    """Its messages arrive in order: until the later one was taken. Another one was taken, too."""
+    delivery.lives(last_seen_ns=400 * MS)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(300 * MS + later, 320 * MS)
+    delivery.publish(301 * MS, 321 * MS, publisher=2)
+    delivery.misses(start, 900 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("arrival", "taken", "reason"),
+    [
+        pytest.param(-1, 0, "overwritten", id="taken_when_the_wait_ends"),
+        pytest.param(-1, -1, "not_delivered", id="taken_within_the_wait"),
+        pytest.param(0, 1, "not_delivered", id="arrives_when_the_wait_ends"),
+    ],
+)
+def test_a_reader_without_cpu_has_the_next_message_during_its_wait(
+    delivery: Delivery, arrival: int, taken: int, reason: str
+) -> None:
+    """It takes that behind the wait."""
+    delivery.lives(queue_depth=1)
+    usually(delivery, 300_000)
+    missing = [delivery.publish(300 * MS + at) for at in range(2)]
+    end = 310 * MS
+    delivery.waits(280 * MS, end)
+    delivery.publish(end + arrival, end + taken)
+    delivery.publish(end + MS)
+    assert delivery.reason(missing[0]) == reason
+
+
+@pytest.mark.parametrize(
+    ("seen", "first", "second"),
+    [
+        pytest.param(0, "pending_at_end", "pending_at_end", id="seen_when_it_arrived"),
+        pytest.param(-1, "subscription_ended", "subscription_ended", id="seen_before"),
+    ],
+)
+def test_others_go_on_after_the_first_message_that_a_reader_did_not_see(
+    delivery: Delivery, seen: int, first: str, second: str
+) -> None:
+    """10 ms after the second, and more after the first of two."""
+    delivery.lives(last_seen_ns=300 * MS + seen, host_end_ns=310 * MS + 1)
+    delivery.publish(0, 300_000)
+    one = delivery.publish(300 * MS)
+    other = delivery.publish(300 * MS + 1)
+    assert (delivery.reason(one), delivery.reason(other)) == (first, second)
+
+
+def test_who_was_seen_when_a_message_arrived_has_not_ended_before(delivery: Delivery) -> None:
+    """Only before the next one."""
+    delivery.lives(last_seen_ns=300 * MS, host_end_ns=400 * MS)
+    delivery.publish(0, 300_000)
+    one = delivery.publish(300 * MS)
+    other = delivery.publish(301 * MS)
+    assert delivery.reason(one) == "pending_at_end"
+    assert delivery.reason(other) == "subscription_ended"
+
+
+@pytest.mark.parametrize(
+    ("start", "reason"), [(300 * MS, "unknown"), (300 * MS + 1, "before_discovery")]
+)
+def test_a_gap_that_begins_when_a_message_arrives(
+    delivery: Delivery, start: int, reason: str
+) -> None:
+    """The next message was taken before publish() returned, and before this one's did."""
+    delivery.lives()
+    missing = delivery.publish(300 * MS)
+    delivery.publish(301 * MS, 290 * MS)
+    delivery.misses(start, 305 * MS)
+    assert delivery.reason(missing) == reason
+
+
+@pytest.mark.parametrize(
+    ("depth", "newer", "reason"),
+    [
+        (2, 1, "pending_at_end"),
+        (2, 2, "unknown"),
+        (None, 0, "pending_at_end"),
+        (None, 1, "unknown"),
+    ],
+)
+def test_messages_stay_in_a_queue_that_nobody_reads(
+    delivery: Delivery, depth: int | None, newer: int, reason: str
+) -> None:
+    """As many as it holds; the last one in any case. It was never seen to get any."""
+    delivery.lives(queue_depth=depth, last_seen_ns=400 * MS, host_end_ns=400 * MS)
+    missing = delivery.publish(300 * MS)
+    for at in range(newer):
+        delivery.publish(301 * MS + at)
+    assert delivery.reason(missing) == reason
+
+
+def test_what_was_lost_is_not_told_without_a_depth(delivery: Delivery) -> None:
+    """The queue may have held one message."""
+    delivery.lives(queue_depth=None)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(301 * MS, 302 * MS)
+    assert delivery.reason(missing) == "unknown"

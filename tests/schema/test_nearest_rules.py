@@ -117,6 +117,23 @@ def test_or_for_twice_what_is_usual_for_it(
     assert nearest(rules).get(time + delay) == ((999, 1) if is_found else None)
 
 
+@pytest.mark.parametrize(("delay", "is_found"), [(396_000, True), (396_001, False)])
+def test_or_for_twice_what_is_usual_on_its_host(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
+) -> None:
+    """Its own thread was never seen to go on; those of another topic's publisher were."""
+    clock(rules, (0, 100, 0))
+    time = 0
+    for identity, usual in enumerate(range(1, 201)):
+        publish(rules, identity, time, time + MILLISECOND, topic="/b")
+        take(rules, time + usual * MICROSECOND, topic="/b")
+        time += PERIOD
+    publish(rules, 999, time, None)
+    take(rules, time + delay)
+    found = nearest(rules)
+    assert found.get(time + delay, (None, 0))[0] == (999 if is_found else None)
+
+
 @pytest.mark.parametrize(
     ("median", "width", "delay", "is_found"),
     [

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-
-from msgflow.db import objects
+from rules import modelled
 
 # Thread 1 serves a message, waits, and runs what would be a timer; then it serves another message.
 STAGE = """
@@ -39,10 +38,7 @@ SERVED = "UPDATE staging.callback_run SET"
 
 @pytest.fixture
 def staged() -> Iterator[duckdb.DuckDBPyConnection]:
-    (rule,) = (each for each in objects.load("model") if each.name == "staging.untraced_take")
-    with duckdb.connect() as con:
-        con.execute(STAGE)
-        con.execute(f"CREATE VIEW found AS {rule.body}")
+    with modelled(STAGE, "untraced_take", "found") as con:
         yield con
 
 

@@ -1,4 +1,4 @@
-"""Every query, and every public view that does more than to show a table, has a golden case."""
+"""Queries, public views that do more than to show a table, and page queries have golden cases."""
 
 from __future__ import annotations
 
@@ -7,10 +7,18 @@ from pathlib import Path
 import pytest
 from sql_files import SqlFile, sql_files
 
+from msgflow.view.page_query import DIRECTORY, page_query
+
 TESTS = Path(__file__).resolve().parents[1]
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
 PUBLIC = [file for file in FILES if file.layer == "public"]
+# Those of kind 'inline' are parts of others.
+PAGE_QUERIES = sorted(
+    f"view.{path.stem}"
+    for path in DIRECTORY.glob("*.sql")
+    if page_query(path.stem).kind != "inline"
+)
 # What a view needs to show one table with its times corrected: the clock, and the way to it.
 CORRECTION = {
     "derive.corrected_ns",
@@ -43,8 +51,13 @@ def test_every_public_view_with_logic_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 
+@pytest.mark.parametrize("name", PAGE_QUERIES)
+def test_every_page_query_has_a_case(name: str) -> None:
+    assert cases(TESTS / "view" / "cases" / name)
+
+
 def test_every_case_belongs_to_something_that_exists() -> None:
-    names = {file.header.name for file in FILES}
+    names = {file.header.name for file in FILES} | set(PAGE_QUERIES)
     for folder in TESTS.glob("*/cases/*"):
         assert folder.name in names, folder
 

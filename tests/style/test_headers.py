@@ -11,7 +11,8 @@ import pytest
 from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.query_command import COMMON_OPTIONS
-from msgflow.query.run import INTERNAL_COLUMN, RESERVED
+from msgflow.query.run import RESERVED
+from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
@@ -124,6 +125,15 @@ def test_a_query_is_ordered_and_hides_only_truth_values(
     assert "ORDER_MODIFIER" in modifiers
     types = dict(declared(file))
     assert types.get(INTERNAL_COLUMN, "BOOLEAN") == "BOOLEAN"
+
+
+@pytest.mark.parametrize("file", QUERIES, ids=str)
+def test_columns_say_what_they_name(file: SqlFile) -> None:
+    """So that the query has the options that choose rows by it."""
+    kinds = {"topic_name": "topic", "hostname": "host"} | {kind: kind for kind in (*KINDS, PATH)}
+    for column in file.header.columns:
+        if column.name in kinds:
+            assert column.unit == kinds[column.name], column.name
 
 
 @pytest.mark.parametrize("file", QUERIES, ids=str)

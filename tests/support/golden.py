@@ -8,13 +8,15 @@
         derive               if this file is there, links are derived before
         params.json          parameters of the query, and run, start, end, skip_first, internal;
                              or arguments of the macro
+        scratch/<table>.csv  of page queries over what pages compute once per run: its rows
         expected.csv         the output in order; create it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
-A query is run as `Database.query` runs it; a view (its full name, such as `main.node`) is read
-whole, a table macro called with its arguments, both sorted by all columns. An empty field is NULL,
-"" is an empty text. Lines of input that begin with # are comments. Tables of BASE for which
-there is no file have one row, of key 1.
+A query is run as `Database.query` runs it; a page query (view.<name>) of run 1, with times from 0
+and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
+`main.node`) is read whole, a table macro called with its arguments, both sorted by all columns. An
+empty field is NULL, "" is an empty text. Lines of input that begin with # are comments. Tables of
+BASE for which there is no file have one row, of key 1.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pyarrow as pa
@@ -36,6 +39,8 @@ from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.run import run_query
+from msgflow.view.page_query import run_page_query
+from msgflow.view.pages import Scratch
 
 Rows = list[list[str | None]]
 
@@ -50,6 +55,8 @@ BASE: dict[str, dict[str, str]] = {
 SYSTEMS = Path(__file__).parent / "systems"
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SELECTION = ("run", "start", "end", "skip_first", "internal")
+_PAGE_QUERY = "view."
+_FRAME = {"run": 1, "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _TEMPLATE = pytest.StashKey[Path]()
 
 
@@ -214,6 +221,8 @@ def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:
     parameters = folder / "params.json"
     given = json.loads(parameters.read_text()) if parameters.exists() else {}
     name = folder.parent.name
+    if name.startswith(_PAGE_QUERY):
+        return QueryResult(_page_rows(connection, folder, name.removeprefix(_PAGE_QUERY), given))
     if "." in name:
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
         source = f"{name}({arguments})" if parameters.exists() else name
@@ -221,3 +230,24 @@ def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:
         return QueryResult(relation.to_arrow_table())
     selection = {key: given.pop(key) for key in _SELECTION if key in given}
     return run_query(connection, load_query(name), given, **selection)
+
+
+def _page_rows(
+    connection: duckdb.DuckDBPyConnection, folder: Path, name: str, given: dict[str, Any]
+) -> pa.Table:
+    values = _FRAME | given
+    (recorded,) = run_page_query(connection, "recorded_window", values).to_pylist()
+    values = recorded | values
+    files = sorted((folder / "scratch").glob("*.csv"))
+    if not files:
+        return run_page_query(connection, name, values)
+    scratch = Scratch()
+    for path in files:
+        names, *rows = parse_csv(path.read_text())
+        columns = [list(column) for column in zip(*rows, strict=True)]
+        table = pa.table(columns, names=[str(name) for name in names])
+        scratch.fill(path.stem, _FRAME["run"], lambda table=table: table)
+    try:
+        return scratch.ask(name, values)
+    finally:
+        scratch.close()

@@ -13,6 +13,8 @@ import duckdb
 
 from msgflow.view.server import running
 
+_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1, "ns"))
+
 
 class Served:
     """A server in a thread of this process."""
@@ -108,3 +110,14 @@ def colors(page: Page) -> int:
         }"""
     )
     return found
+
+
+def shown(ns: int | None) -> str:
+    """Return a duration as pages write it."""
+    if ns is None:
+        return ""
+    if ns == 0:
+        return "0"
+    scale, unit = next((scale, unit) for scale, unit in _UNITS if abs(ns) >= scale)
+    text = f"{ns / scale:,.3f}".rstrip("0").rstrip(".") if scale > 1 else str(ns)
+    return f"{text} {unit}"

@@ -61,6 +61,26 @@ def test_lost_events_are_not_asked_for(simulation, database):
     assert scores["transport"].labels.startswith("exact")
 
 
+@pytest.mark.parametrize("share", [0, 0.3])
+@pytest.mark.parametrize("layout", ["foxy", "galactic"])
+def test_takes_without_an_event_are_no_loss(tmp_path, layout, share):
+    """Before Humble nothing but the callback shows a take, and nothing whose message it was."""
+    recording = Recording(lost_event_share=share)
+    simulation = simulate(
+        "two_hosts", tmp_path / "trace", layout=layout, factor=0.1, recording=recording
+    )
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    scores, drops = compare_simulated(path, simulation.truth)
+    (excused,) = (score for score in scores if score.kind == "excused")
+    assert excused.wrong == 0
+    assert share or excused.found == 0
+    assert [drop for drop in drops if not drop.undecided and not drop.is_right] == []
+    reasons = {drop.reason: drop.messages for drop in drops if drop.truth == "no event"}
+    assert reasons.keys() == {"no_stamp"}
+    assert reasons["no_stamp"] > 100
+
+
 def test_a_link_that_is_gone_is_missing(simulation, database):
     before = _scores(simulation, database)
     _change(

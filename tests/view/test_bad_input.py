@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -26,32 +28,39 @@ def visit(page: Page, address: str, run: int | None = None) -> None:
         asked = "run=3&other=2&what=callbacks" if name == "compare" else f"run={run}"
         page.go(f"#/{name}?{'' if run is None else asked}")
         page.page.wait_for_timeout(100)
-        assert page.page.locator("main .failed").count() == 0, name
+        assert page.page.locator("main .failed").all_inner_texts() == [], name
         assert page.page.evaluate("typeof hacked") == "undefined"
         for made in ("img", "script", "iframe", "a[href^=http]", "a[href^=javascript]"):
             assert page.page.locator(f"main {made}").count() == 0
 
 
+@contextmanager
+def shown_as(way: str, path: Path, page: Page, **options: Any) -> Iterator[str]:
+    """Give the address of a database that is served, or of a report of it."""
+    if way == "file":
+        target = path.with_suffix(".html")
+        with open_db(path) as opened:
+            opened.report(target, **options)
+        yield target.as_uri()
+        return
+    server = Served(path)
+    try:
+        yield server.address
+    finally:
+        page.page.goto("about:blank")
+        server.close()
+
+
 @pytest.mark.parametrize("way", ["served", "file"])
 def test_names_are_only_ever_text(way: str, systems: Path, tmp_path: Path, page: Page) -> None:
     path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
-    if way == "file":
-        target = tmp_path / "report.html"
-        with open_db(path) as opened:
-            opened.report(target, run=1)
-        visit(page, target.as_uri())
-        ((number,),) = _first_publication(path)
-        page.go(f"#/timeline?flow=publication:{number}")
+    ((number,),) = _first_publication(path)
+    with shown_as(way, path, page, **({"run": 1} if way == "file" else {})) as address:
+        visit(page, address, None if way == "file" else 1)
+        page.go(f"#/timeline?run=1&flow=publication:{number}")
         assert page.flow()
         page.page.locator("canvas.timeline").hover(position={"x": 400, "y": 120})
         assert page.page.evaluate("typeof hacked") == "undefined"
-    else:
-        server = Served(path)
-        try:
-            visit(page, server.address, 1)
-        finally:
-            page.page.goto("about:blank")
-            server.close()
 
 
 def _first_publication(path: Path) -> list[tuple[int]]:
@@ -82,14 +91,13 @@ def test_names_in_the_address_are_only_ever_text(
     page.page.wait_for_url("**#/overview*")
 
 
-def test_long_names(demo: Path, tmp_path: Path, page: Page) -> None:
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_long_names(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
     path = renamed(demo, tmp_path / "long.duckdb", ("/" + 10_000 * "x",))
-    target = tmp_path / "report.html"
-    with open_db(path) as opened:
-        opened.report(target)
-    visit(page, target.as_uri())
-    wide = page.page.evaluate("document.documentElement.scrollWidth")
-    assert wide <= 1280
+    with shown_as(way, path, page) as address:
+        visit(page, address)
+        wide = page.page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= 1280
 
 
 def test_a_database_without_a_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
@@ -106,7 +114,8 @@ def test_a_database_without_a_run(empty_database: Path, tmp_path: Path, page: Pa
         server.close()
 
 
-def test_an_empty_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_an_empty_run(way: str, empty_database: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "empty.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
@@ -114,32 +123,33 @@ def test_an_empty_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
             "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash)"
             " VALUES (1, 'nothing', now()::TIMESTAMP, '0', '')"
         )
-    target = tmp_path / "report.html"
-    with open_db(path) as opened:
-        opened.report(target)
-    page.open(target.as_uri())
-    for name in PAGES:
-        page.go(f"#/{name}?x=1")
-        assert "has no events" in page.page.locator("main").inner_text()
+    with shown_as(way, path, page) as address:
+        page.open(address)
+        for name in PAGES:
+            page.go(f"#/{name}?x=1")
+            assert "has no events" in page.page.locator("main").inner_text()
 
 
-def test_a_run_without_links(demo: Path, tmp_path: Path, page: Page) -> None:
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_a_run_without_links(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "unlinked.duckdb"
     shutil.copyfile(demo, path)
     with duckdb.connect(str(path)) as connection:
         for table in ("link_transport", "link_causal", "link_request", "link_response"):
             connection.execute(f"DELETE FROM store.{table}")
-    target = tmp_path / "report.html"
-    with open_db(path) as opened:
-        opened.report(target)
-    visit(page, target.as_uri())
-    page.go("#/paths")
-    assert "There are no paths" in page.page.locator("main").inner_text()
-    page.go("#/timeline")
-    assert page.page.evaluate("msgflow.page.renderer.bars.table.rows") > 1000
+        ((number,),) = connection.execute("SELECT min(take_id) FROM store.take").fetchall()
+    with shown_as(way, path, page) as address:
+        visit(page, address)
+        page.go("#/paths")
+        assert "There are no paths" in page.page.locator("main").inner_text()
+        page.go("#/timeline?x=1")
+        assert page.page.evaluate("msgflow.page.renderer.bars.table.rows") > 1000
+        page.go(f"#/timeline?flow=take:{number}")
+        assert ("take", number) in page.flow()
 
 
-def test_a_long_gap_is_shaded(demo: Path, tmp_path: Path, page: Page) -> None:
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_a_long_gap_is_shaded(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "gap.duckdb"
     shutil.copyfile(demo, path)
     later = 1_200_000_000_000
@@ -157,16 +167,15 @@ def test_a_long_gap_is_shaded(demo: Path, tmp_path: Path, page: Page) -> None:
             "INSERT INTO store.loss_interval SELECT 1, min(trace_id), NULL, 'pause',"
             f" {middle}, {middle + later}, NULL FROM store.trace"
         )
-    target = tmp_path / "report.html"
-    with open_db(path) as opened:
-        opened.report(target)
-    visit(page, target.as_uri())
-    page.go("#/timeline?from=0")
-    gaps = page.page.evaluate("msgflow.page.renderer.gaps")
-    assert [gap["length"] for gap in gaps] == [later]
+    with shown_as(way, path, page) as address:
+        visit(page, address)
+        page.go("#/timeline?from=0")
+        gaps = page.page.evaluate("msgflow.page.renderer.gaps")
+        assert [gap["length"] for gap in gaps] == [later]
 
 
-def test_five_hundred_nodes(demo: Path, tmp_path: Path, page: Page) -> None:
+@pytest.mark.parametrize("way", ["served", "file"])
+def test_five_hundred_nodes(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "many.duckdb"
     shutil.copyfile(demo, path)
     with duckdb.connect(str(path)) as connection:
@@ -188,18 +197,37 @@ def test_five_hundred_nodes(demo: Path, tmp_path: Path, page: Page) -> None:
             " r.start_ns + i * 1000 AS start_ns, r.start_ns + i * 1000 + 10 AS end_ns"
             " FROM store.run AS r, range(1000) AS s (i)"
         )
-    target = tmp_path / "report.html"
-    with open_db(path) as opened:
-        opened.report(target)
-    visit(page, target.as_uri())
-    page.go("#/graph")
-    assert "those with the most messages" in page.page.locator(".status").inner_text()
-    page.page.get_by_placeholder("node or topic").fill("/n499")
-    page.page.get_by_placeholder("node or topic").press("Enter")
-    assert "/n499" in (page.page.locator(".graph").text_content() or "")
-    page.go("#/timeline?q=/t499")
-    labels = page.page.evaluate("msgflow.page.renderer.lanes.map(lane => lane.label)")
-    assert "/t499" in labels
+    with shown_as(way, path, page) as address:
+        visit(page, address)
+        page.go("#/graph")
+        assert "those with the most messages" in page.page.locator(".status").inner_text()
+        page.page.get_by_placeholder("node or topic").fill("/n499")
+        page.page.get_by_placeholder("node or topic").press("Enter")
+        assert "/n499" in (page.page.locator(".graph").text_content() or "")
+        page.go("#/timeline?q=/t499")
+        labels = page.page.evaluate("msgflow.page.renderer.lanes.map(lane => lane.label)")
+        assert "/t499" in labels
+
+
+def test_a_page_of_a_replaced_database_says_so(
+    demo: Path, systems: Path, tmp_path: Path, page: Page
+) -> None:
+    path = tmp_path / "run.duckdb"
+    shutil.copyfile(demo, path)
+    with shown_as("served", path, page) as address:
+        page.open(address)
+        other = tmp_path / "other.duckdb"
+        shutil.copyfile(systems, other)
+        other.replace(path)
+        page.go("#/paths")
+        said = page.page.locator("main").inner_text()
+        assert "the database was replaced while the page was open" in said
+        page.page.get_by_role("button", name="reload the page").click()
+        page.page.get_by_role("region", name="paths", exact=True).wait_for(timeout=60_000)
+        assert "/BehaviorPlanner" in page.page.locator("main").inner_text()
+    # What the browser itself says of an answer that is an error.
+    assert all("409" in error for error in page.errors)
+    page.errors.clear()
 
 
 def test_a_browser_without_what_the_page_needs(
@@ -230,6 +258,9 @@ def test_a_report_says_what_it_left_out(demo: Path, tmp_path: Path, page: Page) 
         assert not whole.notes
         with pytest.raises(UsageError, match="the pages alone take"):
             opened.report(target, max_size=100_000)
+        # The pages fit, the timeline in bins beside them does not.
+        with pytest.raises(UsageError, match="the report takes"):
+            opened.report(target, max_size=341_000)
         small = opened.report(target, max_size=360_000)
         assert small.size <= 360_000 < whole.size
         (note,) = small.notes

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import base64
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
 import duckdb
 import pytest
-from served import Page, Served, a_publication, colors, flow_of
+from served import Page, Served, a_publication, colors, flow_of, shown
 
 from msgflow.database import open_db
 
@@ -61,8 +62,6 @@ def test_picking_lights_up_exactly_the_flow(
     wanted = flow_of(connection, "publication", number)
     assert len(wanted) > 10
     assert page.flow() == wanted
-    marked = page.page.locator(".steps tr.is-critical").count()
-    assert 2 < marked <= len(wanted)
     assert colors(page) > 10
     # The address leads back to it.
     address = page.page.url
@@ -70,6 +69,101 @@ def test_picking_lights_up_exactly_the_flow(
     page.page.keyboard.press("Escape")
     page.page.locator(".side").wait_for(state="hidden")
     assert "flow=" not in page.page.url
+
+
+def marked(page: Page) -> set[tuple[str, int]]:
+    """Return what is marked as critical in the picked flow, once that is known."""
+    page.page.locator(".steps-critical tbody tr").first.wait_for(state="attached", timeout=180_000)
+    rows = page.page.locator(".steps tr.is-critical")
+    found = rows.evaluate_all("rows => rows.map(row => [row.dataset.kind, row.dataset.id])")
+    return {(kind, int(number)) for kind, number in found}
+
+
+def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> None:
+    """Compare what the page marks and lists with what the command that it names gives."""
+    shown_path = marked(page)
+    lit = page.flow()
+    words = shlex.split(page.page.locator(".side .command code").text_content() or "")
+    assert words[:3] == ["msgflow", "query", "critical-path"]
+    options = dict(zip(words[3::2], words[4::2], strict=True))
+    with open_db(database) as opened:
+        pieces = (
+            opened.query(
+                "critical-path", run=run,
+                **{"from": options["--from"], "to": options["--to"],
+                   "flow": int(options["--flow"]), "detail": options["--detail"]},
+            )
+            .to_arrow()
+            .to_pylist()
+        )  # fmt: skip
+    assert len(pieces) > 2
+    named = {
+        (kind, row[f"{kind}_id"]) for row in pieces for kind in ("callback_instance", "publication")
+    }
+    assert {one for one in shown_path if one[0] != "take"} == named & lit
+    assert ("take", pieces[0]["take_id"]) in shown_path
+    cells = page.page.locator(".steps-critical tbody tr").evaluate_all(
+        "rows => rows.map(row => [row.cells[0].textContent, row.cells[2].textContent])"
+    )
+    assert cells == [[f"+{shown(row['at_ns'])}", shown(row["duration_ns"])] for row in pieces]
+    drawn = page.page.evaluate("""() => {
+        const { lanes, flow } = msgflow.page.renderer;
+        return [lanes[0].type, flow.pieces.rows, flow.edges.filter(edge => edge.critical).length];
+    }""")
+    assert drawn[:2] == ["critical", len(pieces)]
+    assert drawn[2] >= 2
+
+
+@pytest.mark.parametrize(
+    ("run", "kind", "which"),
+    [
+        (3, "publication", "SELECT min(publication_id) FROM publication JOIN publisher USING"
+         " (publisher_id) WHERE publication.run_id = 3 AND topic_name = '/FrontLidarDriver'"),
+        (3, "take", "SELECT quantile_disc(take_id, 0.5) FROM take JOIN subscription USING"
+         " (subscription_id) WHERE take.run_id = 3 AND topic_name = '/VehicleInterface'"),
+        (3, "callback_instance", "SELECT min(callback_instance_id) FROM link_causal"
+         " WHERE run_id = 3 AND kind = 'periodic_async'"),
+        (2, "publication", "SELECT quantile_disc(publication_id, 0.5) FROM publication JOIN"
+         " publisher USING (publisher_id) WHERE publication.run_id = 2"
+         " AND topic_name = '/RayGroundFilter'"),
+        (1, "request", "SELECT quantile_disc(l.request_id, 0.5) FROM link_request AS l"
+         " JOIN callback_instance AS i USING (callback_instance_id)"
+         " JOIN link_causal AS c USING (callback_instance_id) WHERE l.run_id = 1"),
+    ],
+)  # fmt: skip
+def test_the_critical_path_is_that_of_the_query(
+    run: int, kind: str, which: str, systems: Path, read: Read, serve: Serve, page: Page
+) -> None:
+    ((number,),) = read(systems).execute(which).fetchall()
+    page.open(serve(systems).address)
+    page.go(f"#/timeline?run={run}&flow={kind}:{number}")
+    require_critical_path_of_the_query(page, systems, run)
+
+
+def test_a_report_has_the_critical_path_of_its_slowest_flows(
+    demo: Path, read: Read, report: Report, page: Page
+) -> None:
+    page.open(report(demo))
+    page.go("#/timeline")
+    page.page.get_by_label("go to the slowest flow of a path").focus()
+    slowest = page.page.get_by_label("go to the slowest flow of a path").locator("option")
+    slowest.nth(1).wait_for(state="attached")
+    values = slowest.evaluate_all("all => all.slice(1).map(one => [one.value, one.textContent])")
+    latest = max(range(len(values)), key=lambda at: in_ns(values[at][1]))
+    page.page.get_by_label("go to the slowest flow of a path").select_option(index=latest + 1)
+    page.page.locator(f".steps tr[data-id='{values[latest][0].split(':')[1]}']").wait_for()
+    require_critical_path_of_the_query(page, demo, 1)
+    # Of others it says where to find it.
+    number = a_publication(read(demo), 1)
+    page.go(f"#/timeline?flow=publication:{number}")
+    page.flow()
+    assert "msgflow query critical-path" in page.page.locator(".side").inner_text()
+    assert page.page.locator(".steps tr.is-critical").count() == 0
+
+
+def in_ns(text: str) -> float:
+    value, unit = text.split()[:2]
+    return float(value.replace(",", "")) * {"s": 1e9, "ms": 1e6, "µs": 1e3, "ns": 1}[unit]
 
 
 @pytest.mark.parametrize("way", ["served", "file"])

@@ -42,6 +42,34 @@ def test_the_file_has_exactly_the_flow(
     assert 0 < arrows <= len(wanted)
 
 
+def test_the_file_ends_where_depth_does(
+    systems: Path, read: Read, tmp_path: Path, page: Page
+) -> None:
+    number = a_publication(read(systems), 3)
+    target = tmp_path / "flow.html"
+    for depth in (0, 1):
+        with open_db(systems) as opened:
+            flow = opened.flow(publication_id=number, depth=depth, internal=True)
+            opened.flow_page(flow, target)
+        page.open(target.as_uri())
+        assert page.flow() == set(flow.nodes)
+        assert f"--depth {depth}" in page.page.locator(".said").inner_text()
+    assert 1 < len(flow.nodes) < len(flow_of(read(systems), "publication", number))
+
+
+def test_the_limit_is_of_the_direction(
+    systems: Path, read: Read, tmp_path: Path, page: Page
+) -> None:
+    number = a_publication(read(systems), 3)
+    target = tmp_path / "flow.html"
+    for direction in ("forward", "backward"):
+        with open_db(systems) as opened:
+            flow = opened.flow(publication_id=number, direction=direction, limit=3)
+            opened.flow_page(flow, target)
+        page.open(target.as_uri())
+        assert len(page.flow()) == 3
+
+
 def test_what_the_limit_leaves_out_is_said(
     systems: Path, read: Read, tmp_path: Path, page: Page
 ) -> None:

@@ -44,6 +44,8 @@ def test_headers_say_what_a_page_query_has(name: str, demo: Path, read: Read) ->
     )
     if name == "neighbour":
         given["kind"] = 1
+    if "direction" in named:
+        given["direction"] = "both"
     table = run_page_query(connection, name, given)
     assert table.column_names == [column.name for column in header.columns]
 

@@ -4,28 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
-from served import Page, Served
+from served import Page, Served, shown
 
 from msgflow.database import open_db
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]
 Serve = Callable[[Path], Served]
-_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1, "ns"))
-
-
-def shown(ns: int | None) -> str:
-    """Return a duration as pages write it."""
-    if ns is None:
-        return ""
-    if ns == 0:
-        return "0"
-    scale, unit = next((scale, unit) for scale, unit in _UNITS if abs(ns) >= scale)
-    text = f"{ns / scale:,.3f}".rstrip("0").rstrip(".") if scale > 1 else str(ns)
-    return f"{text} {unit}"
 
 
 def cells(page: Page, table: str) -> list[list[str]]:
@@ -195,10 +184,39 @@ def test_compare(systems: Path, serve: Serve, page: Page) -> None:
     assert f"of {len(subjects)} differ" in said
 
 
+def test_compare_shows_what_was_measured_before_intervals(
+    systems: Path, serve: Serve, page: Page
+) -> None:
+    """What takes long comes later: the page shows the rest meanwhile, and says so."""
+    with open_db(systems) as opened:
+        wanted = opened.compare(2, 3, what="callbacks").result.to_arrow().to_pylist()
+    page.open(serve(systems).address)
+    held: list[Any] = []
+    page.page.route(
+        "**/api/compare*",
+        lambda route: route.continue_() if "quick=1" in route.request.url else held.append(route),
+    )
+    page.page.evaluate("location.hash = '#/compare?run=3&other=2&what=callbacks'")
+    rows = cells(page, "measured")
+    assert [row[:5] for row in rows] == [
+        [
+            row["subject"], row["statistic"], shown(row["a_ns"]), shown(row["b_ns"]),
+            shown(row["difference_ns"]),
+        ]
+        for row in wanted
+    ][: len(rows)]  # fmt: skip
+    said = page.page.locator("main").inner_text()
+    assert f"{len({row['subject'] for row in wanted})} subjects measured" in said
+    assert "confidence intervals" in said
+    (route,) = held
+    route.continue_()
+    page.page.get_by_role("region", name="comparison", exact=True).wait_for(timeout=60_000)
+
+
 def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> None:
     page.open(report(systems, run=3, compare=2, path_text="/BehaviorPlanner"))
     page.go("#/compare")
-    page.page.locator(".chart canvas").wait_for()
+    page.page.locator(".chart canvas").wait_for(timeout=180_000)
     labels = page.page.locator(".u-legend").inner_text()
     assert "A: autoware_two_threads" in labels
     assert "B: autoware" in labels

@@ -9,18 +9,21 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pytest
 from served import Served
 from tables import decoded
 
-from msgflow.errors import DatabaseError, UsageError
+from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
-from msgflow.view.server import is_local, listen, serve
+from msgflow.view.server import Turns, is_local, listen, serve
 
 Serve = Callable[[Path], Served]
 
@@ -226,3 +229,54 @@ def test_what_nobody_waits_for_ends(
         time.sleep(0.05)
     assert ended
     assert server.get("/api/run")[0] == 200
+
+
+def test_memory_that_others_took_is_waited_for() -> None:
+    """Of questions that have memory one by one only, each is answered."""
+    memory = threading.Lock()
+    begun = threading.Barrier(3)
+    tries: list[int] = []
+
+    def ask() -> bytes:
+        number = len(tries)
+        tries.append(1)
+        if number < 3:
+            begun.wait()
+        if not memory.acquire(blocking=False):
+            raise QueryError("the query failed") from duckdb.OutOfMemoryException("no memory")
+        try:
+            time.sleep(0.2)
+            return b"answer"
+        finally:
+            memory.release()
+
+    turns = Turns()
+    with ThreadPoolExecutor(3) as pool:
+        answers = [pool.submit(turns.ask, ask) for _ in range(3)]
+    assert [answer.result() for answer in answers] == [b"answer"] * 3
+    assert len(tries) == 5
+
+
+def test_what_needs_too_much_memory_alone_says_what_to_do() -> None:
+    tries: list[int] = []
+
+    def ask() -> bytes:
+        tries.append(1)
+        raise duckdb.OutOfMemoryException("no memory")
+
+    with pytest.raises(QueryError) as error:
+        Turns().ask(ask)
+    assert "--memory-limit" in str(error.value.hint)
+    assert len(tries) == 2
+
+
+def test_other_failures_are_not_tried_again() -> None:
+    tries: list[int] = []
+
+    def ask() -> bytes:
+        tries.append(1)
+        raise QueryError("the query failed") from duckdb.BinderException("no such column")
+
+    with pytest.raises(QueryError):
+        Turns().ask(ask)
+    assert len(tries) == 1

@@ -1,11 +1,13 @@
 -- name: flow
 -- title: The flow of what was picked
--- description: Everything that the picked thing caused and was caused by (main.flow_both), as bars,
---     and the links between them.
+-- description: Everything that the picked thing caused and was caused by (main.flow_both), or one of
+--     the two, as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
+-- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
+-- param: steps BIGINT = NULL  Most steps each way, of which a message is three; any number when NULL
 -- param: limit BIGINT = 20000  Most vertices, those nearest in time
 -- column: kind UTINYINT  As in bar.sql and call.sql
 -- column: id BIGINT  Identity of the vertex
@@ -29,9 +31,13 @@ WITH code AS (
 reached AS MATERIALIZED (
     SELECT kind, id, bool_or(is_effect) AS is_effect, bool_or(NOT is_effect) AS is_cause
     FROM (
-        SELECT kind, id, true AS is_effect FROM main.flow_forward($kind, $id)
+        SELECT kind, id, true AS is_effect
+        FROM main.flow_forward($kind, $id, max_depth := $steps)
+        WHERE $direction <> 'backward'
         UNION ALL
-        SELECT kind, id, false FROM main.flow_backward($kind, $id)
+        SELECT kind, id, false
+        FROM main.flow_backward($kind, $id, max_depth := $steps)
+        WHERE $direction <> 'forward'
     )
     GROUP BY kind, id
 ),

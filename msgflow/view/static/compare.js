@@ -8,6 +8,8 @@ import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 
 const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (from publication to take)" };
+const MEASURED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "effect", "a_count", "b_count", "a_share", "b_share"];
+const COMPARED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "effect", "a_count", "b_count", "a_share", "b_share"];
 
 export class ComparePage {
   constructor(app, root) {
@@ -37,13 +39,23 @@ export class ComparePage {
     await this.show();
   }
 
+  // What was measured first; intervals, and with them verdicts, take longer.
   async show() {
     replace({ page: "compare", other: this.other.run_id, what: this.what });
     this.app.linksMoved();
-    clear(this.body, waiting("comparing, with confidence intervals from resampling: this may take a minute …"));
+    this.abort?.abort();
+    this.abort = new AbortController();
+    const { signal } = this.abort;
+    this.subject = null;
+    clear(this.body, waiting("measuring both runs …"));
     clear(this.picture);
+    const asked = { other: this.other.run_id, what: this.what };
     try {
-      this.table = await this.app.fetch("compare", { other: this.other.run_id, what: this.what });
+      if (this.app.source.isServed) {
+        this.table = await this.app.fetch("compare", { ...asked, quick: 1 }, signal);
+        this.rows();
+      }
+      this.table = await this.app.fetch("compare", asked, signal);
       this.rows();
     } catch (error) {
       if (error.name !== "AbortError") clear(this.body, failed(error));
@@ -56,15 +68,19 @@ export class ComparePage {
     const changed = new Set();
     for (let row = 0; row < table.rows; row++) if (differs(row)) changed.add(table.subject[row]);
     const subjects = new Set(table.subject);
+    const isQuick = table.meta.is_quick;
     clear(this.body,
-      h("p", {}, `${count(changed.size, "subject")} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B).`),
-      dataTable(table, { label: "comparison", only: (row) => this.all || differs(row), nothing: "No difference is shown.",
-        columns: ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "effect", "a_count", "b_count", "a_share", "b_share"],
+      isQuick ? waiting(`${count(subjects.size, "subject")} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
+        : h("p", {}, `${count(changed.size, "subject")} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B).`),
+      dataTable(table, { label: isQuick ? "measured" : "comparison", only: (row) => isQuick || this.all || differs(row), nothing: "No difference is shown.",
+        columns: isQuick ? MEASURED : COMPARED,
         onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),
       notes(table.meta.notes), command(table.meta.command));
-    if (this.what === "paths" && table.rows) {
+    if (this.what === "paths" && table.rows && this.subject === null) {
+      // Of those that differ, as far as that is known, the one that does so most.
+      const size = (row) => (differs(row) ? 1e18 : 0) + Math.abs(table.difference_ns[row] || 0);
       let most = 0;
-      for (let row = 1; row < table.rows; row++) if (Math.abs(table.difference_ns[row] || 0) > Math.abs(table.difference_ns[most] || 0)) most = row;
+      for (let row = 1; row < table.rows; row++) if (size(row) > size(most)) most = row;
       this.overlay(table.subject[most]);
     }
   }
@@ -92,5 +108,5 @@ export class ComparePage {
   }
 
   recolor() { redrawCharts(); }
-  leave() {}
+  leave() { this.abort?.abort(); }
 }

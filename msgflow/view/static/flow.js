@@ -1,4 +1,4 @@
-// A picked flow: its vertices once each, its links, and the chain that made the last effect late.
+// A picked flow: its vertices once each, its links, and what of it lies on the critical path.
 
 import { KIND_NAMES } from "./words.js";
 
@@ -25,44 +25,30 @@ export function buildFlow(table, picked) {
     if (from !== undefined && to !== undefined) edges.push({ from, to, kind: table.link_kind[row], critical: false });
   }
   const total = table.rows ? table.vertex_count[0] : 0;
-  const flow = { vertices, edges, picked, total, leftOut: total - vertices.length, outside: table.meta.outside ?? 0 };
-  markCritical(flow);
+  const flow = { vertices, edges, picked, total, leftOut: total - vertices.length, outside: table.meta.outside ?? 0, pieces: null };
   return flow;
 }
 
-// From the last effect back: of several causes the one that came last, for it the others waited.
-// Among the causes of a flow without effects the same from what was picked.
-function markCritical(flow) {
+// Marks what the query critical-path names: its callback instances and messages, and the takes
+// between them. It may name others besides, which the flow waited for without being part of them.
+export function markCritical(flow, pieces) {
   const { vertices, edges } = flow;
-  const incoming = new Map();
-  edges.forEach((edge, place) => {
-    const list = incoming.get(edge.to) ?? [];
-    list.push(place);
-    incoming.set(edge.to, list);
-  });
-  const end = (vertex) => vertex.at + vertex.length;
-  let last = -1;
-  vertices.forEach((vertex, place) => {
-    if (last < 0 || end(vertex) > end(vertices[last])) last = place;
-  });
-  const seen = new Set();
-  while (last >= 0 && !seen.has(last)) {
-    seen.add(last);
-    vertices[last].critical = true;
-    const into = incoming.get(last) ?? [];
-    let latest = -1;
-    for (const place of into) {
-      const cause = vertices[edges[place].from];
-      if (latest < 0 || arrival(edges[place], cause) > arrival(edges[latest], vertices[edges[latest].from])) latest = place;
-    }
-    if (latest < 0) break;
-    edges[latest].critical = true;
-    last = edges[latest].from;
+  const named = [new Set(), new Set()];
+  for (let row = 0; row < pieces.rows; row++) {
+    named[0].add(pieces.callback_instance_id[row]);
+    named[1].add(pieces.publication_id[row]);
   }
-}
-
-function arrival(edge, cause) {
-  return edge.kind === "direct" ? cause.at : cause.at + cause.length;
+  const last = pieces.rows ? pieces.take_id[0] : null;
+  for (const vertex of vertices) {
+    vertex.critical = vertex.kind < 2 ? named[vertex.kind].has(vertex.id) : vertex.kind === 2 && vertex.id === last;
+  }
+  for (const edge of edges) {
+    const [take, callback] = [vertices[edge.from], vertices[edge.to]];
+    if (edge.kind !== "callback" || !callback.critical || take.kind !== 2) continue;
+    if (edges.some((other) => other.to === edge.from && vertices[other.from].critical)) take.critical = true;
+  }
+  for (const edge of edges) edge.critical = vertices[edge.from].critical && vertices[edge.to].critical;
+  flow.pieces = pieces;
 }
 
 export function extent(flow) {

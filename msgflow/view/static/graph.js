@@ -114,17 +114,20 @@ export class GraphPage {
     const root = svg("svg", { width: Math.ceil(width * scale), height: Math.ceil(height * scale), viewBox: `0 0 ${Math.ceil(width)} ${Math.ceil(height)}`, role: "img", "aria-label": "graph of nodes and topics" });
     root.append(svg("defs", {}, ["transport", "indirect", "service"].map((name) => svg("marker", { id: `tip-${name}`, viewBox: "0 0 8 8", refX: 7, refY: 4, markerWidth: 7, markerHeight: 7, orient: "auto" },
       svg("path", { d: "M0,0 L8,4 L0,8 z", class: `fill-${name}` })))));
+    const names = [];
     for (const key of used) {
       const box = graph.node(key);
-      root.append(svg("rect", { x: box.x - box.width / 2, y: box.y - box.height / 2 - 10, width: box.width, height: box.height + 10, rx: 8, class: "group-box" }),
-        svg("text", { x: box.x - box.width / 2 + 8, y: box.y - box.height / 2 + 2, class: "group-text" }, shortened(groups.get(key), Math.max(Math.floor(box.width / 5.6), 8)), svg("title", {}, groups.get(key))));
+      root.append(svg("rect", { x: box.x - box.width / 2, y: box.y - box.height / 2 - 10, width: box.width, height: box.height + 10, rx: 8, class: "group-box" }));
+      names.push(svg("text", { x: box.x - box.width / 2 + 8, y: box.y - box.height / 2 + 2, class: "group-text" }, shortened(groups.get(key), Math.max(Math.floor((box.width - 16) / 6.2), 8)), svg("title", {}, groups.get(key))));
     }
     edges.forEach((edge, place) => {
       const line = graph.edge(edge.from, edge.to, String(place));
       const style = edge.indirect ? "indirect" : edge.kind === "service" ? "service" : "transport";
       root.append(svg("path", { d: curve(line.points), class: `edge stroke-${style}`, "stroke-dasharray": INDIRECT[edge.indirect] ?? null, "marker-end": `url(#tip-${style})` }, svg("title", {}, edge.title)));
-      if (edge.label) root.append(svg("text", { x: line.x, y: line.y - 4, class: "edge-text" }, edge.label, svg("title", {}, edge.title)));
+      if (edge.label) names.push(svg("text", { x: line.x, y: line.y - 4, class: "edge-text" }, edge.label, svg("title", {}, edge.title)));
     });
+    // What is written lies above all arrows.
+    root.append(...names);
     for (const key of chosen) {
       const vertex = vertices.get(key);
       const box = graph.node(key);

@@ -1,6 +1,6 @@
 // Rows of the timeline: which there are, in which order, and where they lie on the canvas.
 
-export const HEIGHTS = { host: 22, process: 20, node: 20, row: 20 };
+export const HEIGHTS = { critical: 26, host: 22, process: 20, node: 20, row: 20 };
 
 // Kinds of rows that may be hidden, and what the boxes for that say.
 export const ROW_KINDS = {
@@ -9,7 +9,7 @@ export const ROW_KINDS = {
 };
 
 // Options: internal, query, hidden (Set of row keys), folded (Set of header keys), kinds (Set that
-// is hidden), only (Set of row keys, or null), used (Set of row keys with something to draw).
+// is hidden), only (Set of row keys, or null), critical (whether there is a critical path).
 export function layout(rows, options) {
   const lanes = [];
   let y = 0;
@@ -23,6 +23,7 @@ export function layout(rows, options) {
     y += lane.height;
     lanes.push(lane);
   };
+  if (options.critical) push({ type: "critical", key: "critical", label: "critical path" });
   for (let row = 0; row < rows.rows; row++) {
     const key = rows.row_key[row];
     const kind = rows.kind[row];

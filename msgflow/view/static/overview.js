@@ -49,8 +49,7 @@ export class OverviewPage {
           h("p", {}, h("b", {}, "Cause: "), table.cause[first]),
           h("p", {}, h("b", {}, "Cure: "), table.cure[first]));
       });
-      return [notes(table.meta.notes),
-        list.length ? list : h("p", {}, "Nothing is wrong with the recording."), command(table.meta.command)];
+      return [list.length ? list : h("p", {}, "Nothing is wrong with the recording."), notes(table.meta.notes), command(table.meta.command)];
     });
     const paths = fill(slow, async () => {
       const table = await app.query("e2e-latency");

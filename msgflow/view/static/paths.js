@@ -2,7 +2,7 @@
 
 import { h, svg, clear, color } from "./dom.js";
 import { address, current, replace } from "./state.js";
-import { count, duration, partTitle, percent } from "./words.js";
+import { PALE, PART_COLORS, count, duration, partTitle, percent } from "./words.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
@@ -22,6 +22,7 @@ export class PathsPage {
     clear(this.root, waiting("looking for paths and their flows …"));
     const [table, paths] = await Promise.all([this.app.query("e2e-latency"), this.app.fetch("path")]);
     this.table = table;
+    this.paths = paths;
     this.ids = pathNumbers(table, paths);
     if (!table.rows) {
       clear(this.root, h("section", {}, h("h2", {}, "Paths"), h("p", {}, "There are no paths: no message is known to have been taken."), notes(table.meta.notes)));
@@ -57,12 +58,13 @@ export class PathsPage {
   async picture(row) {
     const { app, table } = this;
     const path = this.ids[row];
+    const begin = this.paths.topics[this.paths.path_id.indexOf(path)][0];
     const [histogram, shares, points, slowest] = await Promise.all(
       ["path_histogram", "path_share", "path_point", "path_slowest"].map((name) => app.fetch(name, { path })));
     const parts = h("div", {}, waiting("taking the latency apart …"));
     app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path)))
       .catch((error) => clear(parts, failed(error)));
-    const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null,
+    const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null, source: begin,
       flow: Number.isNaN(source.take_id[at]) || source.take_id[at] === null ? `${source.root_kind[at]}:${source.root_id[at]}` : `take:${source.take_id[at]}` });
     return [
       h("section", {}, h("h2", { className: "path-title" }, table.path[row]), this.fates(row)),
@@ -120,7 +122,7 @@ export class PathsPage {
     const shade = (kind) => PART_COLORS[kind] ?? "faint";
     for (const row of rows) {
       const share = Math.max(breakdown.total_ns[row], 0) / whole;
-      const piece = h("span", { className: `piece${share > 0.06 ? "" : " thin"}`, title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
+      const piece = h("span", { className: `piece${share > 0.06 ? "" : " thin"}${PALE.has(shade(breakdown.part[row])) ? " pale" : ""}`, title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
         share > 0.06 ? duration(breakdown.mean_ns[row]) : "");
       piece.style.width = `${100 * share}%`;
       piece.style.background = color(shade(breakdown.part[row]));
@@ -139,11 +141,6 @@ export class PathsPage {
   recolor() { if (this.row !== undefined) { redrawCharts(); this.choose(this.row, false); } }
   leave() {}
 }
-
-const PART_COLORS = {
-  callback: "subscription", cache: "indirect", take_to_callback: "faint", network_or_idle: "transport", undecided: "wait",
-  executor_busy: "process", service: "service", rclcpp: "publication", rcl: "publication", rmw: "publication", dds: "publication", publish: "publication", take: "take",
-};
 
 function pointSeries(points) {
   const several = points.count.some((number) => number > 1);

@@ -2,7 +2,7 @@
 
 import { color } from "./dom.js";
 import { lowerBound } from "./lanes.js";
-import { duration } from "./words.js";
+import { PALE, PART_COLORS, duration, partTitle } from "./words.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -91,6 +91,7 @@ export class Renderer {
     if (this.links && !this.flow) this.drawLinks();
     c.globalAlpha = 1;
     if (this.flow) this.drawFlow();
+    for (const lane of shown) if (lane.type === "critical") this.drawPieces(lane);
     this.drawMeasure();
     c.restore();
     for (const lane of shown) this.drawLabel(lane);
@@ -114,12 +115,16 @@ export class Renderer {
     const y = AXIS + lane.y - this.scroll;
     c.fillStyle = lane.type === "host" ? colors.stripe : lane.type === "row" ? colors.page : colors.panel;
     c.fillRect(0, y, this.labelWidth, lane.height - 0.5);
-    const indent = { host: 6, process: 14, node: 22, row: 34 }[lane.type];
+    const indent = { critical: 6, host: 6, process: 14, node: 22, row: 34 }[lane.type];
     c.font = `${lane.type === "row" ? "" : "600 "}12px system-ui, sans-serif`;
     c.textBaseline = "middle";
     c.textAlign = "left";
     let left = this.width < 600 ? indent * 0.6 : indent;
-    if (lane.type !== "row") {
+    if (lane.type === "critical") {
+      c.fillStyle = colors.critical;
+      c.fillRect(left, y + lane.height / 2 - 1, 9, 2);
+      left += 13;
+    } else if (lane.type !== "row") {
       c.fillStyle = colors.soft;
       c.fillText(lane.folded ? "▸" : "▾", left, y + lane.height / 2);
       left += 13;
@@ -343,6 +348,42 @@ export class Renderer {
     }
   }
 
+  // One piece of the critical path after the other, with a line below that makes them one.
+  drawPieces(lane) {
+    const { context: c, colors } = this;
+    const { rows, from_ns: froms, duration_ns: lengths, activity } = this.flow.pieces;
+    const y = AXIS + lane.y - this.scroll + 4;
+    const high = lane.height - 10;
+    for (let row = 0; row < rows; row++) {
+      const [x0, x1] = [this.x(froms[row]), this.x(froms[row] + lengths[row])];
+      if (x1 < this.labelWidth || x0 > this.width || lengths[row] <= 0) continue;
+      const left = Math.max(x0, this.labelWidth - 2);
+      const width = Math.max(Math.min(x1, this.width + 2) - left, 0.5);
+      const shade = colors[PART_COLORS[activity[row]]] ?? colors.faint;
+      c.fillStyle = shade;
+      c.fillRect(left, y, width, high);
+      if (width > 3) { c.fillStyle = colors.page; c.fillRect(left + width - 0.75, y, 0.75, high); }
+      c.fillStyle = colors.critical;
+      c.fillRect(left, y + high + 1, width, 2);
+      if (width < 40) continue;
+      c.font = "11px system-ui, sans-serif";
+      c.textAlign = "left";
+      c.textBaseline = "middle";
+      c.fillStyle = PALE.has(PART_COLORS[activity[row]]) ? colors.ink : colors.page;
+      const took = duration(lengths[row]);
+      for (const said of [`${partTitle(activity[row])} ${took}`, `${activity[row].replaceAll("_", " ")} ${took}`, took]) {
+        if (c.measureText(said).width < width - 8) { c.fillText(said, left + 4, y + high / 2 + 0.5); break; }
+      }
+    }
+  }
+
+  pieceAt(x) {
+    const { rows, from_ns: froms, duration_ns: lengths } = this.flow.pieces;
+    const at = this.time(x);
+    for (let row = 0; row < rows; row++) if (froms[row] <= at && at < froms[row] + lengths[row]) return row;
+    return undefined;
+  }
+
   drawGaps(shown) {
     const { context: c, colors } = this;
     if (!this.gaps.length) return;
@@ -441,6 +482,7 @@ export class Renderer {
   pick(x, y) {
     const lane = this.laneAt(y);
     if (!lane) return null;
+    if (lane.type === "critical" && x >= this.labelWidth) return { lane, piece: this.pieceAt(x) };
     if (x < this.labelWidth || lane.type !== "row") return { lane };
     const at = this.time(x);
     const scale = this.plotWidth / (this.view.to - this.view.from);

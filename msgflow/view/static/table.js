@@ -49,7 +49,7 @@ export function dataTable(table, options = {}) {
         const text = cell(table[column.name][row], column);
         const inside = position === 0 && options.onPick
           ? h("button", { type: "button", className: "pick" }, text || "–") : text;
-        return h("td", { className: isNumber ? "number" : `text${String(text).length > 60 ? " long" : ""}` }, inside);
+        return h("td", { className: isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}` }, inside);
       });
       return h("tr", {
         className: options.onPick ? "can-pick" : "",

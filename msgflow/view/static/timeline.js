@@ -2,12 +2,12 @@
 
 import { h, clear } from "./dom.js";
 import { current, go, replace } from "./state.js";
-import { KINDS, KIND_NAMES, LINKS, count, duration, moment, wallClock, percent } from "./words.js";
+import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, wallClock, percent } from "./words.js";
 import { Renderer, AXIS } from "./renderer.js";
 import { ROW_KINDS, indexBars, layout } from "./lanes.js";
-import { buildFlow, extent } from "./flow.js";
+import { buildFlow, extent, markCritical } from "./flow.js";
 import { besides } from "./table.js";
-import { failed, waiting } from "./notice.js";
+import { command, failed, notes, waiting } from "./notice.js";
 
 const LEAST_SPAN = 20;
 const MARGIN = 0.5;
@@ -59,6 +59,7 @@ export class TimelinePage {
     this.gapsCut = gaps.rows ? gaps.total[0] - gaps.rows : 0;
     this.relayout();
     await this.load();
+    this.source = asked.source;
     if (asked.flow) await this.pickText(asked.flow, !asked.from);
     // Where only one flow is at hand there is no other one to go to.
     if (this.app.source.pages) this.worst.hidden = true; else this.slowest();
@@ -104,7 +105,7 @@ export class TimelinePage {
       item("publication", "publication"), item("take", "take"), item("call", "request, response"),
       item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"),
       item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
-      item("indirect", "indirect link", "stroke dashed"), item("critical", "slowest chain", "stroke"),
+      item("indirect", "indirect link", "stroke dashed"), item("critical", "critical path", "stroke"),
       item("gap", "not recorded"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
   }
 
@@ -114,6 +115,7 @@ export class TimelinePage {
       q: this.state.query, internal: this.state.internal ? "1" : null,
       hide: [...this.state.hidden, ...[...this.state.kinds].map((kind) => `kind:${kind}`), ...this.state.folded].join(","),
       flow: this.picked ? `${this.picked.kind}:${this.picked.id}` : null,
+      source: this.picked ? this.source : null,
     });
     this.app.linksMoved();
   }
@@ -135,7 +137,7 @@ export class TimelinePage {
         if (this.rows.kind[row] === "thread" && processes.has(this.rows.process_id[row])) only.add(this.rows.row_key[row]);
       }
     }
-    const made = layout(this.rows, { ...this.state, only });
+    const made = layout(this.rows, { ...this.state, only, critical: Boolean(flow?.pieces?.rows) });
     this.renderer.lanes = made.lanes;
     this.renderer.height = made.height;
     this.hiddenCount = made.hiddenCount;
@@ -403,14 +405,21 @@ export class TimelinePage {
       this.redraw();
     }
     this.canvas.style.cursor = hit?.kind !== undefined ? "pointer" : x < this.renderer.labelWidth ? "pointer" : "grab";
-    if (!hit || hit.lane.type !== "row" || y < AXIS) { this.tooltip.hidden = true; return; }
-    clear(this.tooltip, this.describe(hit, x));
+    if (!hit || (hit.lane.type !== "row" && hit.piece === undefined) || y < AXIS) { this.tooltip.hidden = true; return; }
+    clear(this.tooltip, hit.piece === undefined ? this.describe(hit, x) : this.describePiece(hit.piece));
     this.tooltip.hidden = false;
     const box = this.tooltip.getBoundingClientRect();
     const left = Math.min(x + 14, this.renderer.width - box.width - 6);
     const below = y + 18 + box.height < this.renderer.tall;
     this.tooltip.style.left = `${Math.max(left, 2)}px`;
     this.tooltip.style.top = `${below ? y + 18 : Math.max(y - box.height - 10, 2)}px`;
+  }
+
+  describePiece(row) {
+    const { pieces } = this.renderer.flow;
+    return [h("strong", {}, partTitle(pieces.activity[row])), h("span", {}, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`),
+      h("span", {}, `${duration(pieces.duration_ns[row])}, ${percent(pieces.share[row])} of the latency`), h("span", {}, `begins at ${moment(pieces.from_ns[row])}`),
+      pieces.is_certain[row] === false && h("span", { className: "soft" }, "what waited may have come during it")].filter(Boolean);
   }
 
   describe(hit, x) {
@@ -444,7 +453,9 @@ export class TimelinePage {
     const hit = this.renderer.pick(x, y);
     if (!hit) { if (y >= AXIS) this.drop(); return; }
     if (hit.lane.type !== "row") {
-      if (x < this.renderer.labelWidth) this.fold(hit.lane.key);
+      const { piece } = hit;
+      if (piece !== undefined) this.centerAt(this.renderer.flow.pieces.from_ns[piece], this.renderer.flow.pieces.duration_ns[piece]);
+      else if (x < this.renderer.labelWidth && hit.lane.type !== "critical") this.fold(hit.lane.key);
       return;
     }
     if (x < this.renderer.labelWidth) {
@@ -455,6 +466,7 @@ export class TimelinePage {
     if (hit.isBin) { this.setView(hit.at, hit.at + hit.length); return; }
     const kind = hit.kind >= 5 ? "callback_instance" : KIND_NAMES[hit.kind];
     if (hit.id < 0) return;
+    this.source = null;
     this.pick({ kind, id: hit.id }, false);
   }
 
@@ -465,7 +477,8 @@ export class TimelinePage {
     this.redraw();
   }
 
-  pickText(text, show) {
+  pickText(text, show, source = this.source) {
+    this.source = source;
     const [kind, id] = text.split(":");
     if (!KIND_NAMES.includes(kind) || !/^\d+$/.test(id ?? "")) return undefined;
     return this.pick({ kind, id: Number(id) }, show);
@@ -493,9 +506,48 @@ export class TimelinePage {
       this.redraw();
       this.showSide();
       this.say();
+      this.findCritical(asked);
     } catch (error) {
       if (asked === this.requests) clear(this.side, failed(error));
     }
+  }
+
+  // What the flow waited for takes longer to find than the flow, and comes when it is known.
+  async findCritical(asked) {
+    const { flow } = this.renderer;
+    try {
+      const pieces = await this.app.fetch("critical", { ...this.picked, from: this.source });
+      if (asked !== this.requests) return;
+      markCritical(flow, pieces);
+      this.relayout();
+      this.redraw();
+      this.showSide();
+    } catch (error) {
+      if (asked !== this.requests || error.name === "AbortError") return;
+      clear(this.critical, this.app.source.isServed ? failed(error)
+        : h("p", { className: "soft" }, "The critical path is in this report for its slowest flows alone; msgflow ui marks it, and msgflow query critical-path prints it."));
+    }
+  }
+
+  // The pieces of the critical path, as the query gives them.
+  pieces() {
+    const { pieces } = this.renderer.flow;
+    if (!pieces) return waiting("looking for what it waited for …");
+    if (!pieces.rows) return h("p", { className: "soft" }, "No path leads to where this flow ends: there is no critical path.");
+    const rows = Array.from({ length: pieces.rows }, (_, row) => h("tr", { className: "can-pick", on: { click: () => this.centerAt(pieces.from_ns[row], pieces.duration_ns[row]) } },
+      h("td", { className: "number" }, `+${duration(pieces.at_ns[row])}`),
+      h("td", {}, h("button", { type: "button", className: "pick" }, partTitle(pieces.activity[row])), h("div", { className: "soft" }, `${pieces.what[row] ?? ""} · ${pieces.node[row] ?? ""}`)),
+      h("td", { className: "number" }, duration(pieces.duration_ns[row]))));
+    return [
+      h("p", {}, `${duration(pieces.latency_ns[0])} from ${pieces.meta.from} to ${pieces.meta.to}, take ${pieces.meta.take_id}: the longest flow that ends with it, and what it waited for.`),
+      besides(count(pieces.rows, "piece"), h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": "pieces of the critical path" },
+        h("table", { className: "steps-critical" }, h("thead", {}, h("tr", {}, ["at", "what", "took"].map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, rows))), command(pieces.meta.command), notes(pieces.meta.notes)),
+    ];
+  }
+
+  centerAt(at, length) {
+    const span = Math.max(length * 1.5, 1000);
+    this.setView(at - (span - length) / 2, at + length + (span - length) / 2);
   }
 
   drop() {
@@ -510,6 +562,7 @@ export class TimelinePage {
 
   showSide() {
     const { flow } = this.renderer;
+    this.critical = h("div", {}, this.pieces());
     const gather = h("input", { type: "checkbox", checked: this.gathered, on: { change: () => { this.gathered = gather.checked; this.relayout(); this.redraw(); } } });
     const executors = h("input", { type: "checkbox", checked: this.withExecutors, on: { change: () => { this.withExecutors = executors.checked; this.relayout(); this.redraw(); } } });
     const { from, to } = extent(flow);
@@ -541,7 +594,7 @@ export class TimelinePage {
         h("button", { type: "button", on: { click: () => { const span = Math.max(to - from, 1000); this.setView(from - span * 0.08, to + span * 0.08); } } }, "show all of it")),
       h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": "steps of the flow" },
         h("table", { className: "steps" }, h("thead", {}, h("tr", {}, ["at", "what", "took"].map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, rows))),
-      h("p", { className: "soft" }, "Marked: the slowest chain, from the last effect back to the cause that came last."));
+      h("h3", { className: "critical-title" }, "Critical path"), this.critical);
     this.renderer.resize();
     this.redraw();
   }
@@ -564,6 +617,7 @@ export class TimelinePage {
       const { from, to } = this.renderer.view;
       const at = found.start_at[0];
       if (at < from || at + found.length[0] > to) this.setView(at - (to - from) / 2, at + (to - from) / 2);
+      this.source = null;
       await this.pick({ kind: KIND_NAMES[found.kind[0]], id: found.id[0] }, false);
     } catch (error) {
       clear(this.status, failed(error));
@@ -579,9 +633,10 @@ export class TimelinePage {
       try {
         const [paths, worst] = await Promise.all([this.app.fetch("path"), this.app.fetch("path_slowest", { limit: 1 })]);
         const names = new Map(Array.from({ length: paths.rows }, (_, row) => [paths.path_id[row], paths.path[row]]));
+        const sources = new Map(Array.from({ length: paths.rows }, (_, row) => [paths.path_id[row], paths.topics[row][0]]));
         for (let row = 0; row < worst.rows; row++) {
           const value = Number.isNaN(worst.take_id[row]) ? `${worst.root_kind[row]}:${worst.root_id[row]}` : `take:${worst.take_id[row]}`;
-          this.worst.append(h("option", { value }, `${duration(worst.latency[row])}  ${names.get(worst.path_id[row]) ?? ""}`));
+          this.worst.append(h("option", { value, data: { source: sources.get(worst.path_id[row]) ?? "" } }, `${duration(worst.latency[row])}  ${names.get(worst.path_id[row]) ?? ""}`));
         }
         if (!worst.rows) this.worst.append(h("option", { disabled: true }, "no path has a flow that arrived"));
       } catch (error) {
@@ -593,7 +648,7 @@ export class TimelinePage {
   }
 
   goWorst() {
-    if (this.worst.value) this.pickText(this.worst.value, true);
+    if (this.worst.value) this.pickText(this.worst.value, true, this.worst.selectedOptions[0].dataset.source);
     this.worst.selectedIndex = 0;
   }
 

@@ -1,0 +1,47 @@
+"""`msgflow targets`: files of requirements, for `msgflow verify`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    DatabaseOption,
+    OutputOption,
+    RunOption,
+    SkipFirstOption,
+)
+
+app = typer.Typer(help="Write requirements for verify.")
+
+
+@app.callback()
+def group() -> None:
+    """Write requirements for verify."""
+
+
+@app.command("suggest")
+def suggest(
+    run: RunOption = None,
+    skip_first: SkipFirstOption = None,
+    margin: Annotated[
+        float,
+        typer.Option(
+            "--margin", metavar="PERCENT", min=0, help="How much more than measured is allowed"
+        ),
+    ] = 20.0,
+    output: OutputOption = None,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Write requirements that a good run meets, as a file to review.
+
+    It covers paths, timers, topics and services with at least 20 values.
+    """
+    from msgflow.cli.output import print_text
+    from msgflow.database import Database
+
+    with Database(database) as opened:
+        text = opened.suggest_targets(run=run, skip_first=skip_first, margin=margin / 100)
+    print_text(lambda width, color: text, output)

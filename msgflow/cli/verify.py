@@ -1,0 +1,90 @@
+"""`msgflow verify`: whether a run meets the requirements of a file."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    DEFAULT_DATABASE,
+    OUTPUT,
+    DatabaseOption,
+    EndOption,
+    OutputOption,
+    SkipFirstOption,
+    StartOption,
+    WideOption,
+)
+from msgflow.errors import ExitCode
+
+
+class VerifyFormat(StrEnum):
+    """How verdicts are written."""
+
+    TABLE = "table"
+    JSON = "json"
+    CSV = "csv"
+    MARKDOWN = "markdown"
+    JUNIT = "junit"
+
+
+def command(
+    targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="Requirements, as YAML")],
+    run: Annotated[
+        str | None,
+        typer.Argument(metavar="[RUN]", help="Name or id of the run", show_default="the latest"),
+    ] = None,
+    start: StartOption = None,
+    end: EndOption = None,
+    skip_first: SkipFirstOption = None,
+    allow_not_measured: Annotated[
+        bool,
+        typer.Option(
+            "--allow-not-measured",
+            help="Exit with 0 if nothing failed, even if something was not measured",
+        ),
+    ] = False,
+    form: Annotated[
+        VerifyFormat | None,
+        typer.Option(
+            "--format",
+            help="Output format",
+            show_default="junit into FILE.xml, else table",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    output: OutputOption = None,
+    wide: WideOption = False,
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Check a run against the requirements of a file: passed, failed, or not measured.
+
+    Exit code: 0 if all passed, 1 if one failed, 5 if none failed but one was not measured.
+    `msgflow targets suggest` writes such a file from a good run.
+    """
+    from msgflow.cli.output import print_result, print_runs, print_status, print_text
+    from msgflow.database import Database
+    from msgflow.export.formats import Format
+
+    with Database(database) as opened:
+        verification = opened.verify(targets, run=run, start=start, end=end, skip_first=skip_first)
+    if form is None and output is not None and output.suffix.lower() == ".xml":
+        form = VerifyFormat.JUNIT
+    if form is VerifyFormat.JUNIT:
+        print_runs([verification.run])
+        text = verification.to_junit(allow_not_measured=allow_not_measured)
+        print_text(lambda width, color: text, output)
+    else:
+        chosen = None if form is None else Format(form.value)
+        print_result(verification.result, chosen, output, wide=wide)
+    numbers = {
+        verdict: verification.count(verdict) for verdict in ("passed", "failed", "not measured")
+    }
+    print_status(", ".join(f"{number} {verdict}" for verdict, number in numbers.items()))
+    if numbers["failed"]:
+        raise typer.Exit(ExitCode.FAILED)
+    if numbers["not measured"] and not allow_not_measured:
+        raise typer.Exit(ExitCode.NOT_MEASURED)

@@ -1,0 +1,59 @@
+"""What is the same for all databases and takes long to make, kept in the user's cache.
+
+It belongs to a version of DuckDB and to the files of `schema/`. Nothing depends on it: where it
+cannot be written, is damaged or missing, it is made again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from pathlib import Path
+
+import duckdb
+
+from msgflow.db.objects import definition_hash, head_revision
+from msgflow.resources import resource_directory
+from msgflow.version import __version__
+
+_MOST_OF_A_KIND = 8
+
+
+def read(kind: str, made_by: str) -> bytes | None:
+    """Return what was kept, None where that is not whole.
+
+    Args:
+        kind: what it is.
+        made_by: what else it depends on.
+    """
+    try:
+        digest, content = _file(kind, made_by).read_bytes().split(b"\n", 1)
+    except (OSError, ValueError, RuntimeError):  # the last: there is no home directory
+        return None
+    return content if hashlib.sha256(content).hexdigest().encode() == digest else None
+
+
+def keep(kind: str, made_by: str, content: bytes) -> None:
+    """Keep something, if possible."""
+    with contextlib.suppress(OSError, RuntimeError):
+        path = _file(kind, made_by)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        aside = path.with_suffix(f".{os.getpid()}.part")
+        try:
+            aside.write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
+            aside.replace(path)
+        finally:
+            aside.unlink(missing_ok=True)
+        kept = sorted(path.parent.glob(f"{kind}-*"), key=lambda old: old.stat().st_mtime)
+        for old in kept[:-_MOST_OF_A_KIND]:
+            old.unlink()
+
+
+def _file(kind: str, made_by: str) -> Path:
+    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
+    tables = (resource_directory("schema") / "tables.sql").read_text(encoding="utf-8")
+    made_of = "\0".join((__version__, head_revision(), definition_hash(), tables, made_by))
+    key = hashlib.sha256(made_of.encode()).hexdigest()[:32]
+    return root / "msgflow" / f"{kind}-{duckdb.__version__}-{key}"

@@ -1,0 +1,81 @@
+"""Removes and renames runs of a database: all that was asked for, or nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.db.change import change_runs
+from msgflow.db.store import delete
+from msgflow.errors import UsageError
+from msgflow.query.window import is_run_name
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import duckdb
+
+    from msgflow.query.window import Run
+
+
+def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:
+    """Delete runs with all that is known of them, and return which.
+
+    Args:
+        path: the database.
+        run: 'all', a name or an id.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Raises:
+        UsageError: no such run.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+
+    def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
+        delete(con, [one.run_id for one in runs])
+        return runs
+
+    return change_runs(path, run, change, memory_limit=memory_limit)
+
+
+def rename_run(path: Path, run: str | int, name: str, *, memory_limit: str | None = None) -> Run:
+    """Give a run another name, and return the run as it was.
+
+    Args:
+        path: the database.
+        run: a name or an id.
+        name: the new name.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Raises:
+        UsageError: no such run, several, or a name that another run has or `require_run_name`
+            refuses.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+    require_run_name(name)
+
+    def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> Run:
+        if len(runs) > 1:
+            raise UsageError(f"one run has one name — {run}", "give a name or an id")
+        named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [name]).fetchall()
+        if any(run_id != runs[0].run_id for (run_id,) in named):
+            raise UsageError(
+                f"the database has a run of that name already — {name}",
+                "give another name; msgflow runs list has those that are taken",
+            )
+        con.execute("UPDATE store.run SET name = ? WHERE run_id = ?", [name, runs[0].run_id])
+        return runs[0]
+
+    return change_runs(path, run, change, memory_limit=memory_limit)
+
+
+def require_run_name(name: str) -> None:
+    """Raise unless a run may have this name.
+
+    Raises:
+        UsageError: `--run` takes it for something else, or it is no text that a database holds.
+    """
+    if not is_run_name(name):
+        raise UsageError(
+            f"a run cannot have a name that --run takes for something else — {name!r}",
+            "give a name that is neither empty, nor 'all', nor a number",
+        )

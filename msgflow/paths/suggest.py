@@ -1,0 +1,86 @@
+"""Writes the paths of a run as a file of named paths to choose from."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter, defaultdict
+from typing import TYPE_CHECKING, Any
+
+from msgflow.query.human import format_duration, printable
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_HEAD = """\
+# Paths of a run by name, for --path: keep those that matter, and call them as you like.
+#   msgflow query e2e-latency --path NAME"""
+_PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
+_ARROW = " → "
+
+
+def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return a file with a named path for each path of a run.
+
+    Paths that begin and end alike are told apart by what only some of them visit.
+
+    Args:
+        rows: of the query `e2e-latency`.
+    """
+    texts = list(dict.fromkeys(row["path"] for row in rows))
+    if not texts:
+        return f"{_HEAD}\n# There are none.\npaths: []"
+    evidence = {row["path"]: row for row in rows}
+    steps = {text: text.split(_ARROW) for text in texts}
+    alike: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for text in texts:
+        # From the first topic: a node may publish several.
+        alike[steps[text][1], steps[text][-1]].append(text)
+    taken: Counter[str] = Counter()
+    lines = [_HEAD, "paths:"]
+    for text in texts:
+        first, last = steps[text][1], steps[text][-1]
+        siblings = [set(steps[other]) for other in alike[first, last]]
+        name = f"{_slug(first)}-to-{_slug(last)}"
+        taken[name] += 1
+        lines += _entry(
+            name if taken[name] == 1 else f"{name}-{taken[name]}",
+            first,
+            last,
+            [step for step in dict.fromkeys(steps[text]) if not all(step in s for s in siblings)],
+            sorted(set().union(*siblings) - set(steps[text])),
+            evidence[text],
+        )
+    return "\n".join(lines)
+
+
+def _entry(
+    name: str,
+    first: str,
+    last: str,
+    via: Sequence[str],
+    without: Sequence[str],
+    row: Mapping[str, Any],
+) -> list[str]:
+    seen = f"{row['reached']} of {row['roots']} arrived"
+    if row["p99_ns"] is not None:
+        seen += f", p99 {format_duration(row['p99_ns'])}"
+    lines = [
+        f"  # {printable(row['path'])}",
+        f"  # {seen}",
+        f"  - name: {_quoted(name)}",
+        f"    from: {_quoted(first)}",
+        f"    to: {_quoted(last)}",
+    ]
+    for word, places in (("via", via), ("without", without)):
+        if places:
+            lines.append(f"    {word}: [{', '.join(map(_quoted, places))}]")
+    return lines
+
+
+def _slug(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"
+
+
+def _quoted(text: str) -> str:
+    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,117 @@
+"""Names that a user gives: those that no run has are refused, not answered with nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import duckdb
+
+    from msgflow.query.value import Value
+    from msgflow.query.window import Run
+
+# Parameters with these names take topics or nodes, in every query that has them.
+PLACE_PARAMETERS = ("from", "to", "via", "without")
+_SHOWN = 3
+_TOPICS = """
+SELECT topic_name AS name FROM main.publisher WHERE list_contains($runs, run_id)
+UNION
+SELECT topic_name FROM main.subscription WHERE list_contains($runs, run_id)
+"""
+_NODES = """
+SELECT full_name AS name FROM main.node WHERE list_contains($runs, run_id)
+UNION
+SELECT node FROM main.callback_label WHERE list_contains($runs, run_id)
+UNION
+SELECT printf('[%s %d]', coalesce(name, '?'), pid) FROM main.process
+WHERE list_contains($runs, run_id)
+"""
+_CALLBACKS = "SELECT label AS name FROM main.callback_label WHERE list_contains($runs, run_id)"
+_HOSTS = "SELECT hostname AS name FROM main.host WHERE list_contains($runs, run_id)"
+_SERVICES = "SELECT service_name AS name FROM main.service WHERE list_contains($runs, run_id)"
+# What a name is of: the names that there are, and what lists them.
+_KNOWN = {
+    "topic": (_TOPICS, "msgflow query info-topics"),
+    "node": (_NODES, "msgflow query info-nodes"),
+    "callback": (_CALLBACKS, "msgflow query callback-duration"),
+    "host": (_HOSTS, "msgflow query info-hosts"),
+    "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow query graph"),
+}
+_WORDS = {"place": "topic or node"}
+_MISSING = """
+SELECT each
+FROM (SELECT unnest($patterns::VARCHAR[]) AS each)
+WHERE NOT EXISTS (
+    FROM ({known}) AS known WHERE known.name = each OR known.name GLOB each
+)
+"""
+
+
+def require_places(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
+) -> None:
+    """Raise unless every topic and node among the parameters of a query is one of the chosen runs.
+
+    Args:
+        connection: to a database with the public views.
+        runs: the chosen runs; where there are none, every name will do.
+        bound: all parameters of the query.
+
+    Raises:
+        UsageError: it names similar ones, else the first few.
+    """
+    for key in PLACE_PARAMETERS:
+        given = bound.get(key)
+        texts = given.split(",") if isinstance(given, str) else given
+        if isinstance(texts, list):
+            require_names(connection, runs, "place", [str(text).strip() for text in texts])
+
+
+def require_names(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], kind: str, names: Sequence[str]
+) -> None:
+    """Raise unless the chosen runs have something of every name, or that fits every pattern.
+
+    Args:
+        connection: to a database with the public views.
+        runs: the chosen runs; where there are none, every name will do.
+        kind: 'topic', 'node', 'callback', 'host', or 'place' for topics, nodes and services.
+        names: names or patterns (GLOB).
+
+    Raises:
+        UsageError: it names similar ones, else the first few.
+    """
+    if not runs or not names:
+        return
+    sql, source = _KNOWN[kind]
+    values = {"runs": [run.run_id for run in runs]}
+    missing = connection.execute(
+        _MISSING.format(known=sql), values | {"patterns": list(names)}
+    ).fetchall()
+    if not missing:
+        return
+    name = missing[0][0]
+    rows = connection.execute(sql, values).fetchall()
+    # Processes stand in brackets where their node is not known: they are no help.
+    known = sorted({each for (each,) in rows if each is not None and not each.startswith("[")})
+    what = _WORDS.get(kind, kind)
+    where = "the run" if len(runs) == 1 else "these runs"
+    is_pattern = any(character in name for character in "*?[")
+    problem = f"no {what} in {where} fits" if is_pattern else f"there is no such {what} in {where}"
+    raise UsageError(f"{problem} — {name}", _hint(name, known, what, source))
+
+
+def _hint(name: str, known: list[str], what: str, source: str) -> str:
+    if near := nearest(name, known):
+        return f"did you mean {' or '.join(near)}"
+    if not known:
+        return source
+    more = len(known) - _SHOWN
+    rest = f" and {more} more ({source})" if more > 0 else ""
+    plural = "topics and nodes" if what == "topic or node" else f"{what}s"
+    return f"the {plural} are {', '.join(known[:_SHOWN])}{rest}"

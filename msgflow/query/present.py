@@ -1,0 +1,302 @@
+"""What a terminal shows of a result: the stage between the rows and their lines.
+
+Columns that say nothing are left out and named. Paths are numbered and stand below the table once.
+What then still does not fit loses its least important columns, as `brief` in the header of the
+query has it; where not even the most important ones have a place, every row is a record.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from rich.cells import cell_len
+
+from msgflow.query.human import MOMENT, NULL, format_cell, short_symbol, shown_name
+from msgflow.query.wrapping import ARROW, longest_piece, longest_word
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from msgflow.query.result import QueryResult
+
+MOST_ROWS = 50
+GAP = 2
+PATH = "path"
+PATH_ID = "path_id"
+RUN = "run_id"
+_SYMBOLS = ("symbol", "symbols")
+# So many of the most important columns have to fit, for a table to be one. For so many, names are
+# broken if need be.
+_ESSENTIAL = 3
+_WANTED = 6
+# Text is not made narrower than so many cells, nor into more lines than that; of plain SQL, which
+# does not say what is important, into more.
+_NARROW = 18
+_WORD = 40
+_LINES = 4
+_LINES_OF_SQL = 10
+
+
+@dataclass(frozen=True)
+class ShownColumn:
+    """A column as people read it.
+
+    Attributes:
+        name: as the result has it.
+        title: as the table has it.
+        cells: one for each row that is shown.
+        is_number: aligned to the right, and never in several lines.
+        width: as wide as its content.
+        least: as narrow as it may become.
+        broken: as narrow as it may become where names are broken.
+    """
+
+    name: str
+    title: str
+    cells: tuple[str, ...]
+    is_number: bool
+    width: int
+    least: int
+    broken: int
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """What is shown of a result.
+
+    Attributes:
+        columns: in the order of the result, the number of the path first.
+        widths: of the columns; None where each row is a record.
+        paths: that the numbers mean, from 1 on.
+        notes: what is left out, a sentence each.
+    """
+
+    columns: tuple[ShownColumn, ...]
+    widths: tuple[int, ...] | None
+    paths: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def present(
+    result: QueryResult, width: int, *, most_rows: int | None = MOST_ROWS, is_chosen: bool = False
+) -> Presentation:
+    """Return what to show of `result`.
+
+    Args:
+        result: the rows.
+        width: of the terminal, in cells.
+        most_rows: how many rows are shown; all when None.
+        is_chosen: somebody asked for these columns, so that all of them are shown.
+    """
+    keeps_all = is_chosen or result.header is None
+    kept, nothing = _that_say_something(result, keeps_all)
+    first = result.table if most_rows is None else result.table.slice(0, most_rows)
+    columns = [_column(result, name, first[name]) for name in kept]
+    columns, paths = _with_numbered_paths(columns)
+    notes = []
+    if first.num_rows < len(result):
+        notes.append(f"the first {first.num_rows} of {len(result):,} rows: --wide shows all")
+    shown = columns if keeps_all else _that_fit(result, columns, width)
+    names = {column.name for column in shown}
+    left_out = [column for column in columns if column.name not in names]
+    is_table = _least(shown) <= width and not (left_out and first.num_rows == 1)
+    if not keeps_all:
+        important = _by_importance(result, columns)[:_ESSENTIAL]
+        is_table = is_table and all(column.name in names for column in important)
+    if not is_table:
+        shown, left_out = columns, []
+    if nothing:
+        notes.append(f"0 or empty in all rows: {', '.join(nothing)}")
+    notes += _of_columns_left_out(left_out) if first.num_rows else []
+    widths = tuple(_widths(shown, width)) if is_table else None
+    return Presentation(tuple(shown), widths, paths, tuple(notes))
+
+
+def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str], list[str]]:
+    """Return the columns that have something to say, and those that are 0 or empty throughout."""
+    if keeps_all or not len(result):
+        return list(result.columns), []
+    kept, nothing = [], []
+    for name in result.columns:
+        if name == RUN and len(result.runs) == 1:
+            continue
+        if name == PATH_ID and PATH in result.columns:
+            continue
+        if _is_nothing(result.table[name]):
+            nothing.append(_title(result, name))
+        else:
+            kept.append(name)
+    return kept, nothing
+
+
+def _is_nothing(column: pa.ChunkedArray) -> bool:
+    import pyarrow.types as types
+    from pyarrow import compute
+
+    if column.null_count == len(column):
+        return True
+    kind = column.type
+    if types.is_boolean(kind):
+        return not compute.any(column).as_py()
+    if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
+        ends = compute.min_max(column).as_py()
+        return bool(ends["min"] == 0 == ends["max"])
+    if types.is_list(kind):
+        return not compute.max(compute.list_value_length(column)).as_py()
+    return bool(types.is_string(kind) and compute.max(column).as_py() == "")
+
+
+def _title(result: QueryResult, name: str) -> str:
+    return shown_name(name, result.units.get(name), result.columns)
+
+
+def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownColumn:
+    import pyarrow.types as types
+
+    kind = values.type
+    title, cells = _title(result, name), None
+    is_number = bool(types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind))
+    listed = values.to_pylist()
+    if name == RUN and (names := _run_names(result)):
+        title, is_number = "run", False
+        cells = [format_cell(names.get(value, value)) for value in listed]
+    elif name in _SYMBOLS:
+        cells = [NULL if value is None else format_cell(_symbols(value)) for value in listed]
+    else:
+        unit = result.units.get(name)
+        is_handle = name.endswith("_handle")
+        begin = _begin(result) if unit == MOMENT else None
+        cells = [
+            format_cell(value, unit, is_handle=is_handle)
+            if begin is None or value is None
+            else _since(value - begin)
+            for value in listed
+        ]
+    lines = _LINES_OF_SQL if result.header is None else _LINES
+    return _measured(name, title, cells, is_number, lines)
+
+
+def _measured(
+    name: str, title: str, cells: list[str], is_number: bool, lines: int = _LINES
+) -> ShownColumn:
+    width = max([cell_len(title), *map(cell_len, cells)])
+    least = broken = width
+    if not is_number:
+        word = max((longest_word(cell) for cell in cells), default=0)
+        most = max(map(cell_len, cells), default=0)
+        piece = max(map(longest_piece, cells), default=0)
+        broken = min(
+            width,
+            max(cell_len(title), min(piece, _WORD), _NARROW, -(-most * 5 // (4 * lines))),
+        )
+        least = min(width, max(broken, min(word, _WORD)))
+    return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
+
+
+def _run_names(result: QueryResult) -> dict[int, str]:
+    """Return the name of each run by its id; nothing where the rows are about the runs."""
+    if result.header is None or result.header.grain == "one row per run":
+        return {}
+    names = {run.run_id: run.name for run in result.runs}
+    return names if len(set(names.values())) == len(names) else {}
+
+
+def _symbols(text: str) -> str:
+    return short_symbol(text)
+
+
+def _begin(result: QueryResult) -> int | None:
+    """Return what points in time count from: the start of the only run, unless rows tell it."""
+    if len(result.runs) != 1 or result.header is None or result.header.grain == "one row per run":
+        return None
+    return result.runs[0].start_ns
+
+
+def _since(duration_ns: int) -> str:
+    # Rounded down, so that what is given to --start or --at does not leave this moment out.
+    microseconds = duration_ns // 1_000
+    sign = "-" if microseconds < 0 else ""
+    seconds, rest = divmod(abs(microseconds), 1_000_000)
+    return f"{sign}{seconds}.{rest:06d} s"
+
+
+def _with_numbered_paths(
+    columns: list[ShownColumn],
+) -> tuple[list[ShownColumn], tuple[str, ...]]:
+    """Return the columns with numbers in place of paths, and the paths."""
+    texts = next((column.cells for column in columns if column.name == PATH), ())
+    if not any(ARROW in text for text in texts):
+        return columns, ()
+    paths = tuple(dict.fromkeys(text for text in texts if ARROW in text))
+    numbers = {text: str(number) for number, text in enumerate(paths, start=1)}
+    column = _measured(PATH, PATH, [numbers.get(text, text) for text in texts], True)
+    others = [other for other in columns if other.name != PATH]
+    return ([column] if len(paths) > 1 else []) + others, paths
+
+
+def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[ShownColumn]:
+    brief = () if result.header is None else result.header.brief
+    places = {name: place for place, name in enumerate(dict.fromkeys((PATH, RUN, *brief)))}
+    return sorted(
+        columns,
+        key=lambda column: (
+            places.get(column.name, len(places)),
+            column.name.endswith(("_id", "_handle")),
+        ),
+    )
+
+
+def _that_fit(result: QueryResult, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
+    """Return the most important columns that have a place, in their own order."""
+    if _least(columns) <= width:
+        return columns
+    ranked = _by_importance(result, columns)
+    chosen = _greedy(ranked, width)
+    if any(column not in chosen for column in ranked[:_WANTED]):
+        ranked = [replace(column, least=column.broken) for column in ranked]
+        chosen = _greedy(ranked, width)
+    by_name = {column.name: column for column in chosen}
+    return [by_name[column.name] for column in columns if column.name in by_name]
+
+
+def _greedy(ranked: list[ShownColumn], width: int) -> list[ShownColumn]:
+    chosen: list[ShownColumn] = []
+    for column in ranked:
+        if _least([*chosen, column]) <= width:
+            chosen.append(column)
+    return chosen
+
+
+def _least(columns: list[ShownColumn]) -> int:
+    return sum(column.least for column in columns) + GAP * max(0, len(columns) - 1)
+
+
+def _widths(columns: list[ShownColumn], width: int) -> list[int]:
+    """Return the widths of columns that fit: the widest are made narrower first."""
+    widths = [column.width for column in columns]
+    free = width - GAP * (len(columns) - 1)
+    while sum(widths) > free:
+        widest = max(
+            (place for place, column in enumerate(columns) if widths[place] > column.least),
+            key=lambda place: widths[place],
+        )
+        widths[widest] -= 1
+    return widths
+
+
+def _of_columns_left_out(columns: list[ShownColumn]) -> list[str]:
+    """Say which columns have no place, and what stands in those that are alike in all rows."""
+    alike = [
+        column
+        for column in columns
+        if len(column.cells) > 1 and len(set(column.cells)) == 1 and column.width <= _WORD
+    ]
+    others = [column.title for column in columns if column not in alike]
+    notes = []
+    if alike:
+        same = ", ".join(f"{column.title} {column.cells[0]}" for column in alike)
+        notes.append(f"the same in all rows: {same}")
+    if others:
+        notes.append(f"no room for {', '.join(others)}: --wide shows all")
+    return notes

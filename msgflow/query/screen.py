@@ -1,0 +1,89 @@
+"""The lines of what is shown of a result: a table or records, and the paths below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.cells import cell_len
+
+from msgflow.query.present import GAP
+from msgflow.query.wrapping import ARROW, wrap, wrap_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from msgflow.query.present import Presentation, ShownColumn
+
+# A path that begins as the one before is cut, where that spares so many steps.
+_SPARED = 4
+
+
+def screen_lines(shown: Presentation, width: int) -> Iterator[str]:
+    """Yield the lines of what is shown, none longer than `width`."""
+    if shown.columns and shown.columns[0].cells:
+        if shown.widths is None:
+            yield from _records(shown.columns, width)
+        else:
+            yield from _table(shown.columns, shown.widths)
+    if shown.paths:
+        yield ""
+        yield from _paths(shown.paths, width)
+
+
+def _table(columns: Sequence[ShownColumn], widths: Sequence[int]) -> Iterator[str]:
+    yield _line([column.title for column in columns], columns, widths)
+    yield "─" * (sum(widths) + GAP * (len(widths) - 1))
+    for row in zip(*(column.cells for column in columns), strict=True):
+        parts = [wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
+        for number in range(max(map(len, parts))):
+            line = [part[number] if number < len(part) else "" for part in parts]
+            yield _line(line, columns, widths)
+
+
+def _line(cells: Sequence[str], columns: Sequence[ShownColumn], widths: Sequence[int]) -> str:
+    parts = []
+    for cell, column, width in zip(cells, columns, widths, strict=True):
+        padding = " " * (width - cell_len(cell))
+        parts.append(padding + cell if column.is_number else cell + padding)
+    return (" " * GAP).join(parts).rstrip()
+
+
+def _records(columns: Sequence[ShownColumn], width: int) -> Iterator[str]:
+    label = max(cell_len(column.title) for column in columns)
+    room = max(10, width - label - GAP)
+    count = len(columns[0].cells)
+    for number in range(count):
+        if count > 1:
+            head = f"── {number + 1} "
+            yield head + "─" * (min(width, label + GAP + 20) - len(head))
+        for column in columns:
+            first, *more = wrap(column.cells[number], room)
+            yield f"{column.title:<{label}}  {first}".rstrip()
+            for line in more:
+                yield " " * (label + GAP) + line
+
+
+def _paths(paths: Sequence[str], width: int) -> Iterator[str]:
+    labels = ["path"] if len(paths) == 1 else [f"path {n + 1}" for n in range(len(paths))]
+    indent = max(map(len, labels)) + GAP
+    before: list[str] = []
+    for number, (label, path) in enumerate(zip(labels, paths, strict=True)):
+        steps = path.split(ARROW)
+        shared = _shared(before, steps)
+        text = path
+        if shared > _SPARED:
+            text = f"(as {number} to {steps[shared - 1]})" + "".join(
+                ARROW + step for step in steps[shared:]
+            )
+        for place, line in enumerate(wrap_path(text, max(20, width - indent))):
+            yield f"{'' if place else label:<{indent}}{line}"
+        before = steps
+
+
+def _shared(left: Sequence[str], right: Sequence[str]) -> int:
+    count = 0
+    for one, other in zip(left, right, strict=False):
+        if one != other:
+            break
+        count += 1
+    return count

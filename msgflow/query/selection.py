@@ -1,0 +1,236 @@
+"""Which rows of a query somebody wants, in which order and how many: a SELECT around its SQL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import column_named
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from msgflow.query.header import Header
+    from msgflow.query.value import Value
+
+# What columns name, as the headers of queries have it in the place of a unit.
+KINDS = ("node", "topic", "callback", "host")
+PATH = "path"
+INTERNAL_COLUMN = "is_internal"
+CUT_COLUMN = "is_cut"
+# Columns beside those of the query; the last is missing where no row is left.
+COUNTS = ("msgflow total", "msgflow hidden", "msgflow cut")
+PLACE = "msgflow place"
+_SEPARATOR = {PATH: " → "}
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which rows of a result are wanted.
+
+    Attributes:
+        node: names of nodes, or globs: rows that name any of them.
+        topic: likewise topics.
+        callback: likewise callbacks, as msgflow names them: 'Timer(*)'.
+        host: likewise hosts.
+        via: nodes, topics or services: paths that visit all of them.
+        without: paths that visit none of them.
+        where: a condition in SQL, already known to read only.
+        sort: columns, each with ':desc' or ':asc' behind it or not.
+        limit: most rows; all when None.
+        slowest: so many of the slowest rows; all when None.
+    """
+
+    node: tuple[str, ...] = ()
+    topic: tuple[str, ...] = ()
+    callback: tuple[str, ...] = ()
+    host: tuple[str, ...] = ()
+    via: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    where: str | None = None
+    sort: tuple[str, ...] = ()
+    limit: int | None = None
+    slowest: int | None = None
+
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """Return the wanted names by what they are of; 'place' is a node, topic or service."""
+        given = {kind: getattr(self, kind) for kind in KINDS} | {"place": self.via + self.without}
+        return {kind: names for kind, names in given.items() if names}
+
+
+def selected(header: Header, selection: Selection, internal: bool) -> tuple[str, dict[str, Value]]:
+    """Return the SQL of a query with the selection around it, and what to bind besides.
+
+    The columns COUNTS and PLACE come after those of the query: how many rows there were before
+    the limit, how many internal ones were left out, how many are cut off. There is one row at
+    least; where PLACE is NULL in it, no row was selected.
+
+    Raises:
+        UsageError: the query has no such rows or columns.
+    """
+    names = [column.name for column in header.columns]
+    conditions, bindings = _conditions(header, selection)
+    if selection.where is not None:
+        # A comment at its end ends with the line.
+        conditions.append(f"(\n{selection.where}\n)")
+    is_hidden = f"coalesce({INTERNAL_COLUMN}, false)" if INTERNAL_COLUMN in names else "false"
+    if internal:
+        is_hidden = "false"
+    is_cut = CUT_COLUMN if CUT_COLUMN in names else "false"
+    order = [*_order(header, selection), f'"{PLACE}"']
+    limit = selection.limit if selection.slowest is None else selection.slowest
+    total, hidden, cut = (f'"{name}"' for name in COUNTS)
+    sql = f"""
+WITH numbered AS (
+    SELECT *, row_number() OVER () AS "{PLACE}" FROM (
+{header.body.rstrip().rstrip(";")}
+    )
+),
+wanted AS MATERIALIZED (
+    SELECT * FROM numbered AS result WHERE {" AND ".join(conditions) or "true"}
+),
+counted AS (
+    SELECT
+        count(*) FILTER (WHERE NOT {is_hidden}) AS {total},
+        count(*) FILTER (WHERE {is_hidden}) AS {hidden},
+        count(*) FILTER (WHERE {is_cut}) AS {cut}
+    FROM wanted
+),
+shown AS (
+    SELECT * FROM wanted WHERE NOT {is_hidden}
+    ORDER BY {", ".join(order)} {"" if limit is None else f"LIMIT {int(limit)}"}
+)
+SELECT s.*, {total}, {hidden}, {cut}
+FROM counted
+LEFT JOIN shown AS s ON true
+ORDER BY {", ".join(f"s.{part}" for part in order)}
+"""
+    return sql, bindings
+
+
+def _conditions(header: Header, selection: Selection) -> tuple[list[str], dict[str, Value]]:
+    conditions: list[str] = []
+    bindings: dict[str, Value] = {}
+    for kind in KINDS:
+        if names := getattr(selection, kind):
+            columns = columns_of(header, kind)
+            if not columns:
+                raise UsageError(
+                    f"{header.name} has no column with a {kind} — --{kind} {names[0]}",
+                    _what_it_has(header),
+                )
+            bindings[f"selected_{kind}"] = list(names)
+            any_of = " OR ".join(
+                _is_any(header, column, f"$selected_{kind}", kind) for column in columns
+            )
+            conditions.append(f"({any_of})")
+    for word in ("via", "without"):
+        if names := getattr(selection, word):
+            if not columns_of(header, PATH):
+                raise UsageError(
+                    f"{header.name} has no paths — --{word} {names[0]}", _what_it_has(header)
+                )
+            bindings[f"selected_{word}"] = list(names)
+            conditions.append(_visits(header, word))
+    return conditions, bindings
+
+
+def columns_of(header: Header, kind: str) -> list[str]:
+    """Return the columns of a query that name a node, topic, callback, host or path."""
+    return [column.name for column in header.columns if column.unit == kind]
+
+
+def _parts(header: Header, column: str, kind: str) -> str:
+    """Return the names in a column, a list."""
+    (kept,) = (known for known in header.columns if known.name == column)
+    if kept.type.endswith("[]"):
+        return f'result."{column}"'
+    return f"string_split(result.\"{column}\", '{_SEPARATOR.get(kind, ', ')}')"
+
+
+def _is_any(header: Header, column: str, patterns: str, kind: str) -> str:
+    """Return the condition that one of the names in a column is one of the patterns."""
+    return (
+        f"coalesce(list_bool_or(list_transform({_parts(header, column, kind)}, lambda name:"
+        f" list_bool_or(list_transform({patterns}, lambda each:"
+        " name = each OR name GLOB each)))), false)"
+    )
+
+
+def _visits(header: Header, word: str) -> str:
+    (column,) = columns_of(header, PATH)
+    steps = _parts(header, column, PATH)
+    # Services stand in parentheses there.
+    visited = (
+        f"list_transform($selected_{word}, lambda each: list_bool_or(list_transform({steps},"
+        " lambda name: name = each OR name GLOB each OR trim(name, '()') GLOB each)))"
+    )
+    if word == "via":
+        return f"coalesce(list_bool_and({visited}), false)"
+    return f"NOT coalesce(list_bool_or({visited}), false)"
+
+
+def _order(header: Header, selection: Selection) -> list[str]:
+    if selection.slowest is not None:
+        if header.slowest is None:
+            raise UsageError(
+                f"the rows of {header.name} are not slow or fast — --slowest",
+                "--sort COLUMN:desc --limit N",
+            )
+        if selection.sort or selection.limit is not None:
+            raise UsageError("--slowest N goes without --sort and --limit", "leave them out")
+        return [f'"{header.slowest}" DESC NULLS LAST']
+    return [_sorted(header, text) for text in selection.sort]
+
+
+def _sorted(header: Header, text: str) -> str:
+    name, _, direction = text.partition(":")
+    if direction not in ("", "asc", "desc"):
+        raise UsageError(f"rows are sorted asc or desc — {text}", f"--sort {name}:desc")
+    column = column_named(name, [column.name for column in header.columns])
+    return f'"{column}" {"DESC" if direction == "desc" else "ASC"} NULLS LAST'
+
+
+def _what_it_has(header: Header) -> str:
+    options = [f"--{kind}" for kind in KINDS if columns_of(header, kind)]
+    if columns_of(header, PATH):
+        options += ["--via", "--without"]
+    if any(param.name == "from" for param in header.params):
+        options += ["--from", "--to"]
+    if options:
+        return f"it has {', '.join(options)}; --where takes a condition on any column"
+    return "--where takes a condition on any of its columns"
+
+
+def values_of(given: str | Sequence[str] | None) -> tuple[str, ...]:
+    """Return names that a user gave: one, several, or several in one text, between commas."""
+    if given is None:
+        return ()
+    texts = [given] if isinstance(given, str) else list(given)
+    return tuple(part.strip() for text in texts for part in text.split(",") if part.strip())
+
+
+def make_selection(given: Mapping[str, object]) -> Selection:
+    """Return the selection that the words of `Database.query` mean.
+
+    Raises:
+        UsageError: a limit below one, or a word of another kind.
+    """
+    words: dict[str, object] = {}
+    for word, value in given.items():
+        if word in ("limit", "slowest"):
+            if value is not None and (not isinstance(value, int) or value < 1):
+                raise UsageError(f"--{word} is at least 1 — {value}", f"--{word} 10")
+            words[word] = value
+        elif word == "where":
+            words[word] = value
+        elif value is None or isinstance(value, str) or _is_texts(value):
+            words[word] = values_of(value)  # type: ignore[arg-type]
+        else:
+            raise UsageError(f"{word} is a name or several — {value}", f"{word}='/a*'")
+    return Selection(**words)  # type: ignore[arg-type]
+
+
+def _is_texts(value: object) -> bool:
+    return isinstance(value, list | tuple) and all(isinstance(each, str) for each in value)

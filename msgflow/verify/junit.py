@@ -1,0 +1,63 @@
+"""Verdicts as JUnit XML, which every CI server shows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from msgflow.query.human import format_duration, printable
+from msgflow.query.window import format_epoch
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from msgflow.verify.verify import Verification
+
+
+def junit_xml(verification: Verification, *, allow_not_measured: bool) -> str:
+    """Return a document with one test case per requirement and thing that it is of.
+
+    Args:
+        verification: the verdicts.
+        allow_not_measured: what was not measured is skipped, else an error.
+    """
+    rows: list[dict[str, Any]] = verification.result.to_arrow().to_pylist()
+    missing = "skipped" if allow_not_measured else "errors"
+    counts = {"tests": len(rows), "failures": 0, "errors": 0, "skipped": 0}
+    counts["failures"] = sum(row["verdict"] == "failed" for row in rows)
+    counts[missing] = sum(row["verdict"] == "not measured" for row in rows)
+    numbers = {name: str(number) for name, number in counts.items()}
+    root = ElementTree.Element("testsuites", {"name": "msgflow verify", **numbers})
+    name = printable(verification.run.name)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": name, **numbers})
+    for row in rows:
+        # Names come from traces and files: characters that XML cannot hold stand there escaped.
+        case = ElementTree.SubElement(
+            suite,
+            "testcase",
+            {
+                "classname": printable(row["path"] or row["subject"] or row["target"]),
+                "name": printable(f"{row['metric']} {row['condition']}"),
+            },
+        )
+        if row["verdict"] == "failed":
+            failure = ElementTree.SubElement(
+                case, "failure", {"type": "failed", "message": f"measured {row['measured']}"}
+            )
+            failure.text = printable(_worst(row))
+        elif row["verdict"] == "not measured":
+            tag = "skipped" if allow_not_measured else "error"
+            attributes = {"message": printable(row["reason"])}
+            if tag == "error":
+                attributes["type"] = "not measured"
+            ElementTree.SubElement(case, tag, attributes)
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}'
+
+
+def _worst(row: dict[str, Any]) -> str:
+    if row["worst_at_ns"] is None:
+        return ""
+    took = "" if row["worst_ns"] is None else f"{format_duration(row['worst_ns'])} "
+    return f"worst: {took}at {format_epoch(row['worst_at_ns'])}, see {row['see']}"

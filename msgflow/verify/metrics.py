@@ -1,0 +1,212 @@
+"""What can be required of what: each metric is an expression over the columns of a named query."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from msgflow.verify.condition import Dimension
+
+_ALL = ("min", "median", "mean", "p95", "p99", "max")
+_HIGH = ("median", "p95", "p99", "max")
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One thing that is measured.
+
+    Attributes:
+        query: the named query that measures it.
+        value: SQL over its columns; `{}` stands for the statistic.
+        dimension: of the value.
+        statistics: that there are; none where it is one value.
+        samples: SQL over its columns: how many values it is from.
+        worst: which worst case explains that it is exceeded, a key of `worst.WORST`.
+        missing: why there may be no value.
+    """
+
+    query: str
+    value: str
+    dimension: Dimension
+    statistics: tuple[str, ...] = ()
+    samples: str = "count"
+    worst: str | None = None
+    missing: str = "too few values in the time window"
+
+
+@dataclass(frozen=True)
+class Filter:
+    """How a field of a target chooses rows: the columns of each query that it is compared with.
+
+    Attributes:
+        columns: by query; one of them has to match.
+        names: SQL that gives the names that a run ($run_id) has.
+        what: such a name, in errors.
+    """
+
+    columns: dict[str, tuple[str, ...]]
+    names: str
+    what: str
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A kind of thing that has requirements.
+
+    Attributes:
+        metrics: by name.
+        label: by query, SQL that names a row.
+        filters: by field of the file; the first is the subject itself, others are optional.
+    """
+
+    metrics: dict[str, Metric]
+    label: dict[str, str]
+    filters: dict[str, Filter] = field(default_factory=dict)
+
+
+_TOPICS = """
+SELECT topic_name FROM main.publisher WHERE run_id = $run_id
+UNION SELECT topic_name FROM main.subscription WHERE run_id = $run_id
+"""
+_SERVICES = """
+SELECT service_name FROM main.service WHERE run_id = $run_id
+UNION SELECT service_name FROM main.client WHERE run_id = $run_id
+"""
+_NODES = "SELECT DISTINCT node FROM main.callback_label WHERE run_id = $run_id"
+_TIMERS = """
+SELECT DISTINCT l.node
+FROM main.callback_label AS l
+JOIN main.callback AS c ON l.callback_id = c.callback_id
+WHERE l.run_id = $run_id AND c.kind = 'timer'
+"""
+_CALLBACKS = "SELECT DISTINCT label FROM main.callback_label WHERE run_id = $run_id"
+_PROCESSES = "SELECT DISTINCT name FROM main.process WHERE run_id = $run_id"
+_NOT_DUE = "when it was due is not known: one call only, or its creation was not recorded"
+_ARRIVALS = "reached + superseded + lost"
+
+PATH = "path"
+SUBJECTS: dict[str, Subject] = {
+    PATH: Subject(
+        {
+            "latency": Metric(
+                "e2e-latency", "{}_ns", Dimension.TIME, _ALL, "pairs", "flow",
+                "no flow reached the end of the path in the time window",
+            ),
+            "reaction_time": Metric("reaction-time", "{}_ns", Dimension.TIME, _ALL, "intervals"),
+            "age": Metric("data-age", "{}_ns", Dimension.TIME, _ALL, "outputs"),
+            "completeness": Metric(
+                "e2e-latency", f"reached / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS
+            ),
+            "loss": Metric(
+                "e2e-latency", f"lost / nullif({_ARRIVALS}, 0)", Dimension.SHARE, (), _ARRIVALS,
+                "lost_flow",
+            ),
+        },
+        dict.fromkeys(("e2e-latency", "reaction-time", "data-age"), "path"),
+    ),
+    "timer": Subject(
+        {
+            "rate": Metric("timers", "rate_hz", Dimension.RATE),
+            "jitter": Metric("timers", "jitter_{}_ns", Dimension.TIME, _HIGH, worst="late_call"),
+            "lateness": Metric(
+                "timers", "lateness_{}_ns", Dimension.TIME, _HIGH,
+                "count - unknown - loss_affected", "late_call", _NOT_DUE,
+            ),
+            "missed": Metric(
+                "timers", "missed", Dimension.COUNT, worst="late_call", missing=_NOT_DUE
+            ),
+            "bunched": Metric("timers", "bunched", Dimension.COUNT, worst="late_call"),
+        },
+        {"timers": "node || ' ' || callback"},
+        {
+            "timer": Filter({"timers": ("node",)}, _TIMERS, "node with timers"),
+            "callback": Filter({"timers": ("callback", "symbol")}, _CALLBACKS, "callback"),
+        },
+    ),
+    "callback": Subject(
+        {
+            "duration": Metric(
+                "callback-duration", "{}_ns", Dimension.TIME, _ALL, "count - open", "callback"
+            ),
+            "period": Metric(
+                "callback-duration", "period_{}_ns", Dimension.TIME, ("min", "median", "max")
+            ),
+            "wait": Metric("executor-wait", "wait_{}_ns", Dimension.TIME, ("median", "max")),
+        },
+        dict.fromkeys(("callback-duration", "executor-wait"), "node || ' ' || callback"),
+        {
+            "callback": Filter(
+                {"callback-duration": ("callback", "symbol"), "executor-wait": ("callback",)},
+                _CALLBACKS, "callback",
+            ),
+            "node": Filter(
+                {"callback-duration": ("node",), "executor-wait": ("node",)}, _NODES, "node"
+            ),
+        },
+    ),
+    "topic": Subject(
+        {
+            "rate": Metric("publication-rate", "rate_hz", Dimension.RATE),
+            "period": Metric(
+                "publication-rate", "period_{}_ns", Dimension.TIME, ("min", "median", "p95", "max")
+            ),
+            "jitter": Metric("publication-rate", "period_deviation_ns", Dimension.TIME),
+            "latency": Metric(
+                "transport-latency", "{}_ns", Dimension.TIME, _ALL, "linked", "message"
+            ),
+            "loss": Metric(
+                "delivery", "lost / nullif(published - unconnected, 0)", Dimension.SHARE, (),
+                "published - unconnected",
+            ),
+            "completeness": Metric(
+                "delivery", "delivered_percent / 100", Dimension.SHARE, (),
+                "published - unconnected",
+            ),
+        },
+        {
+            "publication-rate": "publisher || ' → ' || topic_name",
+            "transport-latency": "topic_name || ' → ' || subscriber",
+            "delivery": "topic_name || ' → ' || subscriber",
+        },
+        {
+            "topic": Filter(
+                dict.fromkeys(("publication-rate", "transport-latency", "delivery"),
+                              ("topic_name",)), _TOPICS, "topic",
+            ),
+            "node": Filter(
+                {
+                    "publication-rate": ("publisher",),
+                    "transport-latency": ("subscriber",),
+                    "delivery": ("subscriber",),
+                },
+                "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
+            ),
+        },
+    ),
+    "service": Subject(
+        {
+            "round_trip": Metric(
+                "service-latency", "round_trip_{}_ns", Dimension.TIME, _ALL, "answered", "request"
+            ),
+            "completeness": Metric(
+                "service-latency", "answered / nullif(requests, 0)", Dimension.SHARE, (), "requests"
+            ),
+        },
+        {"service-latency": "coalesce(client, '?') || ' → ' || service_name"},
+        {
+            "service": Filter({"service-latency": ("service_name",)}, _SERVICES, "service"),
+            "node": Filter(
+                {"service-latency": ("client",)},
+                "SELECT DISTINCT full_name FROM main.node WHERE run_id = $run_id", "node",
+            ),
+        },
+    ),
+    "process": Subject(
+        {
+            "utilisation": Metric(
+                "executor-usage", "callback_share", Dimension.SHARE, (), "callbacks"
+            ),
+        },
+        {"executor-usage": "printf('%s, thread %d', process, tid)"},
+        {"process": Filter({"executor-usage": ("process",)}, _PROCESSES, "process")},
+    ),
+}  # fmt: skip

@@ -1,0 +1,143 @@
+"""A file of requirements that a good run meets, for its author to review."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from msgflow.verify.condition import UNITS, Dimension
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from msgflow.query.window import Run
+
+Row = dict[str, Any]
+# With fewer values a percentile is only the largest of them.
+LEAST_VALUES = 20
+# What starts with a pause or comes in bursts has no rate.
+_STEADY = 0.25
+_RATE_PERCENT = 5
+# What the operating system alone may take to wake a thread.
+_LEAST_LATENESS_NS = 1_000_000
+
+
+def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: float) -> str:
+    """Return the text of a file that `read_targets` reads, and that the run meets.
+
+    Args:
+        run: that was measured.
+        results: rows of the named queries `e2e-latency`, `timers`, `publication-rate` and
+            `service-latency`, by name.
+        margin: by how much more than measured is allowed, as a share.
+    """
+    entries = [
+        *_paths(results["e2e-latency"], margin),
+        *_timers(results["timers"], margin),
+        *_topics(results["publication-rate"]),
+        *_services(results["service-latency"], margin),
+    ]
+    lines = [
+        f"# What run {json.dumps(run.name)} met, and {100 * margin:.4g} % more: review it, keep"
+        " what matters.",
+        "targets:" if entries else "targets: []",
+    ]
+    for kind, name, requirements in entries:
+        lines.append(f"  - {kind}: {name}")
+        lines += [f'    {metric}: "{text}"' for metric, text in requirements.items()]
+    return "\n".join(lines)
+
+
+Entry = tuple[str, str, dict[str, str]]
+
+
+def _paths(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
+    """Yield a target per first and last topic, which all paths between the two have to meet."""
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        parts = row["path"].split(" → ")
+        # A service that is called has brackets.
+        if len(parts) > 4 and parts[1].startswith("/") and parts[-2].startswith("/"):
+            groups.setdefault((parts[1], parts[-2]), []).append(row)
+    for ends, group in groups.items():
+        if ends[0] == ends[1] or any(row["pairs"] < LEAST_VALUES for row in group):
+            continue
+        slow = max(row["p99_ns"] for row in group)
+        share = min(
+            row["reached"] / (row["reached"] + row["superseded"] + row["lost"]) for row in group
+        )
+        least = math.floor(100 * share * (1 - margin / 10))
+        yield (
+            "path",
+            json.dumps(ends, ensure_ascii=False),
+            {"latency": f"p99 < {_time(slow, margin)}", "completeness": f">= {least} %"},
+        )
+
+
+def _timers(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
+    for (node, callback), group in _grouped(rows, "node", "callback"):
+        known = [row for row in group if row["count"] >= LEAST_VALUES]
+        if not known or len(known) < len(group):
+            continue
+        requirements = {}
+        rates = [row["rate_hz"] for row in known]
+        if max(rates) - min(rates) <= 2 * _RATE_PERCENT / 100 * min(rates):
+            requirements["rate"] = _around(rates)
+        if all(row["lateness_p99_ns"] is not None for row in known):
+            late = max(_LEAST_LATENESS_NS, *(row["lateness_p99_ns"] for row in known))
+            requirements["lateness"] = f"p99 < {_time(late, margin)}"
+        if requirements:
+            name = json.dumps(_literal(node), ensure_ascii=False)
+            label = json.dumps(_literal(callback), ensure_ascii=False)
+            yield "timer", f"{name}\n    callback: {label}", requirements
+
+
+def _topics(rows: Sequence[Row]) -> Iterator[Entry]:
+    for (topic, node), group in _grouped(rows, "topic_name", "publisher"):
+        if topic is None or not node.startswith("/") or len(group) > 1:
+            continue
+        row = group[0]
+        if row["count"] < LEAST_VALUES or row["period_deviation_ns"] is None:
+            continue
+        if row["period_deviation_ns"] * row["rate_hz"] <= _STEADY * 1e9:
+            name = json.dumps(_literal(topic), ensure_ascii=False)
+            publisher = json.dumps(_literal(node), ensure_ascii=False)
+            yield "topic", f"{name}\n    node: {publisher}", {"rate": _around([row["rate_hz"]])}
+
+
+def _services(rows: Sequence[Row], margin: float) -> Iterator[Entry]:
+    for (service,), group in _grouped(rows, "service_name"):
+        if service is None or any(row["answered"] < LEAST_VALUES for row in group):
+            continue
+        slow = max(row["round_trip_p99_ns"] for row in group)
+        name = json.dumps(_literal(service), ensure_ascii=False)
+        yield "service", name, {"round_trip": f"p99 < {_time(slow, margin)}"}
+
+
+def _grouped(rows: Sequence[Row], *keys: str) -> list[tuple[tuple[Any, ...], list[Row]]]:
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in keys), []).append(row)
+    return list(groups.items())
+
+
+def _literal(name: str) -> str:
+    """Return a pattern that means one name only."""
+    return "".join(f"[{character}]" if character in "*?[" else character for character in name)
+
+
+def _around(rates: Sequence[float]) -> str:
+    middle = (max(rates) + min(rates)) / 2
+    return f"{middle:.4g} Hz ± {_RATE_PERCENT} %"
+
+
+def _time(duration_ns: int, margin: float) -> str:
+    """Return a little more than a duration, rounded up to two digits, with its unit."""
+    allowed = max(1.0, duration_ns * (1 + margin)) + 1
+    unit, size = max(
+        ((unit, size) for unit, size in UNITS[Dimension.TIME].items() if size <= allowed),
+        key=lambda item: item[1],
+    )
+    step = 10 ** (math.floor(math.log10(allowed / size)) - 1)
+    return f"{math.ceil(allowed / size / step) * step:.6g} {unit}"

@@ -1,0 +1,324 @@
+"""Holds the requirements of a file against a run; named queries measure everything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from fnmatch import fnmatchcase
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msgflow.query.catalogue import load_query, nearest
+from msgflow.query.header import Column, Header, Param
+from msgflow.query.result import QueryResult
+from msgflow.query.run import read_runs, run_query
+from msgflow.query.window import Run, choose_one, time_window
+from msgflow.verify.condition import format_value
+from msgflow.verify.metrics import PATH, SUBJECTS
+from msgflow.verify.worst import FLOWS, KEYS, Worst, find_worst, worst_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import duckdb
+
+    from msgflow.query.value import Value
+    from msgflow.verify.file import Requirement, Target, TargetsFile
+    from msgflow.yaml_file import Text
+
+
+class Verdict(StrEnum):
+    """Whether a requirement is met."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_MEASURED = "not measured"
+
+
+_ORDER = (Verdict.FAILED, Verdict.NOT_MEASURED, Verdict.PASSED)
+_COLUMNS = (
+    Column("verdict", "VARCHAR", None, "'passed', 'failed' or 'not measured'"),
+    Column("target", "VARCHAR", None, "What the file calls it"),
+    Column("subject", "VARCHAR", None, "What of the run it is; NULL: nothing there"),
+    Column("metric", "VARCHAR", None, "What is required"),
+    Column("condition", "VARCHAR", None, "As it was written"),
+    Column("measured", "VARCHAR", None, "What was measured, for people"),
+    Column("value", "DOUBLE", None, "What was measured, in `unit`"),
+    Column("unit", "VARCHAR", None, "'ns', 'Hz', 'share' (0 to 1) or 'count'"),
+    Column("samples", "BIGINT", None, "How many values it is from"),
+    Column("reason", "VARCHAR", None, "Why it was not measured"),
+    Column("worst_ns", "BIGINT", "ns", "The worst case of what is too long or lost"),
+    Column("worst_at_ns", "BIGINT", "epoch ns", "When that began"),
+    Column("see", "VARCHAR", None, "The command that shows it"),
+    Column("line", "BIGINT", None, "Line of the file"),
+    Column("path", "VARCHAR", None, "Nodes and topics of a path"),
+)
+_HEADER = Header(
+    name="verify", title="Requirements", description="Whether a run meets its requirements.",
+    grain="one row per requirement and thing that it is of", kind="view", params=(),
+    columns=_COLUMNS, needs=(), severity=None, cause=None, cure=None, note=None, body="",
+    path=Path(),
+    brief=("verdict", "subject", "metric", "condition", "measured", "reason", "worst_ns", "see",
+           "worst_at_ns", "target"),
+)  # fmt: skip
+_LOST = "SELECT sum(discarded_event_count)::BIGINT FROM main.trace WHERE run_id = $run_id"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The verdicts on a run.
+
+    Attributes:
+        result: one row per requirement and thing that it is of; columns as of its header.
+        run: the run.
+    """
+
+    result: QueryResult
+    run: Run
+
+    def __str__(self) -> str:
+        return str(self.result)
+
+    def _repr_html_(self) -> str:
+        return self.result._repr_html_()
+
+    def count(self, verdict: str) -> int:
+        """Return how many requirements have a verdict: 'passed', 'failed' or 'not measured'."""
+        verdicts: list[str] = self.result.table["verdict"].to_pylist()
+        return verdicts.count(Verdict(verdict))
+
+    def to_junit(self, *, allow_not_measured: bool = False) -> str:
+        """Return the verdicts as JUnit XML: what was not measured is an error, or skipped."""
+        from msgflow.verify.junit import junit_xml
+
+        return junit_xml(self, allow_not_measured=allow_not_measured)
+
+
+def verify(
+    connection: duckdb.DuckDBPyConnection,
+    targets: TargetsFile,
+    *,
+    run: str | int | None = None,
+    start: str | int | None = None,
+    end: str | int | None = None,
+    skip_first: float | None = None,
+) -> Verification:
+    """Return whether a run meets the requirements of a file.
+
+    Args:
+        connection: to a database with the public views.
+        targets: the requirements.
+        run: a name or an id; the latest run when None.
+        start: begin of the time window: epoch ns, an offset from the run's start, or ISO time.
+        end: its end, likewise.
+        skip_first: seconds to leave out at the begin of the run.
+
+    Raises:
+        UsageError: no such run, time, topic, node, callback, service or process.
+        QueryError: the database could not run a query.
+    """
+    one = choose_one(read_runs(connection), run, "a verification")
+    window = time_window((one,), start, end, skip_first)
+    _require_names(connection, targets, one)
+    work = _Work(connection, one, window)
+    rows = [row for target in targets.targets for row in work.rows(target)]
+    # What is to be looked at comes first, else the order of the file.
+    rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
+    import pyarrow as pa
+
+    types = {"VARCHAR": pa.string(), "DOUBLE": pa.float64(), "BIGINT": pa.int64()}
+    schema = pa.schema([(column.name, types[column.type]) for column in _COLUMNS])
+    notes = list(work.notes)
+    lost = connection.execute(_LOST, {"run_id": one.run_id}).fetchall()[0][0]
+    if lost:
+        notes.append(f"the trace lost {lost:,} events, so that values may be wrong: msgflow check")
+    table = pa.Table.from_pylist(rows, schema=schema)
+    return Verification(QueryResult(table, _HEADER, (one,), notes), one)
+
+
+class _Work:
+    """Measures the targets one after the other."""
+
+    def __init__(
+        self, connection: duckdb.DuckDBPyConnection, run: Run, window: tuple[int, int]
+    ) -> None:
+        self._connection = connection
+        self._run = run
+        self._window = window
+        self.notes: dict[str, None] = {}
+
+    def rows(self, target: Target) -> Iterator[dict[str, Any]]:
+        """Yield the verdicts on a target, in the order of the file."""
+        metrics = SUBJECTS[target.kind].metrics
+        found: list[tuple[int, int, dict[str, Any]]] = []
+        numbered = list(enumerate(target.requirements))
+
+        def query_of(item: tuple[int, Requirement]) -> str:
+            return metrics[item[1].metric].query
+
+        for name, group in groupby(sorted(numbered, key=query_of), key=query_of):
+            asked = list(group)
+            measured = self._measure(target, name, [requirement for _, requirement in asked])
+            for place, (number, requirement) in enumerate(asked):
+                if not measured:
+                    found.append((number, 0, self._missing(target, requirement)))
+                for position, row in enumerate(measured):
+                    found.append((number, position, self._row(target, requirement, row, place)))
+        yield from (row for _, _, row in sorted(found, key=lambda item: item[:2]))
+
+    def _measure(
+        self, target: Target, name: str, requirements: Sequence[Requirement]
+    ) -> list[dict[str, Any]]:
+        """Return the values of all requirements that one query measures, a row per thing."""
+        subject = SUBJECTS[target.kind]
+        columns = [f"{subject.label[name]} AS subject"]
+        for place, requirement in enumerate(requirements):
+            metric = subject.metrics[requirement.metric]
+            value = metric.value.format(requirement.condition.statistic)
+            key = KEYS[metric.worst] if metric.worst else "NULL"
+            columns.append(f"({value})::DOUBLE AS value_{place}")
+            columns.append(f"({metric.samples})::BIGINT AS samples_{place}")
+            columns.append(f"{key} AS key_{place}")
+        given: dict[str, Value] = {}
+        if target.kind == PATH:
+            given["via"] = [topic.value for topic in target.topics]
+            where = ["list_has_all(string_split(path, ' → '), $via)"]
+        else:
+            where = [
+                self._matches(load_query(name), field, subject.filters[field].columns[name])
+                for field in target.chosen
+            ]
+            given = {f"wanted_{field}": text.value for field, text in target.chosen.items()}
+        sql = f"SELECT {', '.join(columns)} FROM ({{}}) WHERE {' AND '.join(where)} ORDER BY ALL"
+        return self._ask(name, sql, target, given)
+
+    @staticmethod
+    def _matches(header: Header, field: str, columns: tuple[str, ...]) -> str:
+        is_named = " OR ".join(f"{column} = $wanted_{field}" for column in columns)
+        is_meant = " OR ".join(f"{column} GLOB $wanted_{field}" for column in columns)
+        if any(column.name == "is_internal" for column in header.columns):
+            # What ROS does for itself is meant by its name only.
+            is_meant = f"({is_meant}) AND NOT is_internal"
+        return f"({is_named} OR ({is_meant}))"
+
+    def _ask(
+        self, name: str, sql: str, target: Target, given: dict[str, Value]
+    ) -> list[dict[str, Any]]:
+        """Return the rows of SQL around the body of a named query."""
+        header = load_query(name)
+        params = tuple(
+            Param(key, "VARCHAR[]" if isinstance(value, list) else "VARCHAR", None, True, "")
+            for key, value in given.items()
+        )
+        around = replace(
+            header,
+            body=sql.format(header.body.rstrip()),
+            params=header.params + params,
+            # Those of the named query are not in the answer.
+            columns=(),
+        )
+        own: dict[str, Value] = dict(given)
+        if target.kind == PATH:
+            own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
+        start, end = self._window
+        has_window = "$start_ns" in header.body
+        result = run_query(
+            self._connection,
+            around,
+            own,
+            run=self._run.run_id,
+            start=start if has_window else None,
+            end=end if has_window else None,
+            internal=True,
+        )
+        self.notes.update(dict.fromkeys(result.notes))
+        rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
+        return rows
+
+    def _row(
+        self, target: Target, requirement: Requirement, row: dict[str, Any], place: int
+    ) -> dict[str, Any]:
+        metric = SUBJECTS[target.kind].metrics[requirement.metric]
+        condition = requirement.condition
+        value = row[f"value_{place}"]
+        verdict = Verdict.NOT_MEASURED
+        worst: Worst | None = None
+        if value is not None:
+            verdict = Verdict.PASSED if condition.holds(value) else Verdict.FAILED
+            if condition.is_exceeded_by(value) and metric.worst:
+                worst = self._worst(target, metric.worst, row["subject"], row[f"key_{place}"])
+        return self._verdict(target, requirement) | {
+            "verdict": verdict,
+            "subject": target.name if target.kind == PATH else row["subject"],
+            "path": row["subject"] if target.kind == PATH else None,
+            "measured": None if value is None else format_value(value, metric.dimension),
+            "value": value,
+            "samples": row[f"samples_{place}"],
+            "reason": metric.missing if value is None else None,
+            "worst_ns": worst.duration_ns if worst else None,
+            "worst_at_ns": worst.at_ns if worst else None,
+            "see": worst.command if worst else None,
+        }
+
+    def _missing(self, target: Target, requirement: Requirement) -> dict[str, Any]:
+        if target.kind == PATH:
+            reason = "no message of the first topic led to the last one along this path"
+        else:
+            reason = f"nothing of this {target.kind} was measured in the time window"
+        return self._verdict(target, requirement) | {
+            "verdict": Verdict.NOT_MEASURED,
+            "reason": reason,
+        }
+
+    @staticmethod
+    def _verdict(target: Target, requirement: Requirement) -> dict[str, Any]:
+        return {
+            "target": target.name,
+            "metric": requirement.metric,
+            "condition": requirement.condition.text,
+            "unit": str(SUBJECTS[target.kind].metrics[requirement.metric].dimension),
+            "line": requirement.line,
+        }
+
+    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> Worst | None:
+        if kind not in FLOWS:
+            return find_worst(self._connection, kind, key, self._window)
+        rows = self._ask("flows", FLOWS[kind], target, {"subject": subject})
+        return worst_of(list(rows[0].values())) if rows else None
+
+
+def _require_names(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> None:
+    """Raise for the first name or pattern of the file that means nothing in the run."""
+    topics = SUBJECTS["topic"].filters["topic"]
+    known: dict[str, list[str]] = {}
+
+    def names(sql: str) -> list[str]:
+        if sql not in known:
+            rows = connection.execute(sql, {"run_id": run.run_id}).fetchall()
+            known[sql] = sorted(name for (name,) in rows if name is not None)
+        return known[sql]
+
+    def require(text: Text, sql: str, what: str, *, is_exact: bool) -> None:
+        there = names(sql)
+        if text.value in there:
+            return
+        if not is_exact and any(fnmatchcase(name, text.value) for name in there):
+            return
+        near = nearest(text.value, there)
+        hint = f"did you mean {' or '.join(near)}" if near else _some(what, there)
+        file.file.fail(text.line, f"the run has no such {what} — {text.value}", hint)
+
+    for target in file.targets:
+        for topic in target.topics:
+            require(topic, topics.names, topics.what, is_exact=True)
+        for field, text in target.chosen.items():
+            one = SUBJECTS[target.kind].filters[field]
+            require(text, one.names, one.what, is_exact=False)
+
+
+def _some(what: str, names: list[str]) -> str:
+    if not names:
+        return f"it has no {what} at all"
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return f"it has {', '.join(names[:5])}{more}"

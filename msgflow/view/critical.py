@@ -1,0 +1,68 @@
+"""The critical path of a picked flow: what the query critical-path says of it."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.run import run_query
+from msgflow.view.columns import encode
+from msgflow.view.page_query import run_page_query
+
+if TYPE_CHECKING:
+    import duckdb
+
+    from msgflow.query.window import Run
+
+
+def critical_path(
+    connection: duckdb.DuckDBPyConnection,
+    run: Run,
+    origin_ns: int,
+    kind: str,
+    number: int,
+    from_topic: str | None = None,
+) -> bytes:
+    """Return the pieces of the critical path (see `columns`), with the command that prints them.
+
+    It is that of the longest flow that ends where the picked one does, see critical_end.sql.
+
+    Args:
+        connection: to a database with the public views.
+        run: the run of what was picked.
+        origin_ns: what times count from, epoch ns.
+        kind: 'publication', 'take', 'callback_instance', 'request' or 'response'.
+        number: its identity.
+        from_topic: topic where the flow starts; that of its first message when None.
+    """
+    ends = run_page_query(connection, "critical_end", {"kind": kind, "id": number}).to_pylist()
+    if not ends:
+        return encode(pa.table({"at_ns": pa.array([], pa.int64())}))
+    (end,) = ends
+    asked = {
+        "from": from_topic or end["from_topic"],
+        "to": end["to_topic"],
+        "flow": end["take_id"],
+        "detail": "full",
+    }
+    header = load_query("critical-path")
+    result = run_query(connection, header, asked, run=str(run.run_id))
+    options = " ".join(
+        f"--{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in asked.items()
+    )
+    return encode(
+        result.to_arrow(),
+        meta={
+            "from": asked["from"],
+            "to": asked["to"],
+            "take_id": asked["flow"],
+            "notes": result.notes,
+            "columns": {column.name: column.description for column in header.columns},
+            "command": f"msgflow query critical-path {options} --run {shlex.quote(run.name)}",
+        },
+        origin_ns=origin_ns,
+        units=result.units,
+    )

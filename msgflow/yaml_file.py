@@ -1,0 +1,127 @@
+"""YAML files that users write by hand: every mistake is named with its line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from msgflow.errors import UsageError
+from msgflow.text_file import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Text:
+    """A text of the file, and the line it stands on, from 1."""
+
+    value: str
+    line: int
+
+
+@dataclass(frozen=True)
+class YamlFile:
+    """A file, read as a tree of nodes that know their lines.
+
+    Attributes:
+        path: the file.
+        example: of what it may say, for hints.
+        quoting: what is easily forgotten to be quoted, for the hint of what is not YAML.
+    """
+
+    path: Path
+    example: str
+    quoting: str
+
+    def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
+        """Raise the error of a line."""
+        raise UsageError(f"{self.path}, line {line}: {what}", hint)
+
+    def entries(self, name: str) -> list[Any]:
+        """Return the nodes of the list called `name`, the only thing in the file.
+
+        Raises:
+            UsageError: the file cannot be read, is not YAML, or of another form.
+        """
+        root = self._compose()
+        if root is None:
+            self.fail(1, "the file is empty", self.example)
+        entries = self.mapping(root, "the file", (name,), (), may_be_null=(name,))[name]
+        if is_null(entries):
+            return []
+        if entries.id != "sequence":
+            self.fail(line_of(entries), f"{name} is not a list", self.example)
+        return list(entries.value)
+
+    def mapping(
+        self,
+        node: Any,
+        what: str,
+        required: tuple[str, ...],
+        optional: tuple[str, ...],
+        may_be_null: tuple[str, ...] = (),
+    ) -> dict[str, Any]:
+        """Return the values of a mapping by name: all that are required, and no others."""
+        names = ", ".join(required + optional)
+        if node.id != "mapping":
+            self.fail(line_of(node), f"{what} is not a mapping with {names}", self.example)
+        fields: dict[str, Any] = {}
+        for key, value in node.value:
+            name = key.value if key.id == "scalar" else "…"
+            if name not in required + optional:
+                self.fail(line_of(key), f"{what} has no {name}", f"it has {names}")
+            if name in fields:
+                self.fail(line_of(key), f"{name} is given twice")
+            if is_null(value) and name not in may_be_null:
+                self.fail(line_of(key), f"{name} has no value", self.example)
+            fields[name] = value
+        for name in required:
+            if name not in fields:
+                self.fail(line_of(node), f"{what} lacks {name}", self.example)
+        return fields
+
+    def texts(self, node: Any, what: str, kind: str = "a name or a pattern") -> tuple[Text, ...]:
+        """Return the texts of a list, or a text alone."""
+        if node.id != "sequence":
+            return (self.text(node, what, kind),)
+        if not node.value:
+            self.fail(line_of(node), f"{what} is empty", self.example)
+        return tuple(self.text(item, what, kind) for item in node.value)
+
+    def optional(self, fields: Mapping[str, Any], name: str) -> Text | None:
+        """Return the text of a field that may be missing."""
+        return self.text(fields[name], name) if name in fields else None
+
+    def text(self, node: Any, what: str, kind: str = "a name or a pattern") -> Text:
+        """Return the text of a node."""
+        if node.id != "scalar" or is_null(node) or not str(node.value).strip():
+            self.fail(line_of(node), f"{what} is not {kind}", self.example)
+        return Text(str(node.value), line_of(node))
+
+    def _compose(self) -> Any:
+        """Return the tree of nodes of the only document, which know their lines."""
+        from ruamel.yaml import YAML
+        from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+        text = read_text(self.path, "cannot read the file", self.example)
+        try:
+            return YAML(typ="safe", pure=True).compose(text)
+        except MarkedYAMLError as error:
+            mark = error.problem_mark or error.context_mark
+            line = 1 if mark is None else mark.line + 1
+            what = " ".join(str(error.problem or error.context or "not YAML").split())
+            raise UsageError(f"{self.path}, line {line}: {what}", self.quoting) from error
+        except (YAMLError, RecursionError, ValueError) as error:
+            raise UsageError(f"not a YAML file — {self.path}", self.example) from error
+
+
+def line_of(node: Any) -> int:
+    """Return the line of a node, from 1."""
+    return int(node.start_mark.line) + 1
+
+
+def is_null(node: Any) -> bool:
+    """Tell whether a node says nothing."""
+    return str(node.tag) == "tag:yaml.org,2002:null"

@@ -1,0 +1,190 @@
+-- name: timers
+-- title: Whether timers keep their period, how late they are called, and why
+-- description: Jitter is how far the time from one start of the callback to the next differs from
+--     the period asked for (from the median, if the trace does not have the period). Lateness is
+--     the time from the moment at which the timer was due to the start of the callback. It is due
+--     at the first moment after its previous call that is a whole number of periods after its
+--     creation. Lateness does not add up: a call that is a period late or more replaces those that
+--     were due meanwhile (missed), and is followed by one sooner than usual (bunched). A timer
+--     waits for what its executor runs, else for the executor itself, or for a CPU. Calls after a
+--     gap of the trace are not counted in any of this.
+-- grain: one row per callback of a timer, called or not
+-- column: run_id BIGINT             Run
+-- column: node VARCHAR [node]       Node of the timer
+-- column: callback VARCHAR [callback]  The timer, by its period
+-- column: period_ns BIGINT [ns]     Period asked for; empty: not in the trace
+-- column: period_median_ns BIGINT [ns]  Median time from one start to the next
+-- column: rate_hz DOUBLE [Hz]       Calls per second, between the first and the last
+-- column: count BIGINT              Calls that began in the time window
+-- column: missed BIGINT             Calls that did not happen, since the one before was late by
+--     whole periods
+-- column: bunched BIGINT            Calls less than half a period after the one before
+-- column: jitter_median_ns BIGINT [ns]  Median of the jitter
+-- column: jitter_p95_ns BIGINT [ns]  95 % of the jitter values are at most this
+-- column: jitter_p99_ns BIGINT [ns]  99 % of the jitter values are at most this
+-- column: jitter_max_ns BIGINT [ns]  Greatest jitter
+-- column: lateness_median_ns BIGINT [ns]  Median lateness
+-- column: lateness_p95_ns BIGINT [ns]  95 % of the calls were at most this late
+-- column: lateness_p99_ns BIGINT [ns]  99 % of the calls were at most this late
+-- column: lateness_max_ns BIGINT [ns]  Greatest lateness
+-- column: busy_share DOUBLE         Share of all lateness for which the executor was busy with
+--     callbacks, 0 to 1
+-- column: meanwhile VARCHAR         What ran in that time: the three with the largest share, with
+--     their node if it is another one
+-- column: unknown BIGINT            Of count, those whose due moment is not known, such as the
+--     first call
+-- column: loss_affected BIGINT      Of count, those with a gap of the trace since the call before
+-- column: symbol VARCHAR            Function registered for the callback
+-- column: timer_id BIGINT           Identity of the timer
+-- column: callback_id BIGINT        Identity of the callback
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, jitter_p99_ns, meanwhile,
+--     lateness_median_ns, busy_share, rate_hz, bunched
+-- needs: main.callback, main.timer, main.callback_instance, main.callback_label,
+--     main.executor_thread, main.thread_break, main.executor_wait, main.executor_interference
+WITH asked AS (
+    SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns
+    FROM main.callback AS c
+    JOIN main.timer AS t ON c.timer_id = t.timer_id
+    WHERE list_contains($runs, c.run_id)
+),
+called AS (
+    SELECT
+        i.callback_id,
+        i.callback_instance_id,
+        x.executor_id,
+        i.start_ns,
+        lag(i.start_ns) OVER (
+            PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id
+        ) AS previous_ns
+    FROM main.callback_instance AS i
+    JOIN asked AS a ON i.callback_id = a.callback_id
+    LEFT JOIN main.executor_thread AS x ON i.thread_id = x.thread_id
+),
+broken AS (
+    SELECT x.executor_id, b.resumed_ns
+    FROM main.thread_break AS b
+    JOIN main.executor_thread AS x ON b.thread_id = x.thread_id
+),
+instance AS (
+    SELECT
+        c.callback_id,
+        c.callback_instance_id,
+        c.start_ns,
+        c.start_ns - c.previous_ns AS interval_ns,
+        coalesce(b.resumed_ns > c.previous_ns, false) AS is_loss_affected
+    FROM called AS c
+    ASOF LEFT JOIN broken AS b ON c.executor_id = b.executor_id AND c.start_ns >= b.resumed_ns
+    WHERE c.start_ns >= $start_ns AND c.start_ns < $end_ns
+),
+-- Behind a gap the call before may be missing, and with it when this one was due.
+late AS (
+    SELECT i.callback_id, i.callback_instance_id, w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns
+    FROM instance AS i
+    JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
+    WHERE w.since = 'timer' AND NOT i.is_loss_affected
+),
+usual AS (
+    SELECT callback_id, quantile_disc(interval_ns, 0.5) AS median_ns
+    FROM instance
+    WHERE NOT is_loss_affected
+    GROUP BY callback_id
+),
+kept AS (
+    SELECT
+        i.callback_id,
+        quantile_disc(
+            abs(i.interval_ns - coalesce(a.period_ns, u.median_ns)), [0.5, 0.95, 0.99, 1]
+        ) AS jitter,
+        count(*) FILTER (WHERE 2 * i.interval_ns < coalesce(a.period_ns, u.median_ns)) AS bunched
+    FROM instance AS i
+    JOIN asked AS a ON i.callback_id = a.callback_id
+    JOIN usual AS u ON i.callback_id = u.callback_id
+    WHERE i.interval_ns IS NOT NULL AND NOT i.is_loss_affected
+    GROUP BY i.callback_id
+),
+counted AS (
+    SELECT
+        callback_id,
+        count(*) AS count,
+        (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
+        count(*) FILTER (WHERE is_loss_affected) AS loss_affected
+    FROM instance
+    GROUP BY callback_id
+),
+delayed AS (
+    SELECT
+        l.callback_id,
+        count(*) AS known,
+        quantile_disc(l.lateness_ns, [0.5, 0.95, 0.99, 1]) AS lateness,
+        sum(l.lateness_ns // nullif(a.period_ns, 0))::BIGINT AS missed,
+        sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share
+    FROM late AS l
+    JOIN asked AS a ON l.callback_id = a.callback_id
+    GROUP BY l.callback_id
+),
+pair AS (
+    SELECT l.callback_id, r.callback_id AS meanwhile_id, sum(i.overlap_ns) AS overlap_ns
+    FROM main.executor_interference AS i
+    JOIN late AS l ON i.callback_instance_id = l.callback_instance_id
+    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
+    GROUP BY l.callback_id, r.callback_id
+),
+ranked AS (
+    SELECT
+        callback_id,
+        meanwhile_id,
+        overlap_ns / sum(overlap_ns) OVER (PARTITION BY callback_id) AS share,
+        row_number() OVER (
+            PARTITION BY callback_id ORDER BY overlap_ns DESC, meanwhile_id
+        ) AS place
+    FROM pair
+),
+meanwhile AS (
+    SELECT
+        r.callback_id,
+        string_agg(
+            CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
+            || printf('%s %.0f %%', o.label, 100 * r.share),
+            ', ' ORDER BY r.place
+        ) AS shares
+    FROM ranked AS r
+    JOIN main.callback_label AS l ON r.callback_id = l.callback_id
+    JOIN main.callback_label AS o ON r.meanwhile_id = o.callback_id
+    WHERE r.place <= 3 AND r.share >= 0.005
+    GROUP BY r.callback_id
+)
+SELECT
+    a.run_id,
+    n.node,
+    n.label AS callback,
+    a.period_ns,
+    u.median_ns AS period_median_ns,
+    c.rate_hz,
+    coalesce(c.count, 0) AS count,
+    d.missed,
+    k.bunched,
+    k.jitter[1] AS jitter_median_ns,
+    k.jitter[2] AS jitter_p95_ns,
+    k.jitter[3] AS jitter_p99_ns,
+    k.jitter[4] AS jitter_max_ns,
+    d.lateness[1] AS lateness_median_ns,
+    d.lateness[2] AS lateness_p95_ns,
+    d.lateness[3] AS lateness_p99_ns,
+    d.lateness[4] AS lateness_max_ns,
+    d.busy_share,
+    m.shares AS meanwhile,
+    coalesce(c.count - c.loss_affected - coalesce(d.known, 0), 0) AS unknown,
+    coalesce(c.loss_affected, 0) AS loss_affected,
+    a.symbol,
+    a.timer_id,
+    a.callback_id,
+    n.is_internal
+FROM asked AS a
+JOIN main.callback_label AS n ON a.callback_id = n.callback_id
+LEFT JOIN counted AS c ON a.callback_id = c.callback_id
+LEFT JOIN usual AS u ON a.callback_id = u.callback_id
+LEFT JOIN kept AS k ON a.callback_id = k.callback_id
+LEFT JOIN delayed AS d ON a.callback_id = d.callback_id
+LEFT JOIN meanwhile AS m ON a.callback_id = m.callback_id
+ORDER BY a.run_id, n.node, n.label, a.callback_id

@@ -1,0 +1,117 @@
+"""`msgflow runs`: what a database holds can be renamed and removed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+from ingested import contents
+from typer.testing import Result
+
+from msgflow.database import Database
+from msgflow.db.check import run_checks
+from msgflow.sim import simulate
+
+Msgflow = Callable[..., Result]
+
+
+@pytest.fixture
+def database(msgflow: Msgflow, tmp_path: Path) -> Path:
+    for seed, name in ((1, "before"), (2, "after")):
+        simulate("demo", tmp_path / name, factor=0.05, seed=seed)
+        result = msgflow("ingest", tmp_path / name, "--db", tmp_path / "two.duckdb")
+        assert result.exit_code == 0
+    return tmp_path / "two.duckdb"
+
+
+def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
+    """Return what each table has of a run."""
+    with duckdb.connect(str(database), read_only=True) as connection:
+        tables = connection.execute(
+            "SELECT table_name FROM duckdb_columns() "
+            "WHERE schema_name = 'store' AND column_name = 'run_id' ORDER BY 1"
+        ).fetchall()
+        return {
+            table: connection.execute(
+                f"FROM store.{table} WHERE run_id = ? ORDER BY ALL", [run_id]
+            ).fetchall()
+            for (table,) in tables
+        }
+
+
+def names(msgflow: Msgflow, database: Path) -> list[str]:
+    result = msgflow("runs", "list", "--format", "json", "--db", database)
+    assert result.exit_code == 0
+    assert "run:" not in result.stderr
+    return [row["name"] for row in json.loads(result.stdout)]
+
+
+def test_remove_leaves_the_others_as_they_were(
+    msgflow: Msgflow, database: Path, tmp_path: Path
+) -> None:
+    kept = of_run(database, 2)
+    result = msgflow("runs", "remove", "before", "--db", database)
+    assert result.exit_code == 0
+    assert result.stderr == "run 1 removed: before\n"
+    assert names(msgflow, database) == ["after"]
+    assert not any(of_run(database, 1).values())
+    assert of_run(database, 2) == kept
+    assert kept["publication"]
+    with Database(database) as opened:
+        assert opened.sql("SELECT DISTINCT run_id FROM publication").to_arrow().to_pylist() == [
+            {"run_id": 2}
+        ]
+        assert not any(check.row_count for check in run_checks(opened.connection, 2))
+    assert msgflow("ingest", tmp_path / "before", "--db", database).exit_code == 0
+    assert names(msgflow, database) == ["after", "before"]
+
+
+def test_remove_all_leaves_no_row(msgflow: Msgflow, database: Path) -> None:
+    assert msgflow("runs", "remove", "all", "--db", database).exit_code == 0
+    assert names(msgflow, database) == []
+    rows = contents(database)
+    # What the file itself is made of.
+    assert {table for table, found in rows.items() if found} == {"alembic_version", "definition"}
+
+
+def test_rename(msgflow: Msgflow, database: Path) -> None:
+    result = msgflow("runs", "rename", 1, "tuned", "--db", database)
+    assert result.exit_code == 0
+    assert result.stderr == "run 1 renamed: before is tuned\n"
+    assert names(msgflow, database) == ["tuned", "after"]
+    assert msgflow("runs", "rename", "tuned", "tuned", "--db", database).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("remove", "befor"), "there is no such run — befor"),
+        (("rename", "befor", "x"), "there is no such run — befor"),
+        (("rename", "before", "after"), "has a run of that name already — after"),
+        (("rename", "before", "all"), "takes for something else — 'all'"),
+        (("rename", "before", "7"), "takes for something else — '7'"),
+        (("rename", "all", "x"), "one run has one name — all"),
+    ],
+)
+def test_what_cannot_be_changed(
+    msgflow: Msgflow, database: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    result = msgflow("runs", *arguments, "--db", database)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert names(msgflow, database) == ["before", "after"]
+
+
+def test_a_name_with_escape_codes_is_text(msgflow: Msgflow, database: Path) -> None:
+    assert msgflow("runs", "rename", 1, "\x1b[31mred\n", "--db", database).exit_code == 0
+    result = msgflow("runs", "rename", 1, "plain", "--db", database)
+    assert "\\x1b[31mred" in result.stderr
+
+
+def test_a_missing_database_is_not_made(msgflow: Msgflow, tmp_path: Path) -> None:
+    assert msgflow("runs", "remove", "1", "--db", tmp_path / "none.duckdb").exit_code == 4
+    assert not (tmp_path / "none.duckdb").exists()

@@ -1,0 +1,75 @@
+"""`msgflow verify` and `msgflow targets`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from typer.testing import Result
+
+from msgflow.sim import simulate
+
+Msgflow = Callable[..., Result]
+
+
+@pytest.fixture
+def demo(msgflow: Msgflow, tmp_path: Path) -> Msgflow:
+    simulate("demo", tmp_path / "trace", factor=0.3)
+    assert msgflow("ingest", tmp_path / "trace", "--name", "good").exit_code == 0
+    return msgflow
+
+
+def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
+    file = tmp_path / "targets.yaml"
+    assert demo("targets", "suggest", "--run", "good", "-o", file).exit_code == 0
+    result = demo("verify", file, "good")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines()[0] == "run: good (1)"
+    assert result.stderr.splitlines()[-1].endswith(" passed, 0 failed, 0 not measured")
+    assert "passed" in result.stdout
+    shown = json.loads(demo("verify", file, "--format", "json").stdout)
+    assert {row["verdict"] for row in shown} == {"passed"}
+
+
+@pytest.mark.parametrize(
+    ("requirement", "code", "allowed"),
+    [
+        ("rate: < 1000 Hz", 0, 0),
+        ("rate: < 1 Hz", 1, 1),
+        ("node: /planner\n    latency: p99 < 1 s", 5, 0),
+        ("rate: fast", 2, 2),
+    ],
+)
+def test_exit_codes(
+    demo: Msgflow, tmp_path: Path, requirement: str, code: int, allowed: int
+) -> None:
+    topics = demo("query", "publication-rate", "--format", "jsonl").stdout.splitlines()
+    publisher = json.loads(topics[0])
+    file = tmp_path / "targets.yaml"
+    requirement = requirement.replace("/planner", publisher["publisher"])
+    file.write_text(f"targets:\n  - topic: {publisher['topic_name']}\n    {requirement}\n")
+    assert demo("verify", file).exit_code == code
+    assert demo("verify", file, "--allow-not-measured").exit_code == allowed
+
+
+def test_a_file_that_ends_with_xml_is_junit(demo: Msgflow, tmp_path: Path) -> None:
+    file, output = tmp_path / "targets.yaml", tmp_path / "verdicts.xml"
+    file.write_text('targets:\n  - process: "*"\n    utilisation: < 0 %\n')
+    result = demo("verify", file, "-o", output)
+    assert result.exit_code == 1
+    assert ElementTree.parse(output).getroot().tag == "testsuites"
+    assert result.stdout == ""
+
+
+def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
+    assert demo("ingest", tmp_path / "trace", "--name", "good2", "--replace").exit_code == 0
+    simulate("demo", tmp_path / "other", factor=0.1, seed=2)
+    assert demo("ingest", tmp_path / "other").exit_code == 0
+    file = tmp_path / "targets.yaml"
+    file.write_text('targets:\n  - process: "*"\n    utilisation: < 100 %\n')
+    result = demo("verify", file, "all")
+    assert result.exit_code == 2
+    assert "a verification is of one run" in result.stderr

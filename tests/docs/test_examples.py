@@ -1,0 +1,52 @@
+"""Pages with commands show what these print."""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("examples", DOCS / "examples.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@cache
+def produced() -> dict[str, str]:
+    return script().pages()
+
+
+@pytest.mark.parametrize("page", script().PAGES)
+def test_it_shows_what_its_commands_print(page: str) -> None:
+    assert produced()[page] == (DOCS / page).read_text("utf-8")
+
+
+@pytest.mark.parametrize("page", script().PAGES)
+def test_its_answers_fit_the_terminal_and_are_answers(page: str) -> None:
+    text = (DOCS / page).read_text("utf-8")
+    shown = [block[1] for block in script().CONSOLE.finditer(text)]
+    shown += [block[0].partition("```text\n")[2] for block in script().SQL.finditer(text)]
+    assert len(shown) > 4
+    for answer in shown:
+        lines = [line for line in answer.splitlines() if not line.startswith("$ ")]
+        assert [line for line in lines if len(line) > script().COLUMNS] == []
+        assert not any(line.startswith(("error:", "Traceback")) for line in lines)
+        assert "note: no rows" not in lines or "show no difference" in answer
+        assert lines
+
+
+def test_a_page_that_differs_is_found(tmp_path: Path) -> None:
+    text = "```sh setup\ntrue\n```\n\n```console\n$ echo ä; echo b >&2\nwrong\n\n$ tput cols\n```\n"
+    assert script().filled(text, tmp_path) == text.replace("wrong\n", "ä\nb\n").replace(
+        "cols\n", "cols\n100\n"
+    )

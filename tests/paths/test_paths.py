@@ -1,0 +1,147 @@
+"""Paths with names: their file, what refuses it, and suggestions that can be used as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from msgflow.database import Database
+from msgflow.errors import UsageError
+from msgflow.paths import read_paths, suggest_paths
+from msgflow.sim import simulate
+
+GOOD = """\
+paths:
+  - name: motors
+    from: /camera/image
+    to: [/base/motors]
+    via: [/planning/*, /control/cmd]
+  - name: rest
+    without: /planning/planner
+"""
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    place = tmp_path_factory.mktemp("paths")
+    simulate("demo", place / "trace", factor=0.1)
+    with Database(place / "demo.duckdb") as opened:
+        opened.ingest(place / "trace")
+        yield opened
+
+
+def test_a_name_stands_for_a_path(database: Database, tmp_path: Path) -> None:
+    file = tmp_path / "paths.yaml"
+    file.write_text(GOOD, encoding="utf-8")
+    by_name = database.query("e2e-latency", path="motors", paths=file).to_arrow()
+    assert by_name.num_rows == 1
+    assert (
+        by_name
+        == database.query(
+            "e2e-latency",
+            from_="/camera/image",
+            to="/base/motors",
+            via=["/planning/planner", "/control/cmd"],
+        ).to_arrow()
+    )
+    rest = database.query("e2e-latency", path="rest", paths=file).to_arrow()
+    assert rest == database.query("e2e-latency", without="/planning/planner").to_arrow()
+    assert rest.num_rows == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("", "line 1: the file is empty", "paths: ["),
+        ("paths: 3\n", "line 1: paths is not a list", "paths: ["),
+        ("path: []\n", "line 1: the file has no path", "it has paths"),
+        ("paths:\n  - from: /a\n", "line 2: a path lacks name", "paths: ["),
+        ("paths:\n  - name: a\n", "line 2: nothing says which path it is — a", "paths: ["),
+        ("paths:\n  - {name: a, form: /a}\n", "line 2: a path has no form", "it has name, from"),
+        ("paths:\n  - {name: a, from: /a, from: /b}\n", "line 2: from is given twice", None),
+        ("paths:\n  - {name: a, from: '/a,/b'}\n", "line 2: several names are a list", "[/a, /b]"),
+        ("paths:\n  - {name: a, via: []}\n", "line 2: via is empty", "paths: ["),
+        ("paths:\n  - name: a\n    via: *x\n", "line 3: ", "quote patterns"),
+        (
+            GOOD + "  - name: motors\n    to: /a\n",
+            "line 8: line 2 has this name, too — motors",
+            None,
+        ),
+    ],
+)
+def test_mistakes_are_named_with_their_line(
+    tmp_path: Path, text: str, message: str, hint: str | None
+) -> None:
+    file = tmp_path / "paths.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError) as raised:
+        read_paths(file)
+    assert f"{file}, {message}" in raised.value.message
+    assert (hint or "") in (raised.value.hint or "")
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "message", "hint"),
+    [
+        (GOOD, "motor", "has no path of this name — motor", "did you mean motors"),
+        (GOOD, "x\x1b[31m", "has no path of this name", "it has motors, rest"),
+        ("paths: []\n", "a", "has no path of this name — a", "msgflow paths suggest"),
+        (
+            GOOD.replace("/control/cmd", "/control/cmds"),
+            "motors",
+            "line 5: there is no such topic or node in the run — /control/cmds",
+            "did you mean /control/cmd",
+        ),
+        (GOOD.replace("/planning/*", "/x*"), "motors", "line 5: no topic or node in the run", None),
+    ],
+)
+def test_names_that_are_not_there(
+    database: Database, tmp_path: Path, text: str, name: str, message: str, hint: str | None
+) -> None:
+    file = tmp_path / "paths.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(UsageError) as raised:
+        database.query("e2e-latency", path=name, paths=file)
+    assert message in raised.value.message
+    assert (hint or "") in (raised.value.hint or "")
+
+
+def test_a_name_goes_without_other_words(database: Database, tmp_path: Path) -> None:
+    file = tmp_path / "paths.yaml"
+    file.write_text(GOOD, encoding="utf-8")
+    with pytest.raises(UsageError, match="a path with a name goes without others — motors"):
+        database.query("e2e-latency", path="motors", paths=file, from_="/camera/image")
+    with pytest.raises(UsageError, match="info-nodes has no paths — --path motors"):
+        database.query("info-nodes", path="motors", paths=file)
+    with pytest.raises(UsageError, match="cannot read the file"):
+        database.query("e2e-latency", path="motors", paths=tmp_path / "none.yaml")
+
+
+def test_suggestions_name_every_path_and_nothing_else(database: Database, tmp_path: Path) -> None:
+    file = tmp_path / "paths.yaml"
+    rows = database.query("e2e-latency").to_arrow().to_pylist()
+    file.write_text(suggest_paths(rows), encoding="utf-8")
+    named = [path.name.value for path in read_paths(file).paths]
+    assert "camera-image-to-base-motors" in named
+    for row, name in zip(rows, named, strict=True):
+        found = database.query("e2e-latency", path=name, paths=file).to_arrow().to_pylist()
+        assert [one["path"] for one in found] == [row["path"]]
+
+
+def test_suggestions_tell_paths_apart_that_begin_and_end_alike(tmp_path: Path) -> None:
+    counts = {"roots": 2, "reached": 1, "p99_ns": None}
+    rows = [
+        {"path": "/a → /t → /b → /u → /d", **counts},
+        {"path": "/a → /t → /c → /v → /d", **counts},
+        {"path": '/"x\n → /nul → /d', **counts},
+    ]
+    file = tmp_path / "paths.yaml"
+    file.write_text(suggest_paths(rows), encoding="utf-8")
+    paths = read_paths(file).paths
+    assert [path.name.value for path in paths] == ["t-to-d", "t-to-d-2", "nul-to-d"]
+    assert paths[0].words() == {"from": "/t", "to": "/d", "via": "/b,/u", "without": "/c,/v"}
+    assert read_paths(file).paths[2].words() == {"from": "/nul", "to": "/d"}
+    file.write_text(suggest_paths([]), encoding="utf-8")
+    assert read_paths(file).paths == ()

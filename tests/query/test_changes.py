@@ -1,0 +1,57 @@
+"""What changed between two runs: a row for each subject of a comparison."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyarrow as pa
+
+from msgflow.query.changes import changes
+from msgflow.query.result import QueryResult
+
+A_TO_B = "/a → /t → /b"
+
+
+def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, **more: Any) -> Any:
+    return [
+        {
+            "subject": subject, "statistic": statistic, "verdict": verdict, "a_ns": 1_000,
+            "b_ns": None if difference_ns is None else 1_000 + difference_ns,
+            "change_percent": None if difference_ns is None else difference_ns / 10,
+            "effect": None, "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20, **more,
+        }
+        for statistic, verdict in verdicts.items()
+    ]  # fmt: skip
+
+
+ROWS = [
+    *compared(A_TO_B, {"median": "B is longer", "p95": "no difference shown"}, 100),
+    *compared("/same", {"median": "no difference shown", "p95": "too few values"}, 500),
+    *compared("/both", {"median": "B is shorter", "p95": "B is longer"}, -300, effect="large"),
+    *compared("/gone", {"median": "only in A", "p95": "only in A"}, None, b_count=0),
+]
+RESULT = QueryResult(pa.Table.from_pylist(ROWS), notes=["a note"])
+
+
+def test_a_row_for_each_that_differs_the_greatest_change_first() -> None:
+    found = changes(RESULT, only_different=True)
+    rows = found.to_arrow().to_pylist()
+    assert [(row["path"], row["change"], row["of"]) for row in rows] == [
+        ("/gone", "only in A", None),
+        ("/both", "both", "median, p95"),
+        (A_TO_B, "longer", "median"),
+    ]
+    assert rows[2]["a_median_ns"] == 1_000
+    assert rows[2]["b_median_ns"] == 1_100
+    assert rows[2]["median_percent"] == 10.0
+    assert rows[1]["effect"] == "large"
+    assert found.notes == ["1 of 4 show no difference: --all lists them", "a note"]
+
+
+def test_all_of_them() -> None:
+    found = changes(RESULT, only_different=False)
+    assert {row["path"]: row["change"] for row in found.to_arrow().to_pylist()}["/same"] == (
+        "none shown"
+    )
+    assert found.notes == ["a note"]
+    assert found.columns == tuple(column.name for column in (found.header or 0).columns)  # type: ignore[union-attr]

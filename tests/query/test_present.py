@@ -1,0 +1,188 @@
+"""What a terminal shows of a result, at several widths: `screens/NAME.WIDTH.txt` has the lines."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+from rich.cells import cell_len
+
+from msgflow.query.catalogue import load_query
+from msgflow.query.header import Header
+from msgflow.query.present import MOST_ROWS, present
+from msgflow.query.result import QueryResult
+from msgflow.query.screen import screen_lines
+from msgflow.query.window import Run
+
+SCREENS = Path(__file__).parent / "screens"
+BEGIN = 1_700_000_000_000_000_000
+RUN = Run(1, "morning", BEGIN)
+OTHER = Run(2, "evening", BEGIN + 10**12)
+TYPES = {"BIGINT": pa.int64(), "INTEGER": pa.int32(), "DOUBLE": pa.float64(), "BOOLEAN": pa.bool_()}
+CAMERA = (
+    "/camera/driver → /camera/image → /perception/detector → /perception/detections"
+    " → /perception/tracker → /perception/objects → /planning/planner → /planning/trajectory"
+    " → /control/controller → /control/cmd → /base/motors"
+)
+SHORT = "/camera/driver → /camera/camera_info → /perception/detector"
+LIKE = CAMERA.replace("/base/motors", "/base/brakes")
+
+
+def result_of(
+    query: str, rows: list[dict[str, Any]], runs: tuple[Run, ...] = (RUN,)
+) -> QueryResult:
+    """Return rows of a query; what they do not name is 0, false or missing."""
+    header = load_query(query)
+    empty = {"BIGINT": 0, "INTEGER": 0, "BOOLEAN": False}
+    fields, columns = [], []
+    for column in header.columns:
+        kind = TYPES.get(column.type, pa.string())
+        fields.append(pa.field(column.name, kind))
+        default = 1 if column.name == "run_id" else empty.get(column.type)
+        columns.append(pa.array([row.get(column.name, default) for row in rows], kind))
+    return QueryResult(pa.table(columns, pa.schema(fields)), header, runs)
+
+
+def latency(path: str, median_ns: int, **more: Any) -> dict[str, Any]:
+    return {
+        "roots": 300, "reached": 298, "cut_by_recording": 2, "pairs": 298, "path": path,
+        "min_ns": median_ns // 2, "median_ns": median_ns, "mean_ns": median_ns + 1_234,
+        "p95_ns": 2 * median_ns, "p99_ns": 3 * median_ns, "max_ns": 4 * median_ns,
+        "sink_event": "callback_end", **more,
+    }  # fmt: skip
+
+
+LATENCIES = [
+    latency(SHORT, 13_035_000),
+    latency(CAMERA, 21_070_000),
+    latency(LIKE, 797_095, roots=301),
+]
+WAITS = [
+    {
+        "start_ns": BEGIN + 1_234_567_891, "node": "/localization/state_estimator",
+        "callback": "Subscription(/localization/odometry)", "since": "publication",
+        "wait_ns": 96_249, "busy_min_ns": 1_000, "busy_max_ns": 90_000, "rest_min_ns": 6_249,
+        "rest_max_ns": 95_249, "callback_instance_id": 4711, "callback_id": 12,
+        "meanwhile": "Subscription(/imu/data) 80.000 µs, Timer(10 ms) of /control/controller"
+        " 10.000 µs",
+    },
+    {
+        "start_ns": BEGIN - 1, "node": "/planning/planner", "callback": "Timer(100 ms)",
+        "wait_ns": None, "busy_min_ns": 0, "busy_max_ns": 0, "rest_min_ns": 0, "rest_max_ns": 0,
+        "callback_instance_id": 4712, "callback_id": 13,
+    },
+]  # fmt: skip
+HOSTILE = [
+    {
+        "topic_name": "/\x1b[31mred\n/x",
+        "publisher_count": 1,
+        "take_count": 12,
+        "publication_count": 7,
+    },
+    {"topic_name": "/深い/話題", "publisher_count": 1, "take_count": 3, "publication_count": 9},
+]
+FINDING = [
+    {
+        "severity": "warning",
+        "name": "clock_not_synchronised",
+        "count": 1,
+        "detail": "x" * 130 + " y",
+    }
+]
+CASES = {
+    "paths": result_of("e2e-latency", LATENCIES),
+    "one_path": result_of("e2e-latency", LATENCIES[1:2]),
+    "waits": result_of("waits", WAITS),
+    "runs": result_of(
+        "e2e-latency", [*LATENCIES, {**LATENCIES[0], "run_id": 2}], runs=(RUN, OTHER)
+    ),
+    "hostile": result_of("info-topics", HOSTILE),
+    "finding": result_of("info-diagnostics", FINDING),
+}
+
+
+def lines_of(result: QueryResult, width: int, **more: Any) -> list[str]:
+    shown = present(result, width, **more)
+    return [*screen_lines(shown, width), *(f"note: {note}" for note in shown.notes)]
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_shown(name: str, width: int) -> None:
+    """MSGFLOW_WRITE_SCREENS=1 in the environment writes them; read the difference then."""
+    lines = lines_of(CASES[name], width)
+    file = SCREENS / f"{name}.{width}.txt"
+    if os.environ.get("MSGFLOW_WRITE_SCREENS"):
+        file.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    assert lines == file.read_text(encoding="utf-8").splitlines()
+
+
+@pytest.mark.parametrize("width", range(40, 200, 7))
+@pytest.mark.parametrize("name", CASES)
+def test_no_line_is_wider_than_the_terminal(name: str, width: int) -> None:
+    shown = present(CASES[name], width)
+    assert max(map(cell_len, screen_lines(shown, width))) <= width
+
+
+def test_every_column_is_shown_or_named() -> None:
+    for name, result in CASES.items():
+        shown = present(result, 80)
+        said = " ".join([*(column.title for column in shown.columns), *shown.notes, *shown.paths])
+        for column in set(result.columns) - {"run_id", "path"}:
+            assert column.removesuffix("_ns") in said, (name, column)
+
+
+def test_long_results_stop_and_say_how_many_rows_there_are() -> None:
+    result = result_of("info-topics", [{"topic_name": f"/{n}", "take_count": n} for n in range(60)])
+    shown = present(result, 100)
+    assert len(shown.columns[0].cells) == MOST_ROWS == 50
+    assert shown.notes[0] == "the first 50 of 60 rows: --wide shows all"
+    assert len(present(result, 100, most_rows=None).columns[0].cells) == 60
+    assert len(present(result, 100, most_rows=55).columns[0].cells) == 55
+
+
+def test_columns_that_somebody_chose_are_all_shown() -> None:
+    chosen = CASES["paths"].with_columns(["lost", "run_id", "p95", "path"])
+    shown = present(chosen, 100, is_chosen=True)
+    assert {column.name for column in shown.columns} == {"lost", "run_id", "p95_ns", "path"}
+    assert shown.notes == ()
+    narrow = present(CASES["paths"], 60, is_chosen=True)
+    assert narrow.widths is None
+    assert len(narrow.columns) == len(CASES["paths"].columns)
+
+
+def test_plain_sql_keeps_every_column() -> None:
+    table = pa.table({"a": [0, 0], "b": [None, None], "path": ["x x" * 10, "y"]})
+    shown = present(QueryResult(table), 60)
+    assert [column.title for column in shown.columns] == ["a", "b", "path"]
+    assert present(QueryResult(table), 30).widths is not None
+    assert present(QueryResult(pa.table({f"c{n}": [1] for n in range(40)})), 80).widths is None
+
+
+def test_a_result_without_rows_has_no_lines() -> None:
+    assert lines_of(result_of("e2e-latency", []), 80) == []
+    assert lines_of(QueryResult(pa.table({"a": pa.array([], pa.int64())})), 80) == []
+
+
+def test_moments_are_whole_where_the_rows_tell_when_runs_began() -> None:
+    rows = [{"name": "morning", "start_ns": BEGIN, "end_ns": BEGIN + 10**9, "duration_ns": 10**9}]
+    lines = lines_of(result_of("info-runs", rows), 200)
+    assert "2023-11-14T22:13:20.000000000Z" in "".join(lines)
+    # Rounded down: --start with it leaves nothing out.
+    (start,) = (c.cells for c in present(CASES["waits"], 120).columns if c.name == "start_ns")
+    assert start == ("1.234567 s", "-0.000001 s")
+
+
+def test_the_order_of_importance_is_that_of_the_header() -> None:
+    header = load_query("e2e-latency")
+    first = present(CASES["paths"], 60)
+    assert "median" in [column.title for column in first.columns]
+    turned: Header = replace(header, brief=("path", "min_ns", "mean_ns", "sink_event"))
+    other = present(replace(CASES["paths"], header=turned), 60)
+    titles = [column.title for column in other.columns]
+    assert {"min", "mean", "sink_event"} <= set(titles)
+    assert "median" not in titles or "max" not in titles

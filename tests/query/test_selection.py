@@ -1,0 +1,325 @@
+"""Rows that somebody chose, on a database of the simulated robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from msgflow.database import Database
+from msgflow.errors import QueryError, UsageError
+from msgflow.query.catalogue import load_queries
+from msgflow.query.selection import KINDS, PATH, columns_of, make_selection, values_of
+from msgflow.sim import simulate
+
+PLANNER = "/planning/planner"
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    place = tmp_path_factory.mktemp("selection")
+    simulate("demo", place / "trace", factor=0.2)
+    with Database(place / "demo.duckdb") as opened:
+        opened.ingest(place / "trace")
+        yield opened
+
+
+def rows(database: Database, name: str, **given: Any) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = database.query(name, **given).to_arrow().to_pylist()
+    return found
+
+
+def test_names_choose_rows(database: Database) -> None:
+    every = rows(database, "executor-wait")
+    assert rows(database, "executor-wait", node=PLANNER) == [
+        row for row in every if row["node"] == PLANNER
+    ]
+    both = rows(database, "executor-wait", node=[PLANNER, "/camera/*"], callback="Timer(*")
+    assert [(row["node"], row["callback"]) for row in both] == [
+        ("/camera/driver", "Timer(33.333 ms)")
+    ]
+    assert {row["host"] for row in rows(database, "executor-usage", host="robot-base")} == {
+        "robot-base"
+    }
+    pairs = rows(database, "clock-pairs", host="robot-base")
+    assert len(pairs) == 2
+    # A row with one of several names in a list.
+    waiting = rows(database, "interference", node=PLANNER)
+    assert {row["node"] for row in waiting} | {row["meanwhile_node"] for row in waiting} == {
+        PLANNER
+    }
+
+
+def test_topics_by_glob_and_in_one_text(database: Database) -> None:
+    names = [row["topic_name"] for row in rows(database, "delivery", topic="/imu/*, /camera/image")]
+    assert names == ["/camera/image", "/imu/data"]
+    assert rows(database, "unmatched", topic="/imu/data", internal=True) == [
+        row
+        for row in rows(database, "unmatched", internal=True)
+        if row["topic_name"] == "/imu/data"
+    ]
+
+
+def test_paths_by_topics_and_nodes(database: Database) -> None:
+    every = [row["path"] for row in rows(database, "e2e-latency")]
+    assert len(every) == 4
+
+    def paths(**given: Any) -> list[str]:
+        return [row["path"] for row in rows(database, "e2e-latency", **given)]
+
+    assert paths(via=PLANNER) == [path for path in every if PLANNER in path]
+    assert paths(via=[PLANNER, "/camera/*"]) == [
+        path for path in every if PLANNER in path and "/camera/" in path
+    ]
+    assert paths(without="/planning/*") == [path for path in every if "/planning/" not in path]
+    assert paths(from_="/lidar/*") == [path for path in every if path.startswith("/lidar/")]
+    assert paths(from_="/camera/driver,/imu/driver") == [
+        path for path in every if path.startswith(("/camera/driver", "/imu/driver"))
+    ]
+    ending = paths(to="/perception/tracker")
+    assert [path.rpartition(" → ")[2] for path in ending] == ["/perception/tracker"]
+    middle = rows(database, "e2e-latency", from_="/perception/tracker", to="/base/*")
+    assert [row["path"].partition(" → ")[0] for row in middle] == ["/perception/tracker"]
+    assert middle[0]["reached"] > 0
+
+
+def test_topics_are_as_they_were_before_there_were_nodes(database: Database) -> None:
+    """A path from a topic is that from its publisher, unless that has others."""
+    by_topic = rows(database, "flows", from_="/camera/image", to="/perception/detections")
+    by_node = rows(database, "flows", from_="/camera/driver", to="/perception/tracker")
+    assert by_topic == by_node
+    assert len(by_topic) > 10
+
+
+def test_sorting_and_limits(database: Database) -> None:
+    every = rows(database, "flows")
+    slowest = rows(database, "flows", slowest=3)
+    reached = sorted(
+        (row["latency_ns"] for row in every if row["latency_ns"] is not None), reverse=True
+    )
+    assert [row["latency_ns"] for row in slowest] == reached[:3]
+    assert rows(database, "flows", sort="latency:desc", limit=3) == slowest
+    # The order of the query decides between equals; what is missing comes last.
+    by_status = rows(database, "flows", sort=["status", "take_id:asc"])
+    assert by_status == sorted(
+        every, key=lambda row: (row["status"], row["take_id"] is None, row["take_id"] or 0)
+    )
+    result = database.query("flows", limit=5)
+    assert result.to_arrow().to_pylist() == every[:5]
+    assert f"5 of {len(every):,} rows" in result.notes
+
+
+def test_hidden_rows_do_not_count_to_the_limit(database: Database) -> None:
+    result = database.query("info-topics", limit=2)
+    assert len(result) == 2
+    assert "2 of 10 rows" in result.notes
+    assert "2 internal rows are hidden; --internal shows them" in result.notes
+    none = database.query("info-topics", where="topic_name = '/rosout'")
+    assert len(none) == 0
+    assert "1 internal row is hidden; --internal shows them" in none.notes
+    assert none.columns == result.columns
+
+
+def test_conditions(database: Database) -> None:
+    every = rows(database, "executor-wait")
+    assert rows(database, "executor-wait", where="count > 50 AND node LIKE '/imu%'") == [
+        row for row in every if row["count"] > 50 and row["node"].startswith("/imu")
+    ]
+    assert len(rows(database, "executor-wait", where="true -- all of them")) == len(every)
+    inner = "node IN (SELECT full_name FROM main.node WHERE name = 'planner')"
+    assert {row["node"] for row in rows(database, "executor-wait", where=inner)} == {PLANNER}
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ("count >", "--where is no condition in SQL"),
+        ("count > 1; DROP TABLE store.node", "--where is no condition in SQL"),
+        ("count > 1) OR (true", "--where is no condition in SQL"),
+        ("count > 1, node", "--where is no condition in SQL"),
+        ("count > 1 AS x", "--where is no condition in SQL"),
+        ("true FROM main.node", "--where is no condition in SQL"),
+        ("true ORDER BY 1", "--where is no condition in SQL"),
+        ("true UNION SELECT true", "--where is no condition in SQL"),
+        ("", "--where is no condition in SQL"),
+        ("count > $runs", "--where takes no parameters"),
+        ("count > ?", "--where takes no parameters"),
+        ("(SELECT count(*) FROM read_csv('/etc/passwd')) > 0", "--where may only read"),
+        ("getenv('HOME') = ''", "--where may only read"),
+        ("node", "--where cannot be evaluated"),
+        ("cont > 1", "--where cannot be evaluated"),
+        ("*", "--where cannot be evaluated"),
+    ],
+)
+def test_what_is_no_condition_is_refused(database: Database, where: str, message: str) -> None:
+    with pytest.raises(UsageError) as raised:
+        database.query("executor-wait", where=where)
+    assert message in raised.value.message
+    assert raised.value.hint
+
+
+def test_the_nearest_column_is_named(database: Database) -> None:
+    for given in ({"where": "cont > 1"}, {"sort": "cont"}):
+        with pytest.raises(UsageError) as raised:
+            database.query("executor-wait", **given)  # type: ignore[arg-type]
+        assert "did you mean count" in (raised.value.hint or "")
+
+
+@pytest.mark.parametrize(
+    ("query", "given", "message"),
+    [
+        ("clocks", {"node": "/a"}, "clocks has no column with a node — --node /a"),
+        ("info-runs", {"via": "/a"}, "info-runs has no paths — --via /a"),
+        ("e2e-latency", {"slowest": 3}, "the rows of e2e-latency are not slow or fast"),
+        ("flows", {"slowest": 3, "limit": 3}, "--slowest N goes without --sort and --limit"),
+        ("flows", {"sort": "latency:down"}, "rows are sorted asc or desc — latency:down"),
+        ("flows", {"limit": 0}, "--limit is at least 1 — 0"),
+        ("flows", {"limit": "3"}, "--limit is at least 1 — 3"),
+        ("executor-wait", {"node": 3}, "node is a name or several — 3"),
+        ("executor-wait", {"node": "\x1b31m"}, "there is no such node in the run"),
+        ("e2e-latency", {"from_": "/camera/nothing*"}, "no topic or node in the run fits"),
+    ],
+)
+def test_what_a_query_does_not_have_is_said(
+    database: Database, query: str, given: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UsageError) as raised:
+        database.query(query, **given)
+    assert message in raised.value.message
+
+
+def test_every_query_can_be_wrapped(database: Database) -> None:
+    """The options that a header promises work, and choose no row that was not there."""
+    for header in load_queries():
+        given: dict[str, Any] = {"where": "true", "limit": 100_000, "internal": True}
+        every = rows(database, header.name, internal=True)
+        assert rows(database, header.name, **given) == every, header.name
+        names = {kind: "*" for kind in KINDS if columns_of(header, kind)}
+        if columns_of(header, PATH):
+            names["via"] = "*"
+        for kind, name in names.items():
+            kept = rows(database, header.name, **given, **{kind: name})
+            assert len(kept) <= len(every)
+            assert all(row in every for row in kept[:5])
+
+
+def test_words_of_a_selection() -> None:
+    assert values_of(None) == ()
+    assert values_of("/a, /b,") == ("/a", "/b")
+    assert values_of(["/a,/b", "/c"]) == ("/a", "/b", "/c")
+    assert make_selection({"via": "/a", "without": ["/b"]}).names() == {"place": ("/a", "/b")}
+
+
+def latencies(database: Database, **given: Any) -> list[int]:
+    return sorted(
+        (row["latency_ns"] for row in rows(database, "flows", case="every_pair", **given)
+         if row["latency_ns"] is not None),
+        reverse=True,
+    )  # fmt: skip
+
+
+def test_the_slowest_flows_piece_by_piece(database: Database) -> None:
+    every = latencies(database, to="/base/motors")
+    for detail in ("short", "full"):
+        pieces = rows(database, "critical-path", to="/base/motors", slowest=3, detail=detail)
+        for rank, latency in enumerate(every[:3], start=1):
+            own = [row for row in pieces if row["rank"] == rank]
+            assert {row["latency_ns"] for row in own} == {latency}
+            assert sum(row["duration_ns"] for row in own) == latency
+            moments = [row["at_ns"] for row in own if row["at_ns"] is not None]
+            assert moments == sorted(moments)
+        assert {row["rank"] for row in pieces} == {1, 2, 3}
+
+
+def test_short_pieces_are_one_line_and_layers_one_piece(database: Database) -> None:
+    short = rows(database, "critical-path", to="/base/motors")
+    full = rows(database, "critical-path", to="/base/motors", detail="full")
+    assert {"rclcpp", "rcl", "rmw"} <= {row["activity"] for row in full}
+    assert [row["activity"] for row in short].count("rest") == 1
+    assert short[-1]["activity"] == "rest"
+    kept = [row for row in full if row["duration_ns"] >= 0.01 * row["latency_ns"]]
+    assert [row["at_ns"] for row in short[:-1]] == [row["at_ns"] for row in kept]
+    folded = rows(database, "critical-path", to="/base/motors", by="part")
+    layers = sum(r["duration_ns"] for r in full if r["activity"] in ("rclcpp", "rcl", "rmw"))
+    (publish,) = (row for row in folded if row["activity"] == "publish")
+    assert publish["duration_ns"] == layers
+    assert publish["pieces"] == 5
+
+
+def test_totals_add_up(database: Database) -> None:
+    full = rows(database, "critical-path", to="/base/motors", detail="full")
+    by_node = rows(database, "critical-path", to="/base/motors", by="node")
+    for row in by_node:
+        own = [piece["duration_ns"] for piece in full if piece["node"] == row["node"]]
+        assert row["duration_ns"] == sum(own)
+    assert sum(row["duration_ns"] for row in by_node) == full[0]["latency_ns"]
+    totals = [row["duration_ns"] for row in by_node]
+    assert totals == sorted(totals, reverse=True)
+
+
+@pytest.mark.parametrize(("at", "share"), [("median", 50), ("p90", 90), ("p95", 95), ("max", 100)])
+def test_the_flow_at_a_quantile(database: Database, at: str, share: int) -> None:
+    every = latencies(database, to="/base/motors")[::-1]
+    found = rows(database, "critical-path", to="/base/motors", at=at)
+    assert found[0]["latency_ns"] == every[-(-share * len(every) // 100) - 1]
+
+
+def test_flows_through_and_by_their_end(database: Database) -> None:
+    lidar = rows(database, "critical-path", via="/lidar/driver, /planning/*")
+    assert lidar[0]["node"] == "/lidar/driver"
+    assert lidar[0]["latency_ns"] == latencies(database, via="/lidar/driver")[0]
+    other = rows(database, "critical-path", without=["/camera/*", "/lidar/points"])
+    assert other[0]["latency_ns"] == latencies(database, without=["/camera/*", "/lidar/points"])[0]
+    (slowest,) = rows(database, "flows", slowest=1)
+    assert rows(database, "critical-path", flow=slowest["take_id"]) == rows(
+        database, "critical-path"
+    )
+    with pytest.raises(UsageError, match="there is no such take in the run — 999999"):
+        database.query("critical-path", flow=999_999)
+    with pytest.raises(UsageError, match="there is no such topic or node in the run"):
+        database.query("critical-path", via="/lidar/drive")
+
+
+@pytest.mark.parametrize(
+    ("short", "whole"),
+    [
+        ("flow_path([1])", "flow_path([1], NULL, NULL, max_depth := 32, max_paths := 1000)"),
+        (
+            "end_to_end([1])",
+            "end_to_end([1], NULL, NULL, 'callback_start', 'callback_end',"
+            " -9223372036854775808, 9223372036854775807)",
+        ),
+        (
+            "end_to_end_part([1])",
+            "end_to_end_part([1], NULL, NULL, 'callback_start', 'callback_end', 0,"
+            " 9223372036854775807, 'first')",
+        ),
+        (
+            "critical_path([1])",
+            "critical_path([1], NULL, NULL, 'callback_start', 'callback_end', 0,"
+            " 9223372036854775807, most_flows := 1)",
+        ),
+    ],
+)
+def test_macros_need_no_more_than_the_runs(database: Database, short: str, whole: str) -> None:
+    found = database.sql(f"FROM {short} ORDER BY ALL").to_arrow()
+    assert found.num_rows > 4
+    assert found == database.sql(f"FROM {whole} ORDER BY ALL").to_arrow()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ("end_to_end([1], from_event := 'start')", "from_event is one of callback_start, publish"),
+        ("end_to_end([1], to_event := NULL)", "to_event is one of take, callback_start"),
+        ("end_to_end_part([1], flow_case := 'fist')", "flow_case is one of first, last, newest"),
+        ("critical_path([1], to_event := 'end')", "not end"),
+    ],
+)
+def test_words_that_macros_do_not_know_are_errors(
+    database: Database, call: str, message: str
+) -> None:
+    with pytest.raises(QueryError) as raised:
+        database.sql(f"SELECT count(*) FROM {call}")
+    assert message in raised.value.message

@@ -1,0 +1,36 @@
+"""A database whose values are known from the golden cases of the queries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import duckdb
+import pytest
+from golden import SYSTEMS, fill
+
+from msgflow.database import Database
+from msgflow.db.derive import derive
+from msgflow.verify import Verification
+
+
+@pytest.fixture
+def system(fresh_database: Path, tmp_path: Path) -> Path:
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill(connection, tmp_path / "no_input")
+        connection.execute((SYSTEMS / "many_messages.sql").read_text())
+        derive(connection, 1)
+    return fresh_database
+
+
+@pytest.fixture
+def check(system: Path, tmp_path: Path) -> Callable[[str], Verification]:
+    """Verifies the text of a file of requirements."""
+
+    def verify(text: str) -> Verification:
+        targets = tmp_path / "targets.yaml"
+        targets.write_text(text, encoding="utf-8")
+        with Database(system) as database:
+            return database.verify(targets)
+
+    return verify

@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from hostile import HOSTILE, renamed
+
+from msgflow.database import Database
+from msgflow.errors import UsageError
+from msgflow.query.catalogue import load_query
+from msgflow.sim import simulate
+from msgflow.verify import Verification
+from msgflow.verify.metrics import SUBJECTS
+from msgflow.verify.worst import KEYS
+
+Check = Callable[[str], Verification]
+# What the golden cases of the queries say of the same system.
+VALUES = """
+targets:
+  - path: [/a, /b]
+    latency: [median < 609741 ns, p99 < 928.11 us]
+    completeness: ">= 100 %"
+    loss: "<= 0 %"
+  - timer: /source
+    callback: Timer(10 ms)
+    rate: 100 Hz ± 5 %
+    lateness: max < 305160 ns
+    jitter: p95 < 250.002 us
+    missed: < 1
+  - callback: Subscription(/a)
+    node: /slow
+    duration: p95 < 117301 ns
+  - topic: /b
+    latency: [p99 < 287.7 us, max < 290401 ns]
+    rate: < 50 Hz
+  - service: /add
+    round_trip: p99 < 448301 ns
+    completeness: ">= 100 %"
+"""
+EXPECTED = {
+    ("/a → /b", "latency", "median < 609741 ns"): ("passed", 609_740),
+    ("/a → /b", "latency", "p99 < 928.11 us"): ("failed", 928_110),
+    ("/a → /b", "completeness", ">= 100 %"): ("passed", 1),
+    ("/a → /b", "loss", "<= 0 %"): ("passed", 0),
+    ("/source Timer(10 ms)", "lateness", "max < 305160 ns"): ("failed", 305_160),
+    ("/source Timer(10 ms)", "jitter", "p95 < 250.002 us"): ("passed", 250_001),
+    ("/source Timer(10 ms)", "missed", "< 1"): ("passed", 0),
+    ("/slow Subscription(/a)", "duration", "p95 < 117301 ns"): ("passed", 117_300),
+    ("/b → /sink", "latency", "p99 < 287.7 us"): ("failed", 287_700),
+    ("/b → /sink", "latency", "max < 290401 ns"): ("passed", 290_400),
+    ("/caller → /add", "round_trip", "p99 < 448301 ns"): ("passed", 448_300),
+    ("/caller → /add", "completeness", ">= 100 %"): ("passed", 1),
+}
+
+
+def rows(verification: Verification) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = verification.result.to_arrow().to_pylist()
+    return found
+
+
+def test_verdicts_are_on_the_values_of_the_queries(check: Check) -> None:
+    verification = check(VALUES)
+    found = {
+        (row["subject"], row["metric"], row["condition"]): (row["verdict"], row["value"])
+        for row in rows(verification)
+    }
+    assert {key: found[key] for key in EXPECTED} == EXPECTED
+    assert found["/relay → /b", "rate", "< 50 Hz"][0] == "failed"
+    assert found["/source Timer(10 ms)", "rate", "100 Hz ± 5 %"][0] == "passed"
+    assert len(found) == len(EXPECTED) + 2
+    assert (verification.count("passed"), verification.count("failed")) == (10, 4)
+    assert [row["verdict"] for row in rows(verification)][:4] == ["failed"] * 4
+
+
+def test_what_failed_names_its_worst_case(check: Check, system: Path) -> None:
+    text = """
+targets:
+  - path: [/a, /b]
+    latency: max < 1 us
+  - timer: /source
+    lateness: max < 1 us
+  - callback: Timer(10 ms)
+    node: /slow
+    duration: max < 1 us
+  - topic: /b
+    latency: [max < 1 us, min > 1 s]
+  - service: /add
+    round_trip: max < 1 us
+"""
+    found = {(row["subject"], row["condition"]): row for row in rows(check(text))}
+    assert found.pop(("/b → /sink", "min > 1 s"))["see"] is None
+    assert len(found) == 5
+    kinds = set()
+    with Database(system) as database:
+        for row in found.values():
+            assert row["worst_ns"] == row["value"]
+            *words, option, identity = row["see"].split()
+            assert words == ["msgflow", "flow"]
+            kind = f"{option[2:].replace('-', '_')}_id"
+            kinds.add(kind)
+            assert str(database.flow(**{kind: int(identity)}))
+    assert kinds == {"take_id", "callback_instance_id", "request_id"}
+
+
+def test_what_was_not_measured_says_why(check: Check) -> None:
+    verification = check(
+        "targets:\n  - path: [/b, /c]\n    latency: p99 < 1 s\n"
+        "  - topic: /c\n    node: /source\n    rate: < 1 Hz\n"
+    )
+    first, second = rows(verification)
+    assert (first["verdict"], second["verdict"]) == ("not measured", "not measured")
+    assert "along this path" in first["reason"]
+    assert "in the time window" in second["reason"]
+
+
+def test_patterns_mean_what_they_match(check: Check) -> None:
+    text = 'targets:\n  - topic: "/[ab]"\n    latency: max < 1 s\n'
+    assert [row["subject"] for row in rows(check(text))] == [
+        "/a → /relay",
+        "/a → /slow",
+        "/b → /sink",
+    ]
+
+
+def test_a_path_passes_every_topic_that_is_named(check: Check) -> None:
+    text = "targets:\n  - path: [/a, /c, /b]\n    latency: max < 1 s\n"
+    assert [row["verdict"] for row in rows(check(text))] == ["not measured"]
+
+
+def test_every_metric_reads_columns_that_its_query_has(check: Check) -> None:
+    """With a condition that nothing meets, so that worst cases are looked for, too."""
+    units = {"ns": "1 ns", "Hz": "1 Hz", "share": "1 %", "count": "1"}
+    names = {"path": "[/a, /b]", "timer": "/source", "callback": "Sub*", "topic": "/a"}
+    names |= {"service": "/add", "process": "process"}
+    for kind, subject in SUBJECTS.items():
+        for name, metric in subject.metrics.items():
+            assert metric.worst is None or metric.worst in KEYS
+            assert load_query(metric.query)
+            for statistic in metric.statistics or ("",):
+                text = f"{statistic} < {units[metric.dimension]}".strip()
+                found = rows(check(f'targets:\n  - {kind}: {names[kind]}\n    {name}: "{text}"\n'))
+                assert found
+                assert all(row["verdict"] in ("passed", "failed") for row in found), found
+
+
+def test_lost_messages_are_a_share_of_those_connected(tmp_path: Path) -> None:
+    simulation = simulate("overload", tmp_path / "trace", factor=0.2)
+    targets = tmp_path / "targets.yaml"
+    targets.write_text('targets:\n  - topic: "*"\n    loss: < 0 %\n    completeness: "> 100 %"\n')
+    with Database(tmp_path / "run.duckdb") as database:
+        database.ingest(simulation.directory)
+        found = rows(database.verify(targets))
+        delivery = database.query("delivery").to_arrow().to_pylist()
+    for row in delivery:
+        connected = row["published"] - row["unconnected"]
+        values = {
+            one["metric"]: one["value"]
+            for one in found
+            if one["subject"] == f"{row['topic_name']} → {row['subscriber']}"
+        }
+        assert values["loss"] == pytest.approx(row["lost"] / connected)
+        assert values["completeness"] == pytest.approx(row["delivered"] / connected, abs=1e-4)
+    assert any(row["value"] < 1 for row in found if row["metric"] == "completeness")
+
+
+@pytest.mark.parametrize("name", ["demo", "services"])
+def test_a_run_meets_what_is_suggested_from_it(name: str, tmp_path: Path) -> None:
+    simulation = simulate(name, tmp_path / "trace", factor=0.5)
+    targets = tmp_path / "targets.yaml"
+    with Database(tmp_path / "run.duckdb") as database:
+        database.ingest(simulation.directory)
+        targets.write_text(database.suggest_targets(), encoding="utf-8")
+        verification = database.verify(targets)
+        targets.write_text(database.suggest_targets(margin=0), encoding="utf-8")
+        closest = database.verify(targets)
+    assert len(verification.result) > 5
+    assert verification.count("passed") == len(verification.result)
+    assert closest.count("passed") == len(closest.result)
+    kinds = {row["metric"] for row in rows(verification)}
+    assert "rate" in kinds
+    assert ({"latency", "completeness"} if name == "demo" else {"round_trip"}) <= kinds
+
+
+def test_a_negative_margin_is_refused(system: Path) -> None:
+    with Database(system) as database, pytest.raises(UsageError, match="0 or more"):
+        database.suggest_targets(margin=-0.1)
+
+
+def test_junit_has_a_case_per_verdict(check: Check) -> None:
+    text = (
+        "targets:\n  - path: [/a, /b]\n    latency: [max < 1 us, max > 0 ns]\n"
+        "  - path: [/b, /c]\n    latency: max < 1 us\n"
+    )
+    verification = check(text)
+    root = ElementTree.fromstring(verification.to_junit())
+    assert {key: root.attrib[key] for key in ("tests", "failures", "errors", "skipped")} == {
+        "tests": "3", "failures": "1", "errors": "1", "skipped": "0",
+    }  # fmt: skip
+    tags = [[child.tag for child in case] for case in root.iter("testcase")]
+    assert tags == [["failure"], ["error"], []]
+    failure = next(root.iter("failure"))
+    assert failure.attrib["message"] == "measured 996.330 µs"
+    assert "msgflow flow --take" in (failure.text or "")
+    skipped = ElementTree.fromstring(verification.to_junit(allow_not_measured=True))
+    assert (skipped.attrib["errors"], skipped.attrib["skipped"]) == ("0", "1")
+
+
+def test_hostile_names_are_text_in_junit(system: Path, tmp_path: Path) -> None:
+    names = (*HOSTILE, "]]>&amp;<x a='", "line\nfeed\r\x07")
+    path = renamed(system, tmp_path / "hostile.duckdb", names)
+    targets = tmp_path / "targets.yaml"
+    targets.write_text(
+        'targets:\n  - callback: "*"\n    duration: max < 1 ns\n'
+        '  - topic: "*"\n    rate: < 0 Hz\n  - process: "*"\n    utilisation: < 0 %\n',
+        encoding="utf-8",
+    )
+    with Database(path) as database:
+        text = database.verify(targets).to_junit()
+    root = ElementTree.fromstring(text)
+    assert len(list(root.iter("testcase"))) > 8
+    assert {element.tag for element in root.iter()} <= {
+        "testsuites", "testsuite", "testcase", "failure", "error",
+    }  # fmt: skip
+    for element in root.iter():
+        for value in element.attrib.values():
+            assert value.isprintable()
