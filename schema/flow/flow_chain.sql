@@ -2,26 +2,49 @@
 -- kind: macro
 -- description: The chains of main.flow_path, each as its last step and a pointer to the chain
 --     without it: lists of what lies on them would cost the square of their length. No
---     subscription comes twice in a chain: a bit for each one tells which were there.
+--     subscription comes twice in a chain: a bit for each one tells which were there. A name or
+--     glob that fits a topic stands for topics, one that fits none for nodes: a node is often
+--     called like the topic that it publishes.
 -- grain: one row per run and chain
--- needs: derive.flow_hop, derive.is_among, store.publisher, store.subscription, store.node
+-- needs: derive.flow_hop, store.publisher, store.subscription, store.node
 CREATE OR REPLACE MACRO derive.flow_chain(
     runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
 ) AS TABLE
-WITH RECURSIVE hop AS MATERIALIZED (
+WITH RECURSIVE wanted AS (
+    SELECT DISTINCT is_end, trim(pattern) AS pattern
+    FROM (
+        SELECT false AS is_end, unnest(string_split(from_topic::VARCHAR, ',')) AS pattern
+        UNION ALL
+        SELECT true, unnest(string_split(to_topic::VARCHAR, ','))
+    )
+),
+wanted_topic AS MATERIALIZED (
+    SELECT DISTINCT w.is_end, w.pattern, p.topic_name
+    FROM wanted AS w
+    JOIN store.publisher AS p ON p.topic_name = w.pattern OR p.topic_name GLOB w.pattern
+    WHERE list_contains(runs, p.run_id)
+),
+wanted_node AS MATERIALIZED (
+    SELECT DISTINCT w.is_end, n.node_id
+    FROM wanted AS w
+    ANTI JOIN wanted_topic AS t ON w.is_end = t.is_end AND w.pattern = t.pattern
+    JOIN store.node AS n ON n.full_name = w.pattern OR n.full_name GLOB w.pattern
+    WHERE list_contains(runs, n.run_id)
+),
+hop AS MATERIALIZED (
     SELECT
         h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id, h.is_cached,
         CASE
             WHEN h.from_subscription_id IS NOT NULL THEN false
             WHEN from_topic IS NULL THEN h.is_source
-            ELSE derive.is_among(from_topic, p.topic_name, pn.full_name)
+            ELSE (p.topic_name IN (SELECT topic_name FROM wanted_topic WHERE NOT is_end)) IS true
+                OR (p.node_id IN (SELECT node_id FROM wanted_node WHERE NOT is_end)) IS true
         END AS is_start,
-        to_topic IS NOT NULL AND derive.is_among(to_topic, p.topic_name, sn.full_name) AS is_last
+        (p.topic_name IN (SELECT topic_name FROM wanted_topic WHERE is_end)) IS true
+        OR (s.node_id IN (SELECT node_id FROM wanted_node WHERE is_end)) IS true AS is_last
     FROM derive.flow_hop AS h
     JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
-    LEFT JOIN store.node AS pn ON p.node_id = pn.node_id
     JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
-    LEFT JOIN store.node AS sn ON s.node_id = sn.node_id
     WHERE list_contains(runs, h.run_id)
 ),
 -- Only what leads to the end asked for is followed, so that nothing else is enumerated.

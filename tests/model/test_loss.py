@@ -503,9 +503,14 @@ def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse
 
 
 def test_a_callback_with_the_rest_of_its_take(system: RosSystem, analyse: Analyse) -> None:
-    """The layers with the stamp are in the gap, the last one is not; then a whole one without."""
+    """The layers with the stamp are in the gap, the last one is not; then a call without any. A take
+    before shows that takes have events here.
+    """
     thread = Thread(100)
     system.subscription(thread, 0x30, "/a", callback=0xC1)
+    system.take(thread, 0x30, 1)
+    system.start(thread, 0xC1)
+    system.end(thread, 0xC1)
     system.add("ros2:rmw_take", thread, message=0xB)
     system.lose()
     system.add("ros2:rclcpp_take", thread, message=0xB)

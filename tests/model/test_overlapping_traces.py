@@ -90,7 +90,7 @@ def test_a_second_session_counts_nothing_twice(system: RosSystem, analyse: Analy
         assert model.value(f"SELECT count(*) FROM {table}") == 1, table
     ((trace, severity, count, detail),) = model.rows(FOUND)
     assert (trace, severity, count) == (2, "warning", 9 + 5 * 8)
-    assert detail.endswith("that the trace trace-0 holds as well: left out")
+    assert detail.endswith("left out because the trace trace-0 has them too")
     assert failed_checks(model) == []
 
 
