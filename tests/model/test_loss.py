@@ -503,8 +503,9 @@ def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse
 
 
 def test_a_callback_with_the_rest_of_its_take(system: RosSystem, analyse: Analyse) -> None:
-    """The layers with the stamp are in the gap, the last one is not; then a call without any. A take
-    before shows that takes have events here.
+    """The layers with the stamp are in the gap, the last one is not; then a call without any.
+
+    The take before shows that takes have events here.
     """
     thread = Thread(100)
     system.subscription(thread, 0x30, "/a", callback=0xC1)
