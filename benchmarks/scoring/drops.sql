@@ -15,6 +15,7 @@ WITH accepted AS (
         -- A take that failed meanwhile goes before these.
         ('lost_in_transport', 'take_failed'),
         ('overwritten', 'take_failed'),
+        ('before_discovery', 'take_failed'),
         -- That a message has expired does not show.
         ('expired', 'lost_in_transport'),
         ('expired', 'not_delivered'),
@@ -78,6 +79,7 @@ said AS (
             -- Where a gap may hide the better partner, a message in a ring buffer has no link.
             WHEN v.reason = 'receiver_gap' AND t.is_in_hole AND NOT t.is_decided
                 THEN 'events are missing'
+            WHEN t.is_unseen AND v.reason <> 'receiver_gap' THEN 'a stream is missing'
             -- Objects whose handles were used again may be mixed up where one was not seen.
             WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN
                 'initialisation is missing'

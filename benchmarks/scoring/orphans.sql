@@ -8,6 +8,8 @@ WITH accepted AS (
         ('sent, pause', 'publisher_gap'),
         ('sent, loss', 'publisher_gap'),
         ('sent, packets', 'publisher_gap'),
+        -- Overwritten before the first snapshot.
+        ('sent, packets', 'before_tracing'),
         ('sent, truncation', 'publisher_gap'),
         ('sent, truncation', 'publisher_trace_ends'),
         ('sent, stop', 'publisher_trace_ends'),
@@ -22,7 +24,10 @@ WITH accepted AS (
         ('taken or sent, truncation', 'publisher_gap'),
         -- The message was kept for subscriptions that come late, or nothing of it is traced.
         ('kept', 'no_stamp'),
-        ('no event', 'no_stamp')
+        ('no event', 'no_stamp'),
+        -- A publication without a trace is one of whoever was not traced.
+        ('sent, no event', 'publisher_not_traced'),
+        ('sent, no event', 'unknown')
     ) AS a(truth, reason)
 ),
 orphan AS (
@@ -37,7 +42,8 @@ matched AS (
     SELECT
         o.take_id, o.reason, any_value(m.truth) AS truth, bool_or(m.is_undecided) AS is_undecided,
         bool_or(m.is_in_hole) AS is_in_hole, bool_or(m.is_beside_hole) AS is_beside_hole,
-        bool_or(m.has_absent) AS has_absent, bool_or(m.is_unnamed) AS is_unnamed
+        bool_or(m.has_absent) AS has_absent, bool_or(m.is_unnamed) AS is_unnamed,
+        bool_or(m.is_torn) AS is_torn, bool_or(m.is_unseen) AS is_unseen
     FROM orphan AS o
     JOIN truth_time AS t
         ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
@@ -54,8 +60,17 @@ SELECT
             THEN 'events are missing'
         WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_beside_hole
             THEN 'events are missing'
+        WHEN m.is_unseen AND m.reason = 'publisher_not_traced' THEN 'a stream is missing'
+        WHEN m.truth = 'sent, no event' AND m.reason = 'receiver_gap' AND m.is_torn
+            THEN 'events are missing'
+        WHEN m.truth = 'sent, no event'
+            AND m.reason IN ('before_tracing', 'publisher_gap', 'publisher_trace_ends')
+            AND m.is_beside_hole
+            THEN 'events are missing'
+        WHEN m.truth = 'sent, no event' AND m.reason = 'ambiguous' THEN 'the link is not decided'
         -- Whoever publishes anything may have sent a message of a topic that is not known.
-        WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_unnamed
+        WHEN (m.is_undecided OR m.truth = 'sent, no event') AND m.reason = 'publisher_gap'
+            AND m.is_unnamed
             THEN 'initialisation is missing'
         WHEN m.is_undecided AND m.reason IN ('ambiguous', 'unknown') THEN 'the link is not decided'
         -- One of them was recorded, and another one that was not may have sent it.

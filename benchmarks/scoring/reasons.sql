@@ -219,6 +219,12 @@ SEMI JOIN (
 GROUP BY host, pid, subscription_handle
 HAVING count(*) > 1;
 
+-- CPUs of which not one whole packet is in the trace: it does not show that there is more to them.
+CREATE OR REPLACE TEMP TABLE truth_unseen_cpu AS
+SELECT DISTINCT host, cpu
+FROM truth_hole
+WHERE cpu IS NOT NULL AND begin_ns = -9223372036854775807 AND end_ns = 9223372036854775807;
+
 -- Messages that a subscription did take, and why the event of that is not in the trace, if it is
 -- not. Copies of messages that come through a ring buffer as well are no deliveries.
 CREATE OR REPLACE TEMP TABLE truth_delivery AS
@@ -227,7 +233,8 @@ SELECT
     coalesce(any_value(u.cause), 'recorded') AS cause,
     bool_or(x.is_in_hole) AS is_in_hole,
     any_value(x.unclear) AS unclear,
-    bool_or(coalesce(l.is_decided, false)) AS is_decided
+    bool_or(coalesce(l.is_decided, false)) AS is_decided,
+    bool_or((u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu)) AS is_unseen
 FROM simulated_take AS t
 JOIN truth_pair AS s
     ON t.publication_id = s.publication_id AND t.subscription_id = s.subscription_id
@@ -260,13 +267,27 @@ written AS (
     WHERE event = 'dds:write'
     GROUP BY publication_id
 ),
+-- How far stamps are from the clock of the trace.
+shift AS (
+    SELECT host, min(source_timestamp_ns - rmw_ns) AS shift_ns
+    FROM simulated_publication
+    GROUP BY host
+),
+-- Some ways to publish have no events, such as loaned and serialised messages of older releases.
 sent AS (
     SELECT
         p.publication_id, p.topic_name, p.host, p.pid, p.tid, p.intra_ns,
-        CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END AS stamped_ns
+        coalesce(p.intra_ns, p.rclcpp_ns, p.rcl_ns, p.rmw_ns) IS NULL
+        AND p.publication_id NOT IN (SELECT publication_id FROM simulated_dds_event)
+            AS has_no_event,
+        coalesce(
+            CASE WHEN l.is_dds_stamped THEN w.ts_ns ELSE p.rmw_ns END,
+            p.source_timestamp_ns - h.shift_ns
+        ) AS stamped_ns
     FROM simulated_publication AS p
     CROSS JOIN layout AS l
     LEFT JOIN written AS w ON p.publication_id = w.publication_id
+    LEFT JOIN shift AS h ON p.host = h.host
 ),
 sender AS (
     SELECT DISTINCT topic_name, host, pid FROM simulated_publication
@@ -316,6 +337,7 @@ SELECT
     CASE
         WHEN t.method = 'callback_only' OR NOT y.has_take AND t.method <> 'ring_buffer'
             THEN 'no event'
+        WHEN s.has_no_event THEN 'sent, no event'
         WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
         -- What there is of a packet that is cut may have been read.
         WHEN k.cause = 'truncation' AND u.cause IS NOT NULL THEN concat('taken or sent, ', u.cause)
@@ -328,7 +350,9 @@ SELECT
     t.take_id IN (FROM hidden) AS is_in_hole,
     t.take_id IN (FROM beside_hole) AS is_beside_hole,
     (t.host, t.pid) IN (FROM unnamed) AS is_unnamed,
-    t.publication_id IN (FROM absent) AS has_absent
+    t.publication_id IN (FROM absent) AS has_absent,
+    k.cause IS NOT NULL AS is_torn,
+    (u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu) AS is_unseen
 FROM simulated_take AS t
 CROSS JOIN truth_layout AS y
 JOIN simulated_transport AS x ON t.take_id = x.take_id

@@ -172,6 +172,27 @@ far_host AS (
     HAVING abs(min_by(source_timestamp_ns - rmw_ns, rmw_ns)) > 5_000_000
         OR count(DISTINCT source_timestamp_ns) < 0.99 * count(*)
 ),
+-- Stamped while events of the host were missing, later than nearly all are after they were written:
+-- another message may have been written in between.
+torn_stamp AS (
+    SELECT DISTINCT p.publication_id
+    FROM (
+        SELECT
+            publication_id, host, pid, rmw_ns, stamped_ns,
+            quantile_disc(stamped_ns - rmw_ns, 0.99) OVER (PARTITION BY host) AS usual_ns
+        FROM (
+            SELECT
+                publication_id, host, pid, rmw_ns,
+                source_timestamp_ns - min(source_timestamp_ns - rmw_ns) OVER (PARTITION BY host)
+                    AS stamped_ns
+            FROM simulated_publication
+        )
+    ) AS p
+    JOIN truth_hole AS h
+        ON p.host = h.host AND coalesce(p.pid = h.pid, true)
+        AND p.rmw_ns < h.end_ns AND p.stamped_ns > h.begin_ns
+    WHERE p.stamped_ns - p.rmw_ns > p.usual_ns
+),
 -- Messages that another one of the topic resembles: by an equal stamp, or from another publisher at
 -- nearly the same time.
 twin AS (
@@ -226,6 +247,7 @@ asked AS (
                     AND (t.take_host, t.take_pid)
                         NOT IN (SELECT (host, pid) FROM unknown_process)
                     AND t.publication_host NOT IN (FROM far_host)
+                    AND t.publication_id NOT IN (FROM torn_stamp)
                     AND p.is_whole
             END
         ) AS is_decided

@@ -51,7 +51,7 @@ course AS (
 located AS (
     SELECT
         b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.publication_id, b.written_ns,
-        b.next_event_ns, c.state, c.before, c.after,
+        b.next_event_ns, b.has_break, c.state, c.before, c.after,
         c.state.difference_ns
         + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns,
         -- Where the drift is not known there may be any, also among the messages that vote.
@@ -87,6 +87,7 @@ published AS MATERIALIZED (
         side, clock_id, topic_name, publisher_id, publication_id, written_ns,
         written_ns + then_ns AS opens_ns,
         next_event_ns + then_ns AS closes_ns,
+        next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
         wander_ns > 0 AND coalesce(
             least(
                 written_ns - lag(written_ns) OVER on_topic,
@@ -131,7 +132,7 @@ looked_for AS (
 ),
 within AS MATERIALIZED (
     SELECT
-        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.clock_id, p.closes_ns,
+        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.clock_id, p.goes_on,
         p.is_crowded, m.source_timestamp_ns - p.opens_ns AS delay_ns,
         row_number() OVER (
             PARTITION BY p.publication_id, p.side ORDER BY m.source_timestamp_ns
@@ -148,7 +149,8 @@ within AS MATERIALIZED (
 share AS (
     SELECT
         publisher_id,
-        sum(closes_ns - opens_ns) / greatest(max(opens_ns) - min(opens_ns), 1) AS writing
+        sum(CASE WHEN goes_on THEN closes_ns - opens_ns END)
+        / greatest(max(opens_ns) - min(opens_ns), 1) AS writing
     FROM published
     GROUP BY publisher_id
 ),
@@ -165,14 +167,14 @@ usual AS (
         quantile_disc(w.delay_ns, derive.clock_limit().usual_quantile) AS usual_ns
     FROM within AS w
     JOIN share AS s ON w.publisher_id = s.publisher_id
-    WHERE w.place = 1 AND w.closes_ns IS NOT NULL
+    WHERE w.place = 1 AND w.goes_on
     GROUP BY w.publisher_id
 ),
 -- Of a publisher that was never seen to go on, what is usual on its host is expected.
 usual_of_clock AS (
     SELECT clock_id, quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns
     FROM within
-    WHERE place = 1 AND closes_ns IS NOT NULL
+    WHERE place = 1 AND goes_on
     GROUP BY clock_id
 ),
 plausible AS (
@@ -183,7 +185,7 @@ plausible AS (
     LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
     LEFT JOIN usual_of_clock AS c ON w.clock_id = c.clock_id
     WHERE CASE
-        WHEN w.closes_ns IS NOT NULL THEN coalesce(w.delay_ns <= u.limit_ns, true)
+        WHEN w.goes_on THEN coalesce(w.delay_ns <= u.limit_ns, true)
         ELSE w.delay_ns <= coalesce(
             derive.clock_limit().usual_factor * coalesce(u.usual_ns, c.usual_ns),
             derive.clock_limit().write_ns

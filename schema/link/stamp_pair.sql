@@ -12,7 +12,12 @@
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
 WITH published AS MATERIALIZED (
     SELECT
-        run_id, clock_id, topic_name, publisher_id, written_ns, next_event_ns,
+        run_id, clock_id, topic_name, publisher_id, written_ns,
+        CASE
+            WHEN next_event_ns IS NULL OR has_break
+                THEN least(next_event_ns, written_ns + derive.clock_limit().write_ns)
+            ELSE next_event_ns
+        END AS closes_ns,
         row_number() OVER in_order AS position,
         lead(written_ns) OVER in_order AS next_written_ns
     FROM derive.unstamped_publication(only_run)
@@ -124,8 +129,7 @@ paired AS (
         p.written_ns,
         (p.written_ns - w.start_ns) // w.stretch_ns AS stretch,
         w.source_timestamp_ns - p.written_ns AS greatest_ns,
-        w.source_timestamp_ns
-        - coalesce(p.next_event_ns, p.written_ns + derive.clock_limit().write_ns) AS least_ns,
+        w.source_timestamp_ns - p.closes_ns AS least_ns,
         w.source_timestamp_ns - p.next_written_ns AS later_ns
     FROM wanted AS w
     JOIN published AS p ON w.publisher_id = p.publisher_id AND w.position = p.position

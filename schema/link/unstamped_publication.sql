@@ -21,8 +21,9 @@ SELECT
     b.publisher_id,
     b.publication_id,
     coalesce(b.rmw_ns, b.rcl_ns) AS written_ns,
-    -- Behind a gap nobody knows what the thread did next.
-    CASE WHEN k.resumed_ns <= b.next_event_ns IS NOT TRUE THEN b.next_event_ns END AS next_event_ns
+    b.next_event_ns,
+    -- The thread may have gone on earlier, and published more, while it was not seen.
+    coalesce(k.resumed_ns <= b.next_event_ns, false) AS has_break
 FROM store.publication AS b
 JOIN unstamped AS u ON b.process_id = u.process_id
 JOIN store.publisher AS p ON b.publisher_id = p.publisher_id

@@ -25,7 +25,7 @@ CREATE SCHEMA derive;
 CREATE SCHEMA store;
 CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
     topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, publication_id BIGINT,
-    written_ns BIGINT, next_event_ns BIGINT);
+    written_ns BIGINT, next_event_ns BIGINT, has_break BOOLEAN DEFAULT false);
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, clock_id BIGINT DEFAULT 1, taken_ns BIGINT);
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,

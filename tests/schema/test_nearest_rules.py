@@ -117,6 +117,38 @@ def test_or_for_twice_what_is_usual_for_it(
     assert nearest(rules).get(time + delay) == ((999, 1) if is_found else None)
 
 
+@pytest.mark.parametrize(
+    ("next_event", "delay", "is_found"),
+    [
+        pytest.param(900_000, 396_000, True, id="usual"),
+        pytest.param(900_000, 396_001, False, id="unusual"),
+        pytest.param(300_000, 299_999, True, id="before_it_is_seen_again"),
+        pytest.param(300_000, 300_000, False, id="behind"),
+    ],
+)
+def test_who_is_seen_again_behind_a_gap_may_have_gone_on_before(
+    rules: duckdb.DuckDBPyConnection, next_event: int, delay: int, *, is_found: bool
+) -> None:
+    """What was written behind a gap bounds the search, and is no example of what is usual."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, (n * MICROSECOND for n in range(1, 201)), MILLISECOND)
+    broken = periodic(rules, [MILLISECOND - 1] * 10, MILLISECOND)
+    rules.execute(
+        "UPDATE published SET publication_id = 1000 + publication_id, has_break = true, "
+        "written_ns = written_ns + ?, next_event_ns = next_event_ns + ? WHERE rowid >= 200",
+        [time, time],
+    )
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns + ? WHERE rowid >= 200",
+        [time],
+    )
+    time += broken
+    publish(rules, 999, time, time + next_event)
+    rules.execute("UPDATE published SET has_break = true WHERE publication_id = 999")
+    take(rules, time + delay)
+    assert nearest(rules).get(time + delay) == ((999, 1) if is_found else None)
+
+
 @pytest.mark.parametrize(("delay", "is_found"), [(396_000, True), (396_001, False)])
 def test_or_for_twice_what_is_usual_on_its_host(
     rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool

@@ -24,6 +24,24 @@ def pairs(con: duckdb.DuckDBPyConnection, columns: str) -> Sequence[tuple[Any, .
 
 
 @pytest.mark.parametrize(
+    ("next_event", "has_break", "closes"),
+    [
+        pytest.param(9_000_000, False, 9_000_000, id="seen_to_go_on"),
+        pytest.param(9_000_000, True, 5_000_000, id="not_seen_for_a_while"),
+        pytest.param(4_000_000, True, 4_000_000, id="nor_after_that"),
+        pytest.param(None, False, 5_000_000, id="never"),
+    ],
+)
+def test_how_long_a_message_is_written(
+    rules: duckdb.DuckDBPyConnection, next_event: int | None, has_break: bool, closes: int
+) -> None:
+    publish(rules, (1, 0, next_event))
+    rules.execute("UPDATE published SET has_break = ?", [has_break])
+    rules.execute("INSERT INTO message (source_timestamp_ns, taken_ns) VALUES (100, 200)")
+    assert pairs(rules, "least_ns, greatest_ns") == [(100 - closes, 100)]
+
+
+@pytest.mark.parametrize(
     ("duration_ns", "messages", "count"),
     [
         pytest.param(10 * SECOND, 1_200, 20, id="half_a_second_each"),
@@ -48,8 +66,8 @@ def test_stretches_of_time(
 def test_enough_messages_of_a_stretch_of_every_publisher(rules: duckdb.DuckDBPyConnection) -> None:
     for publisher, topic in ((1, "/a"), (2, "/b")):
         rules.execute(
-            "INSERT INTO published "
-            "SELECT 1, 1, ?, ?, n, n * 2000000000, NULL FROM range(2) AS r(n)",
+            "INSERT INTO published (topic_name, publisher_id, publication_id, written_ns) "
+            "SELECT ?, ?, n, n * 2000000000 FROM range(2) AS r(n)",
             [topic, publisher],
         )
         rules.execute(

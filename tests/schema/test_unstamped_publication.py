@@ -1,4 +1,4 @@
-"""What a thread did after it published is known only where nothing of it is missing meanwhile."""
+"""What a thread did after it published is certain only where nothing of it is missing meanwhile."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ CREATE TABLE store.thread_break (thread_id BIGINT, resumed_ns BIGINT);
 
 
 @pytest.mark.parametrize(
-    ("resumed", "thread", "next_event"),
-    [(100, 1, 200), (101, 1, None), (200, 1, None), (201, 1, 200), (150, 2, 200)],
+    ("resumed", "thread", "has_break"),
+    [(100, 1, False), (101, 1, True), (200, 1, True), (201, 1, False), (150, 2, False)],
 )
-def test_the_next_event_behind_a_gap(resumed: int, thread: int, next_event: int | None) -> None:
+def test_the_next_event_behind_a_gap(resumed: int, thread: int, has_break: bool) -> None:
     with derived(STAGE, {"unstamped_publication"}) as con:
         con.execute("INSERT INTO store.thread_break VALUES (?, ?)", [thread, resumed])
-        assert con.sql("SELECT next_event_ns FROM derive.unstamped_publication(1)").fetchall() == [
-            (next_event,)
-        ]
+        assert con.sql(
+            "SELECT next_event_ns, has_break FROM derive.unstamped_publication(1)"
+        ).fetchall() == [(200, has_break)]
