@@ -53,7 +53,7 @@ SECOND = 1_000_000_000
 PERFECT = "perfect"
 LONG = "long_recording"
 # Recall of the half an hour in which clocks drift apart by 36 ms; and of bursts that another host
-# takes: where losses leave few publications of a stretch, its clocks are known to a microsecond only.
+# takes: where losses leave few publications, the clocks are known to a microsecond only.
 LOWEST_RECALL = {LONG: 0.999, "bursts_two_hosts": 0.998}
 
 # So small that a second of a system fills some.
