@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from msgflow.export.formats import by_suffix
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -25,6 +27,7 @@ TABLES = (EventFormat.CSV, EventFormat.PARQUET)
 """The formats with columns."""
 
 _SUFFIXES = {
+    ".txt": EventFormat.TEXT,
     ".json": EventFormat.JSON,
     ".jsonl": EventFormat.JSONL,
     ".csv": EventFormat.CSV,
@@ -38,12 +41,16 @@ def is_directory(path: Path) -> bool:
 
 
 def format_of(path: Path | None) -> EventFormat:
-    """Return the format that an output path asks for: by its suffix, Parquet for a directory."""
+    """Return the format that an output path asks for: by its suffix, Parquet for a directory.
+
+    Raises:
+        UsageError: no format has this suffix.
+    """
     if path is None:
         return EventFormat.TEXT
     if is_directory(path):
         return EventFormat.PARQUET
-    return _SUFFIXES.get(path.suffix.lower(), EventFormat.TEXT)
+    return by_suffix(path, _SUFFIXES) if path.suffix else EventFormat.TEXT
 
 
 def table_writer(form: EventFormat, sink: Any, schema: pa.Schema) -> Any:

@@ -63,6 +63,17 @@ def test_the_suffix_chooses_the_format(msgflow: Msgflow, trace: Path) -> None:
     assert ids == [event["event_id"] for event in expected]
 
 
+def test_a_suffix_of_no_format_is_refused(msgflow: Msgflow, trace: Path) -> None:
+    for name in ("e.xlsx", "e.xyz"):
+        refused = msgflow("events", trace, "-o", name)
+        assert (refused.exit_code, refused.stdout) == (2, "")
+        assert f"error: no format has this suffix — {name}" in refused.stderr
+        assert "hint: end it with .txt, .json, .jsonl, .csv, .parquet" in refused.stderr
+        assert not Path(name).exists()
+    assert msgflow("events", trace, "-o", "e.log", "--format", "text").exit_code == 0
+    assert Path("e.log").read_text() == msgflow("events", trace).stdout
+
+
 def test_a_directory_gets_a_file_per_event(msgflow: Msgflow, trace: Path) -> None:
     assert msgflow("events", trace, "-o", "out").exit_code == 0
     assert "ros2.rcl_publish.parquet" in os.listdir("out")
