@@ -79,6 +79,10 @@ said AS (
             -- Where a gap may hide the better partner, a message in a ring buffer has no link.
             WHEN v.reason = 'receiver_gap' AND t.is_in_hole AND NOT t.is_decided
                 THEN 'events are missing'
+            -- Nor is a take that has no event, in a node without events of callbacks.
+            WHEN v.reason IN ('pending_at_end', 'subscription_ended') AND NOT t.is_decided
+                AND t.cause = 'recorded' AND (SELECT NOT has_take FROM truth_layout)
+                THEN 'takes have no event'
             WHEN t.is_unseen AND v.reason <> 'receiver_gap' THEN 'a stream is missing'
             -- Objects whose handles were used again may be mixed up where one was not seen.
             WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN

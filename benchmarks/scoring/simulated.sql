@@ -302,9 +302,9 @@ doubtful_cause AS (
         AND coalesce(c.publication_rmw_ns, c.publication_rcl_ns) > h.begin_ns
     WHERE c.kind <> 'direct'
 ),
--- Which of several runs filled a cache is not in the trace. It is decided where the run that did
--- ended before the publishing one began, and (partial_sync) no other of its callback ran from its
--- start to the publication, or (periodic_async) ended after it and before the publishing one began.
+-- Which of several callback instances filled a cache is not in the trace, nor when it was read. It
+-- is decided where the one that did ended before the publishing one began, and no other of its
+-- callback ran from its start to the publication.
 doubtful AS (
     SELECT DISTINCT c.callback_instance_id, c.publication_id
     FROM simulated_causal AS c
@@ -314,11 +314,7 @@ doubtful AS (
     LEFT JOIN simulated_callback_instance AS o
         ON i.host = o.host AND i.pid = o.pid AND i.callback_handle = o.callback_handle
         AND i.callback_instance_id <> o.callback_instance_id
-        AND CASE c.kind
-            WHEN 'partial_sync' THEN
-                coalesce(o.end_ns > i.start_ns, true) AND o.start_ns < b.rcl_ns
-            ELSE o.end_ns > i.end_ns AND o.end_ns <= r.start_ns
-        END
+        AND coalesce(o.end_ns > i.start_ns, true) AND o.start_ns < b.rcl_ns
     WHERE c.kind IN ('periodic_async', 'partial_sync')
         AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
 ),
