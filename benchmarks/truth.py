@@ -55,6 +55,10 @@ LONG = "long_recording"
 # Recall of the half an hour in which clocks drift apart by 36 ms; and of bursts that another host
 # takes: where losses leave few publications, the clocks are known to a microsecond only.
 LOWEST_RECALL = {LONG: 0.999, "bursts_two_hosts": 0.998}
+# Recorded with losses: their truth says which events are missing, but not where others might be. A
+# link over such a place is not decided, and a publication may be torn in two. Precision is judged.
+LOSSY_RECORDINGS = {"intra_lost", "lossy_intra", "lossy_intra_mt"}
+LOSSY_RECALL = 0.93
 
 # So small that a second of a system fills some.
 _SMALL = 4096
@@ -165,8 +169,9 @@ class Judged:
     @property
     def is_good(self) -> bool:
         """Whether every figure that must be 1.000 is."""
-        lowest = LOWEST_RECALL.get(self.system, 1)
-        is_complete = self.score.recall >= lowest
+        if self.system in LOSSY_RECORDINGS:
+            return not self.score.wrong and self.score.recall >= LOSSY_RECALL
+        is_complete = self.score.recall >= LOWEST_RECALL.get(self.system, 1)
         faults = (self.score.wrong, self.score.repeated, self.score.doubted)
         return is_complete and not any(faults)
 
