@@ -1,4 +1,4 @@
-"""Measures what a user waits for before anything happens: `--help`, and a query on little data.
+"""Measures what a user waits for before anything happens: help, Tab, and a query on little data.
 
     python benchmarks/startup.py [--runs 15]
 
@@ -10,6 +10,7 @@ other work on the machine slows all of them alike.
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import subprocess
 import sys
@@ -18,12 +19,25 @@ import time
 from pathlib import Path
 
 PYTHON = "python -c pass"
+TAB = "Tab: "
+# What a console script does; `python -m` has another name for completion.
+SCRIPT = "import sys; sys.argv[0] = 'msgflow'; from msgflow.__main__ import main; main()"
 
 
 def seconds(command: list[str]) -> float:
     """Return the wall time of a command [s]."""
     started = time.perf_counter()
-    subprocess.run(command, check=True, capture_output=True)
+    environment = os.environ
+    if command[-1].startswith(TAB):
+        line = command[-1].removeprefix(TAB)
+        environment = {
+            **os.environ,
+            "_MSGFLOW_COMPLETE": "complete_bash",
+            "COMP_WORDS": line,
+            "COMP_CWORD": str(len(line.split()) - 1),
+        }
+        command = command[:-1]
+    subprocess.run(command, check=True, capture_output=True, env=environment)
     return time.perf_counter() - started
 
 
@@ -47,6 +61,10 @@ def main() -> None:
             "msgflow query info-topics": [*msgflow, "query", "info-topics", "--db", str(database)],
             "msgflow query e2e-latency": [*msgflow, "query", "e2e-latency", "--db", str(database)],
         }
+        for words in ("query e2e", f"query flows --db {database} --topic /"):
+            line = f"msgflow {words}"
+            shown = line.replace(f" --db {database}", "")
+            commands[f"{shown} Tab"] = [sys.executable, "-c", SCRIPT, f"{TAB}{line}"]
         for command in commands.values():
             seconds(command)  # byte code and files are in the cache afterwards
         measured: dict[str, list[float]] = {name: [] for name in commands}
@@ -56,7 +74,7 @@ def main() -> None:
     python = statistics.median(measured[PYTHON])
     for name, times in measured.items():
         median = statistics.median(times)
-        print(f"{name:28} {median * 1000:7.0f} ms {median / python:6.1f} x")
+        print(f"{name:32} {median * 1000:7.0f} ms {median / python:6.1f} x")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The program `msgflow`: its commands by name, imported without the database stack."""
+"""The program `msgflow`: its commands are imported when they are asked for."""
 
 from __future__ import annotations
 
@@ -8,28 +8,6 @@ import typer
 
 # Scripts of an editable installation look for it here.
 from msgflow.__main__ import main
-from msgflow.cli import (
-    check,
-    clocks,
-    compare,
-    db,
-    events,
-    export,
-    flow,
-    graph,
-    info,
-    ingest,
-    links,
-    paths,
-    query,
-    report,
-    runs,
-    simulate,
-    sql,
-    targets,
-    ui,
-    verify,
-)
 from msgflow.cli.root import RootGroup
 from msgflow.version import __version__
 
@@ -44,26 +22,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("ingest")(ingest.command)
-app.add_typer(query.app, name="query")
-app.command("flow")(flow.command)
-app.command("graph")(graph.command)
-app.command("ui")(ui.command)
-app.command("report")(report.command)
-app.command("compare")(compare.command)
-app.command("verify")(verify.command)
-app.add_typer(targets.app, name="targets")
-app.command("events")(events.command)
-app.command("sql")(sql.command)
-app.command("info")(info.command)
-app.command("check")(check.command)
-app.add_typer(runs.app, name="runs")
-app.add_typer(links.app, name="links")
-app.add_typer(paths.app, name="paths")
-app.add_typer(clocks.app, name="clocks")
-app.add_typer(export.app, name="export")
-app.add_typer(db.app, name="db")
-app.command("simulate")(simulate.command)
 
 
 def _print_version(wanted: bool) -> None:

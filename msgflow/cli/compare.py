@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     OUTPUT,
@@ -43,8 +44,18 @@ class Case(StrEnum):
 
 
 def command(
-    run_a: Annotated[str, typer.Argument(metavar="RUN_A", help="Baseline run: name or id")],
-    run_b: Annotated[str, typer.Argument(metavar="RUN_B", help="Run to compare with it")],
+    run_a: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN_A", help="Baseline run: name or id", autocompletion=complete("run")
+        ),
+    ],
+    run_b: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN_B", help="Run to compare with it", autocompletion=complete("run")
+        ),
+    ],
     what: Annotated[
         Thing,
         typer.Option(
@@ -57,13 +68,21 @@ def command(
     from_topic: Annotated[
         str | None,
         typer.Option(
-            "--from", metavar="NAME", help="Topic where paths start", rich_help_panel=SELECTION
+            "--from",
+            metavar="NAME",
+            help="Topic where paths start",
+            autocompletion=complete("topic"),
+            rich_help_panel=SELECTION,
         ),
     ] = None,
     to_topic: Annotated[
         str | None,
         typer.Option(
-            "--to", metavar="NAME", help="Topic where paths end", rich_help_panel=SELECTION
+            "--to",
+            metavar="NAME",
+            help="Topic where paths end",
+            autocompletion=complete("topic"),
+            rich_help_panel=SELECTION,
         ),
     ] = None,
     case: Annotated[

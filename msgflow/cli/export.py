@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     OUTPUT,
@@ -32,12 +33,20 @@ _DirectoryArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Created
 _ViewsArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="VIEW", help="Public views to export, see msgflow db schema (default: all)"
+        metavar="VIEW",
+        help="Public views to export, see msgflow db schema (default: all)",
+        autocompletion=complete("view"),
     ),
 ]
 _RunOption = Annotated[
     str,
-    typer.Option("--run", metavar="NAME|ID|all", help="Run to export", rich_help_panel=SELECTION),
+    typer.Option(
+        "--run",
+        metavar="NAME|ID|all",
+        help="Run to export",
+        autocompletion=complete("run", "all"),
+        rich_help_panel=SELECTION,
+    ),
 ]
 _ForceOption = Annotated[bool, typer.Option("--force", help="Replace an earlier export")]
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     OUTPUT,
@@ -40,7 +41,13 @@ class Direction(StrEnum):
 def command(
     topic: Annotated[
         str | None,
-        typer.Option("--topic", metavar="NAME", help="Topic", rich_help_panel=_START),
+        typer.Option(
+            "--topic",
+            metavar="NAME",
+            help="Topic",
+            autocompletion=complete("topic"),
+            rich_help_panel=_START,
+        ),
     ] = None,
     at: Annotated[
         str | None,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.completion import complete
 from msgflow.export.formats import Format
 from msgflow.query.times import Times
 
@@ -26,6 +27,7 @@ RunOption = Annotated[
         "--run",
         metavar="NAME|ID|all",
         help="Run to read",
+        autocompletion=complete("run", "all"),
         show_default="the latest",
         rich_help_panel=SELECTION,
     ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from msgflow.cli.query_command import build_command, refuse_list
 from msgflow.query.catalogue import load_queries, load_query, query_names
@@ -18,9 +18,20 @@ class QueryGroup(TyperGroup):
         """Return the names of all queries."""
         return list(query_names())
 
+    _is_completed = False
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Return the queries that begin so, with their titles."""
+        # A shell needs none of their options, and nobody runs them afterwards.
+        self._is_completed = True
+        return super().shell_complete(ctx, incomplete)
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a query; an unknown name is a UsageError with a suggestion."""
-        return build_command(load_query(cmd_name))
+        header = load_query(cmd_name)
+        if self._is_completed:
+            return TyperCommand(header.name, short_help=header.title)
+        return build_command(header)
 
 
 app = typer.Typer(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from msgflow.cli.completion import complete, is_completing
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     OUTPUT,
@@ -30,6 +31,8 @@ from msgflow.query.present import MOST_ROWS
 from msgflow.query.selection import KINDS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from msgflow.query.header import Header, Param
 
 PARAMETERS = "Parameters"
@@ -179,13 +182,12 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
 
 def _option(param: Param) -> Parameter:
     flag = f"--{param.name.replace('_', '-')}"
-    choices = param.choices
     option = typer.Option(
         f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
         metavar=None if param.type == "BOOLEAN" else param.type,
         help=_escape(_describe(param)),
         show_default=False,
-        autocompletion=(lambda: list(choices)) if choices else None,
+        autocompletion=_completion(param),
         rich_help_panel=PARAMETERS,
     )
     kind: Any = bool if param.type == "BOOLEAN" else str
@@ -197,6 +199,12 @@ def _option(param: Param) -> Parameter:
         default=None if param.has_default else Parameter.empty,
         annotation=Annotated[kind | None if param.has_default else kind, option],
     )
+
+
+def _completion(param: Param) -> Callable[..., list[str]] | None:
+    if param.name in PLACE_PARAMETERS:
+        return complete("place")
+    return (lambda: list(param.choices)) if param.choices else None
 
 
 def _describe(param: Param) -> str:
@@ -229,6 +237,8 @@ def _help(header: Header) -> str:
 
 
 def _escape(text: str) -> str:
+    if is_completing():
+        return text
     from rich.markup import escape
 
     return escape(text)

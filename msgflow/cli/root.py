@@ -6,11 +6,15 @@ import errno
 import os
 import sys
 import traceback
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperGroup
 
+from msgflow.cli.completion import is_completing, take_as_typed
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.stop import STOP
 from msgflow.cli.tilde import with_home
@@ -19,7 +23,7 @@ from msgflow.query.interrupt import Terminated
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 # What the libraries below say of values, and how we do.
@@ -35,12 +39,43 @@ COMMANDS = (
 )  # fmt: skip
 
 
+class _Commands(Mapping[str, Any]):
+    """The commands by name, in the order in which a user needs them.
+
+    Each is a module of its name, imported when it is asked for: one command, and completion above
+    all, does not wait for the others.
+    """
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
+        return _built(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+@cache
+def _built(name: str) -> Any:
+    module = import_module(f"msgflow.cli.{name}")
+    around = typer.Typer(add_completion=False)
+    if hasattr(module, "app"):
+        around.add_typer(module.app, name=name)
+    else:
+        around.command(name)(module.command)
+    around.callback()(lambda: None)
+    return typer.main.get_group(around).commands[name]
+
+
 class RootGroup(TyperGroup):
     """The group of all commands; no exception leaves it."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return the commands in the order in which a user needs them."""
-        return sorted(super().list_commands(ctx), key=COMMANDS.index)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands = _Commands()  # type: ignore[assignment]
 
     def main(self, *args: Any, **options: Any) -> None:
         """Run a command line and exit with its code."""
@@ -62,6 +97,8 @@ class RootGroup(TyperGroup):
 
     def _run(self, args: Sequence[str] | None = None, **options: Any) -> ExitCode:
         options["standalone_mode"] = False
+        if is_completing():
+            take_as_typed()
         try:
             words = with_home(sys.argv[1:] if args is None else args)
             return ExitCode(super().main(words, **options) or 0)
@@ -73,6 +110,9 @@ class RootGroup(TyperGroup):
             # What a signal made fail in the libraries below is no error of its own.
             if STOP.came or _is_interrupt(error):
                 return STOP.came or ExitCode.INTERRUPTED
+            # A shell would show the words amid the line that somebody types.
+            if is_completing():
+                return ExitCode.OK
             return _code_with_words(error)
 
     def invoke(self, ctx: Any) -> Any:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     DatabaseOption,
@@ -15,7 +16,10 @@ from msgflow.cli.options import (
 )
 
 app = typer.Typer(help="List, rename and remove runs.")
-_RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="Name or id of the run")]
+_RunArgument = Annotated[
+    str,
+    typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
+]
 
 
 @app.callback()
@@ -59,7 +63,14 @@ def rename(
 
 @app.command("remove")
 def remove(
-    run: Annotated[str, typer.Argument(metavar="RUN|all", help="Name or id of the run, or all")],
+    run: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN|all",
+            help="Name or id of the run, or all",
+            autocompletion=complete("run", "all"),
+        ),
+    ],
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Remove a run with all that is known of it; what other runs have stays as it is.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from msgflow.cli.completion import complete, complete_path
 from msgflow.cli.options import DEFAULT_PATHS
 from msgflow.query.selection import KINDS, PATH, columns_of
 
@@ -22,6 +23,7 @@ def selecting_options(header: Header) -> dict[str, Any]:
     """
     has_path = bool(columns_of(header, PATH))
     has_ends = any(param.name == "from" for param in header.params)
+    place = _if(has_path) | {"autocompletion": complete("place")}
     options: dict[str, Any] = {
         kind: _option(
             list[str] | None,
@@ -29,18 +31,19 @@ def selecting_options(header: Header) -> dict[str, Any]:
             "NAME",
             f"Rows that name this {kind}; a glob, or several",
             hidden=not columns_of(header, kind),
+            autocompletion=complete(kind),
         )
         for kind in KINDS
     }
     for word, kind, metavar, text, more in (
-        ("via", list[str], "NAME", "Paths through all of these topics and nodes", _if(has_path)),
-        ("without", list[str], "NAME", "Paths through none of these", _if(has_path)),
+        ("via", list[str], "NAME", "Paths through all of these topics and nodes", place),
+        ("without", list[str], "NAME", "Paths through none of these", place),
         (
             "path",
             str,
             "NAME",
             "A path by its name in a file, see msgflow paths suggest",
-            _if(has_ends),
+            _if(has_ends) | {"autocompletion": complete_path},
         ),
         (
             "paths",

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     OUTPUT,
@@ -35,7 +36,12 @@ def command(
     targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="Requirements, as YAML")],
     run: Annotated[
         str | None,
-        typer.Argument(metavar="[RUN]", help="Name or id of the run", show_default="the latest"),
+        typer.Argument(
+            metavar="[RUN]",
+            help="Name or id of the run",
+            show_default="the latest",
+            autocompletion=complete("run"),
+        ),
     ] = None,
     start: StartOption = None,
     end: EndOption = None,

@@ -1,0 +1,248 @@
+"""Completion in the shell, asked for as shells ask: by variables of the environment."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import duckdb
+import pytest
+from hostile import HOSTILE, renamed
+
+PROGRAM = [sys.executable, "-c", "import sys; sys.argv = ['msgflow']; "
+           "from msgflow.__main__ import main; main()"]  # fmt: skip
+EVIL = (
+    "/plain", "/two words", "$(touch hacked)", "`touch hacked`", "'; touch hacked; '", '"/quoted"',
+    "/line\nbreak", "\x1b[31m/red", "--help", "~root", "*", "/a\\b", "x;touch hacked", "", "/ünï",
+    "/tab\tbed", "!!",
+)  # fmt: skip
+SAFE = {"/plain", "/two words", "/ünï"}
+
+
+def ask(
+    words: list[str], directory: Path, *, shell: str = "fish", database: Path | None = None
+) -> list[str]:
+    """Return what a shell is told for the last of these words."""
+    environment = {name: value for name, value in os.environ.items() if name != "MSGFLOW_DB"}
+    line = " ".join(("msgflow", *words))
+    environment |= {
+        "_MSGFLOW_COMPLETE": f"complete_{shell}",
+        "_TYPER_COMPLETE_ARGS": line,
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(words)),
+    }
+    if database is not None:
+        environment["MSGFLOW_DB"] = str(database)
+    done = subprocess.run(
+        PROGRAM, cwd=directory, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stderr == ""
+    return [line.partition("\t")[0] for line in done.stdout.splitlines() if line]
+
+
+@pytest.fixture
+def evil(small_database: Path, tmp_path: Path) -> Path:
+    return renamed(small_database, tmp_path / "evil.duckdb", (*HOSTILE, *EVIL))
+
+
+@pytest.fixture
+def named(small_database: Path, tmp_path: Path) -> Path:
+    """A database whose runs have the names above, one each."""
+    path = tmp_path / "named.duckdb"
+    shutil.copyfile(small_database, path)
+    with duckdb.connect(str(path)) as connection:
+        connection.execute("DELETE FROM store.run WHERE run_id <> 1")
+        for number, name in enumerate(EVIL, start=10):
+            connection.execute(
+                "INSERT INTO store.run SELECT * REPLACE (? AS run_id, ? AS name) FROM store.run"
+                " WHERE run_id = 1",
+                [number, name],
+            )
+        connection.execute("DELETE FROM store.run WHERE run_id = 1")
+    return path
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_commands_and_queries(tmp_path: Path, shell: str) -> None:
+    assert any("query" in line for line in ask(["qu"], tmp_path, shell=shell))
+    lines = ask(["query", "e2"], tmp_path, shell=shell)
+    assert len(lines) == 1
+    assert "e2e-latency" in lines[0]
+
+
+def test_names_of_the_database(small_database: Path, tmp_path: Path) -> None:
+    def names(*words: str) -> list[str]:
+        return ask(list(words), tmp_path, database=small_database)
+
+    assert names("query", "publication-rate", "--topic", "/ch") == ["/chatter"]
+    assert names("query", "e2e-latency", "--node", "/ta") == ["/talker"]
+    with duckdb.connect(str(small_database), read_only=True) as connection:
+        labels = {
+            name for (name,) in connection.execute("SELECT label FROM callback_label").fetchall()
+        }
+        hosts = {name for (name,) in connection.execute("SELECT hostname FROM host").fetchall()}
+    assert set(names("query", "callback-duration", "--callback", "")) == labels
+    assert set(names("query", "executor-wait", "--host", "")) == hosts
+    assert names("query", "e2e-latency", "--from", "/ta") == ["/talker"]
+    assert names("query", "e2e-latency", "--via", "/chat") == ["/chatter"]
+    assert names("query", "e2e-latency", "--run", "m") == ["morning"]
+    assert names("query", "e2e-latency", "--run", "a") == ["all"]
+    assert names("compare", "morning", "no") == ["noon"]
+    assert names("runs", "rename", "no") == ["noon"]
+    assert names("flow", "--topic", "/ch") == ["/chatter"]
+    assert names("export", "parquet", "out", "callback_l") == ["callback_label"]
+
+
+def test_the_option_is_before_the_variable(small_database: Path, tmp_path: Path) -> None:
+    words = ["query", "info-topics", "--db", str(small_database), "--run", "m"]
+    assert ask(words, tmp_path, database=tmp_path / "none.duckdb") == ["morning"]
+    assert small_database == tmp_path / "msgflow.duckdb"
+    assert ask(["query", "info-topics", "--run", "m"], tmp_path) == ["morning"]
+
+
+def test_names_of_paths(tmp_path: Path) -> None:
+    words = ["query", "e2e-latency", "--path", "ca"]
+    assert ask(words, tmp_path) == []
+    text = "paths: [{name: camera, from: /a, to: /b}, {name: lidar, from: /c, to: /b}]"
+    (tmp_path / "paths.yaml").write_text(text)
+    assert ask(words, tmp_path) == ["camera"]
+    (tmp_path / "other.yaml").write_text(text.replace("camera", "cat"))
+    assert ask([*words[:2], "--paths", "other.yaml", *words[2:]], tmp_path) == ["cat"]
+    (tmp_path / "paths.yaml").write_text("paths: [")
+    assert ask(words, tmp_path) == []
+
+
+@pytest.mark.parametrize("what", ["missing", "directory", "text", "foreign", "pipe"])
+def test_no_database_has_no_names(tmp_path: Path, what: str) -> None:
+    path = tmp_path / "it"
+    if what == "directory":
+        path.mkdir()
+    elif what == "text":
+        path.write_text("no database" * 1000)
+    elif what == "foreign":
+        with duckdb.connect(str(path)) as connection:
+            connection.execute("CREATE TABLE run AS SELECT 'x' AS name")
+    elif what == "pipe":
+        os.mkfifo(path)
+    assert ask(["query", "info-topics", "--run", "x"], tmp_path, database=path) == []
+    assert path.exists() == (what != "missing")
+
+
+def test_a_database_in_use_has_no_names(small_database: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.duckdb"
+    shutil.copyfile(small_database, copy)
+    with duckdb.connect(str(copy)):
+        assert ask(["query", "info-topics", "--run", "m"], tmp_path, database=copy) == []
+
+
+def test_views_of_a_foreign_file_do_not_run_for_ever(tmp_path: Path) -> None:
+    path = tmp_path / "foreign.duckdb"
+    with duckdb.connect(str(path)) as connection:
+        connection.execute("CREATE SCHEMA store")
+        connection.execute("CREATE TABLE store.alembic_version AS SELECT '0001' AS version_num")
+        connection.execute(
+            "CREATE VIEW run AS SELECT sum(a.range * b.range)::VARCHAR AS name"
+            " FROM range(10000000) AS a, range(10000000) AS b"
+        )
+    assert ask(["query", "info-topics", "--run", "1"], tmp_path, database=path) == []
+
+
+def test_an_unknown_query_completes_nothing(small_database: Path, tmp_path: Path) -> None:
+    words = ["query", "nothing", "--run", "m"]
+    assert ask(words, tmp_path, database=small_database) == []
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_hostile_names_are_left_out(named: Path, evil: Path, tmp_path: Path, shell: str) -> None:
+    lines = ask(["runs", "rename", ""], tmp_path, shell=shell, database=named)
+    expected = {
+        "bash": ["/plain", "/two\\ words", "/ünï"],
+        "zsh": ['_arguments \'*: :(("/plain"', '"/two words"', '"/ünï"))\''],
+        "fish": ["/plain", "/two words", "/ünï"],
+    }
+    assert lines == expected[shell]
+    for words in (["query", "e2e-latency", "--node", ""], ["flow", "--topic", ""]):
+        for line in ask(words, tmp_path, shell="fish", database=evil):
+            assert not set(line) & set("'\"$`\\;|!*?\x1b\n\t")
+
+
+@pytest.mark.parametrize("typed", ["", "/tw", "/two\\ w"])
+def test_bash_itself_has_words_that_are_names(named: Path, tmp_path: Path, typed: str) -> None:
+    """The script that `--show-completion` prints, in a real bash."""
+    from typer._completion_shared import get_completion_script
+
+    script = get_completion_script(
+        prog_name="msgflow", complete_var="_MSGFLOW_COMPLETE", shell="bash"
+    )
+    (tmp_path / "bin").mkdir()
+    program = tmp_path / "bin" / "msgflow"
+    program.write_text(f"#!{sys.executable}\nfrom msgflow.__main__ import main\nmain()\n")
+    program.chmod(0o755)
+    text = f"""{script}
+COMP_WORDS=(msgflow runs rename '{typed}') COMP_CWORD=3
+_msgflow_completion msgflow
+eval "printf '%s\\n' ${{COMPREPLY[*]}}"
+"""
+    done = subprocess.run(
+        ["bash", "--norc", "-c", text],
+        cwd=tmp_path,
+        env=os.environ
+        | {"PATH": f"{program.parent}:{os.environ['PATH']}", "MSGFLOW_DB": named.name},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    assert set(done.stdout.splitlines()) == (SAFE if not typed else {"/two words"})
+    assert not (tmp_path / "hacked").exists()
+
+
+def test_the_script_can_be_shown_and_installed(tmp_path: Path) -> None:
+    # Typer asks which process is the shell: here it is told.
+    environment = os.environ | {
+        "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
+        "HOME": str(tmp_path),
+    }
+
+    def run(*words: str) -> str:
+        code = PROGRAM[2].replace("['msgflow']", str(["msgflow", *words]))
+        return subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+
+    for shell in ("bash", "zsh", "fish"):
+        assert f"_MSGFLOW_COMPLETE=complete_{shell}" in run("--show-completion", shell)
+    run("--install-completion", "bash")
+    assert "msgflow" in (tmp_path / ".bash_completions" / "msgflow.sh").read_text()
+    assert "msgflow.sh" in (tmp_path / ".bashrc").read_text()
+
+
+def test_completion_imports_no_more_than_it_needs(small_database: Path, tmp_path: Path) -> None:
+    code = PROGRAM[2] + "\n"
+    code = (
+        "import atexit, sys\n"
+        "atexit.register(lambda: print(*sorted(sys.modules), file=sys.stderr))\n" + code
+    )
+    environment = os.environ | {
+        "_MSGFLOW_COMPLETE": "complete_bash",
+        "COMP_WORDS": "msgflow query e2e-latency --topic /ch",
+        "COMP_CWORD": "4",
+        "MSGFLOW_DB": str(small_database),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["/chatter"]
+    heavy = {
+        "duckdb", "pyarrow", "numpy", "sqlalchemy", "alembic", "pydantic", "rich.markdown",
+        "msgflow.database", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
+    }  # fmt: skip
+    assert heavy & set(done.stderr.split()) == set()
