@@ -228,6 +228,22 @@ class Database:
         self.close()
         return rename_run(self.path, run, name, memory_limit=self._memory_limit)
 
+    def label_runs(self, run: str | int, **labels: str | None) -> tuple[Run, ...]:
+        """Give runs labels, and return the runs as they were.
+
+        Args:
+            run: 'all', a name, an id, or a label that runs have (KEY=VALUE).
+            **labels: values by key; None takes the label of that key away.
+
+        Raises:
+            UsageError: no such run, a key or value that cannot be one, or no such label.
+            DatabaseError: the file cannot be opened.
+        """
+        from msgflow.db.runs import label_runs
+
+        self.close()
+        return label_runs(self.path, run, labels, memory_limit=self._memory_limit)
+
     def remove_runs(self, run: str | int) -> tuple[Run, ...]:
         """Delete runs with all that is known of them, and return which.
 

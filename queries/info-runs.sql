@@ -11,8 +11,9 @@
 -- column: event_count BIGINT             Events read
 -- column: discarded_event_count BIGINT   Events that the tracer could not record
 -- column: msgflow_version VARCHAR        Version of msgflow that read it
--- brief: run_id, name, start_ns, duration_ns, event_count, discarded_event_count, trace_count,
---     end_ns, msgflow_version
+-- column: labels VARCHAR[]               What users say of it (msgflow runs label), NULL: nothing
+-- brief: run_id, name, labels, start_ns, duration_ns, event_count, discarded_event_count,
+--     trace_count, end_ns, msgflow_version
 -- needs: main.run, main.trace
 WITH run_trace AS (
     SELECT
@@ -33,7 +34,8 @@ SELECT
     coalesce(run_trace.trace_count, 0) AS trace_count,
     coalesce(run_trace.event_count, 0) AS event_count,
     coalesce(run_trace.discarded_event_count, 0) AS discarded_event_count,
-    run.msgflow_version
+    run.msgflow_version,
+    run.labels
 FROM main.run
 LEFT JOIN run_trace ON run_trace.run_id = run.run_id
 WHERE list_contains($runs, run.run_id)

@@ -17,7 +17,8 @@ CREATE TABLE store.run (
     derivation_hash VARCHAR NOT NULL,            -- SHA-256 of the SQL that derived the links
     start_ns        BIGINT,                      -- First event of any trace [epoch ns]
     end_ns          BIGINT,                      -- Last event of any trace [epoch ns]
-    event_count     BIGINT                       -- Events read
+    event_count     BIGINT,                      -- Events read
+    labels          VARCHAR[]                    -- What users say of the run, KEY=VALUE each, sorted; NULL: nothing
 );
 
 -- One row per CTF trace read.

@@ -14,8 +14,9 @@ from msgflow.cli.options import (
     OutputOption,
     WideOption,
 )
+from msgflow.errors import UsageError
 
-app = typer.Typer(help="List, rename and remove runs.")
+app = typer.Typer(help="List, rename, label and remove runs.")
 _RunArgument = Annotated[
     str,
     typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
@@ -24,7 +25,7 @@ _RunArgument = Annotated[
 
 @app.callback()
 def group() -> None:
-    """List, rename and remove runs."""
+    """List, rename, label and remove runs."""
 
 
 @app.command("list")
@@ -59,6 +60,43 @@ def rename(
     with Database(database) as opened:
         before = opened.rename_run(run, name)
     print_status(f"run {before.run_id} renamed: {before.name} is {name}")
+
+
+@app.command("label")
+def label(
+    run: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN|all",
+            help="Name or id of the run, or all",
+            autocompletion=complete("run", "all"),
+        ),
+    ],
+    labels: Annotated[
+        list[str],
+        typer.Argument(metavar="KEY=VALUE...", help="Labels; KEY= takes one away"),
+    ],
+    database: DatabaseOption = DEFAULT_DATABASE,
+) -> None:
+    """Say something of a run: which robot, which build.
+
+    `runs list` and `info` show it, and --run KEY=VALUE means all runs with that label.
+    """
+    from msgflow.cli.output import print_status
+    from msgflow.database import Database
+
+    values: dict[str, str | None] = {}
+    for text in labels:
+        key, sign, value = text.partition("=")
+        if not sign:
+            raise UsageError(f"a label is KEY=VALUE — {text}", f"msgflow runs label {run} {text}=…")
+        if key in values:
+            raise UsageError(f"a run has one label of a key — {key}", "give it once")
+        values[key] = value or None
+    with Database(database) as opened:
+        changed = opened.label_runs(run, **values)
+    for one in changed:
+        print_status(f"run {one.run_id} labelled: {one.name}")
 
 
 @app.command("remove")

@@ -1,7 +1,8 @@
-"""Removes and renames runs of a database: all that was asked for, or nothing."""
+"""Removes, renames and labels runs of a database: all that was asked for, or nothing."""
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from msgflow.db.change import change_runs
@@ -10,11 +11,15 @@ from msgflow.errors import UsageError
 from msgflow.query.window import is_run_name
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     import duckdb
 
     from msgflow.query.window import Run
+
+_KEY = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
+_LONGEST_VALUE = 1_000
 
 
 def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:
@@ -66,6 +71,75 @@ def rename_run(path: Path, run: str | int, name: str, *, memory_limit: str | Non
         return runs[0]
 
     return change_runs(path, run, change, memory_limit=memory_limit)
+
+
+def label_runs(
+    path: Path,
+    run: str | int,
+    labels: Mapping[str, str | None],
+    *,
+    memory_limit: str | None = None,
+) -> tuple[Run, ...]:
+    """Give runs labels or take them away, and return the runs as they were.
+
+    Args:
+        path: the database.
+        run: 'all', a name, an id, or a label that the runs have.
+        labels: values by key; None takes the label of that key away.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Raises:
+        UsageError: no such run, a key or a value that cannot be one, or no such label to take away.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+    for key, value in labels.items():
+        require_label(key, value)
+
+    def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
+        for one in runs:
+            now = dict(label.split("=", 1) for label in one.labels)
+            for key, value in labels.items():
+                if value is not None:
+                    now[key] = value
+                elif now.pop(key, None) is None:
+                    raise UsageError(
+                        f"run {one.run_id} has no label of this key — {key}",
+                        f"its labels are {', '.join(one.labels)}"
+                        if one.labels
+                        else f"msgflow runs label {one.run_id} {key}=VALUE",
+                    )
+            con.execute(
+                "UPDATE store.run SET labels = ? WHERE run_id = ?",
+                [sorted(f"{key}={value}" for key, value in now.items()) or None, one.run_id],
+            )
+        return runs
+
+    return change_runs(path, run, change, memory_limit=memory_limit)
+
+
+def require_label(key: str, value: str | None) -> None:
+    """Raise unless there may be such a label.
+
+    Raises:
+        UsageError: the key is none, or the value is no text that a database holds, or too long.
+    """
+    if not _KEY.fullmatch(key):
+        raise UsageError(
+            f"no key of a label — {key!r}",
+            "a letter, then letters, digits, _, - and . (64 at most), such as robot=r2d2",
+        )
+    if value is not None and (len(value) > _LONGEST_VALUE or not _is_text(value)):
+        raise UsageError(
+            f"no value of a label — {key}", f"give text of at most {_LONGEST_VALUE} characters"
+        )
+
+
+def _is_text(value: str) -> bool:
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return False
+    return "\0" not in value
 
 
 def require_run_name(name: str) -> None:

@@ -40,6 +40,16 @@ class UBigInteger(UserDefinedType[int]):
         return "UBIGINT"
 
 
+class Texts(UserDefinedType[list[str]]):
+    """VARCHAR[]."""
+
+    cache_ok = True
+
+    def get_col_spec(self, **_: object) -> str:
+        """Return the name of the type in SQL."""
+        return "VARCHAR[]"
+
+
 SCHEMA = "store"
 metadata = MetaData(schema=SCHEMA)
 
@@ -158,6 +168,7 @@ run = _table(
     _time("start_ns", "First event of any trace"),
     _time("end_ns", "Last event of any trace"),
     _count("event_count", "Events read"),
+    _column("labels", Texts, "What users say of the run, KEY=VALUE each, sorted; NULL: nothing"),
 )
 
 trace = _table(

@@ -49,9 +49,11 @@ _OF_CONDITIONS = (
 def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
     """Return all runs of the database, oldest first."""
     rows = connection.execute(
-        "SELECT run_id, name, start_ns FROM main.run ORDER BY run_id"
+        "SELECT run_id, name, start_ns, coalesce(labels, []) FROM main.run ORDER BY run_id"
     ).fetchall()
-    return tuple(Run(run_id, name, start_ns) for run_id, name, start_ns in rows)
+    return tuple(
+        Run(run_id, name, start_ns, tuple(labels)) for run_id, name, start_ns, labels in rows
+    )
 
 
 def run_query(

@@ -44,19 +44,22 @@ class Run:
         run_id: its key.
         name: its name.
         start_ns: time of its first event, epoch ns; None for a run without events.
+        labels: KEY=VALUE each.
     """
 
     run_id: int
     name: str
     start_ns: int | None
+    labels: tuple[str, ...] = ()
 
 
 def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
-    """Return the runs that `wanted` means: 'all', an id, a name, or None for the latest.
+    """Return the runs that `wanted` means: 'all', an id, a name, a label, or None for the latest.
 
     Args:
         runs: all runs of the database.
-        wanted: what the user said; a name wins over an id.
+        wanted: what the user said; a name wins over an id. A label, KEY=VALUE, means all runs that
+            have it.
 
     Raises:
         UsageError: no such run, or a name that several runs have.
@@ -70,6 +73,8 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
     if text == "all":
         return tuple(ordered)
     found = [run for run in ordered if run.name == text]
+    if not found and (labelled := tuple(run for run in ordered if text in run.labels)):
+        return labelled
     if not found and (run_id := _integer(text)) is not None:
         found = [run for run in ordered if run.run_id == run_id]
     if len(found) > 1:

@@ -9,6 +9,7 @@
 -- column: start_ns BIGINT [epoch ns]  First event of any trace but kernel traces
 -- column: end_ns BIGINT [epoch ns]  Last event of any trace but kernel traces
 -- column: event_count BIGINT  Events read
+-- column: labels VARCHAR[]  What users say of the run, KEY=VALUE each, sorted; NULL: nothing
 -- needs: store.run, store.trace, main.trace
 WITH extent AS (
     SELECT
@@ -28,6 +29,7 @@ SELECT
     self.derivation_hash,
     self.start_ns + coalesce(e.start_shift_ns, 0) AS start_ns,
     self.end_ns + coalesce(e.end_shift_ns, 0) AS end_ns,
-    self.event_count
+    self.event_count,
+    self.labels
 FROM store.run AS self
 LEFT JOIN extent AS e ON self.run_id = e.run_id

@@ -115,3 +115,78 @@ def test_a_name_with_escape_codes_is_text(msgflow: Msgflow, database: Path) -> N
 def test_a_missing_database_is_not_made(msgflow: Msgflow, tmp_path: Path) -> None:
     assert msgflow("runs", "remove", "1", "--db", tmp_path / "none.duckdb").exit_code == 4
     assert not (tmp_path / "none.duckdb").exists()
+
+
+def labels(msgflow: Msgflow, database: Path) -> list[list[str] | None]:
+    result = msgflow("runs", "list", "--format", "json", "--db", database)
+    return [row["labels"] for row in json.loads(result.stdout)]
+
+
+def test_labels(msgflow: Msgflow, database: Path) -> None:
+    def label(*words: object) -> str:
+        result = msgflow("runs", "label", *words, "--db", database)
+        assert result.exit_code == 0
+        return result.stderr
+
+    assert label("before", "robot=r2d2", "build=a=b c") == "run 1 labelled: before\n"
+    assert labels(msgflow, database) == [["build=a=b c", "robot=r2d2"], None]
+    info = json.loads(msgflow("info", "--format", "json", "--db", database).stdout)
+    assert info["runs"][0]["labels"] == ["build=a=b c", "robot=r2d2"]
+    assert "robot=r2d2" in msgflow("runs", "list", "--db", database).stdout
+    assert label("all", "robot=c3po").splitlines()[1] == "run 2 labelled: after"
+    assert labels(msgflow, database) == [["build=a=b c", "robot=c3po"], ["robot=c3po"]]
+    label("before", "robot=", "place=lab")
+    assert labels(msgflow, database) == [["build=a=b c", "place=lab"], ["robot=c3po"]]
+    label(2, "robot=")
+    assert labels(msgflow, database) == [["build=a=b c", "place=lab"], None]
+    with Database(database) as opened:
+        sql = "SELECT name FROM run WHERE list_contains(labels, 'place=lab')"
+        assert opened.sql(sql).to_arrow().to_pylist() == [{"name": "before"}]
+
+
+def test_a_label_chooses_runs(msgflow: Msgflow, database: Path) -> None:
+    for run in ("before", "after"):
+        assert (
+            msgflow("runs", "label", run, "robot=r2", f"n={run}", "--db", database).exit_code == 0
+        )
+
+    def runs(label: str) -> str:
+        return msgflow("query", "info-hosts", "--run", label, "--db", database).stderr
+
+    assert runs("n=before") == "run: before (1)\n"
+    assert runs("robot=r2") == "runs: before (1), after (2)\n"
+    assert "there is no such run — n=b" in runs("n=b")
+    assert msgflow("runs", "rename", 1, "n=after", "--db", database).exit_code == 0
+    assert runs("n=after") == "run: n=after (1)\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("x=1", "no label"), "a label is KEY=VALUE — no label"),
+        (("x=1", "=2"), "no key of a label — ''"),
+        (("x=1", "1x=2"), "no key of a label — '1x'"),
+        (("x=1", "a b=2"), "no key of a label — 'a b'"),
+        (("x=1", "\x1b[31m=2"), "no key of a label — '\\x1b[31m'"),
+        (("x=1", "x=2"), "a run has one label of a key — x"),
+        (("x=1", f"y={'z' * 1001}"), "no value of a label — y"),
+        (("x=1", "y="), "run 1 has no label of this key — y"),
+    ],
+)
+def test_all_labels_or_none(
+    msgflow: Msgflow, database: Path, words: tuple[str, ...], message: str
+) -> None:
+    assert msgflow("runs", "label", 2, "y=2", "--db", database).exit_code == 0
+    result = msgflow("runs", "label", "all", *words, "--db", database)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert labels(msgflow, database) == [None, ["y=2"]]
+
+
+def test_a_label_with_escape_codes_and_quotes_is_text(msgflow: Msgflow, database: Path) -> None:
+    value = "\x1b[31m'; DROP TABLE run; --\n"
+    assert msgflow("runs", "label", 1, f"x={value}", "--db", database).exit_code == 0
+    assert labels(msgflow, database) == [[f"x={value}"], None]
+    shown = msgflow("runs", "list", "--db", database).stdout
+    assert "\x1b" not in shown
+    assert "DROP TABLE run; --\\n" in shown
