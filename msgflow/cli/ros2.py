@@ -1,0 +1,31 @@
+"""`ros2 msgflow`: the same program as a command of ros2cli, which alone imports this module."""
+
+from __future__ import annotations
+
+from argparse import REMAINDER
+from typing import TYPE_CHECKING
+
+from ros2cli.command import CommandExtension
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+_NO_PREFIX = "\0"
+
+
+class MsgflowCommand(CommandExtension):  # type: ignore[misc]
+    """Ask recorded traces where every message went, and where the time was lost."""
+
+    def add_arguments(self, parser: ArgumentParser, cli_name: str) -> None:
+        """Take all words as they are; `-h` and other options are msgflow's own."""
+        parser.prefix_chars = _NO_PREFIX
+        parser.add_argument("argv", nargs=REMAINDER)
+
+    def main(self, *, parser: ArgumentParser, args: Namespace) -> None:
+        """Run msgflow, and exit with its code."""
+        from msgflow.cli.stop import STOP
+
+        STOP.install()
+        from msgflow.cli.app import app
+
+        app(args.argv, prog_name="ros2 msgflow")
