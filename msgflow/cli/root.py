@@ -35,7 +35,7 @@ _LEAKED = (
 )
 COMMANDS = (
     "ingest", "query", "flow", "graph", "ui", "report", "compare", "verify", "sql", "info", "check",
-    "events", "targets", "runs", "links", "paths", "clocks", "export", "db", "simulate",
+    "events", "targets", "runs", "links", "paths", "clocks", "export", "db", "mcp", "simulate",
 )  # fmt: skip
 
 

@@ -1,0 +1,162 @@
+"""`msgflow mcp`, asked by the client of the SDK over stdin and stdout, as an agent asks."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+from mcp import Client
+from mcp.client.stdio import StdioServerParameters
+
+from msgflow import mcp_server
+
+Call = tuple[str, dict[str, Any]]
+
+
+def ask(database: Path, *calls: Call) -> list[tuple[bool, str]]:
+    """Return for each call whether it failed, and the text of the answer."""
+
+    async def talk() -> list[tuple[bool, str]]:
+        server = StdioServerParameters(
+            command=sys.executable, args=["-m", "msgflow", "mcp", "--db", str(database)]
+        )
+        async with Client(server) as client:
+            answers = [await client.call_tool(name, words) for name, words in calls]
+        return [(bool(answer.is_error), answer.content[0].text) for answer in answers]
+
+    return asyncio.run(talk())
+
+
+def one(database: Path, tool: str, **words: Any) -> Any:
+    ((failed, text),) = ask(database, (tool, words))
+    assert not failed, text
+    return json.loads(text)
+
+
+def test_the_tools_and_what_they_answer(small_database: Path) -> None:
+    before = hashlib.sha256(small_database.read_bytes()).digest()
+    found = ask(
+        small_database,
+        ("info", {}),
+        ("check", {"run": "all"}),
+        ("list_queries", {}),
+        ("list_queries", {"name": "e2e-latency"}),
+        ("run_query", {"name": "info-topics", "run": "morning", "topic": ["/ch*"]}),
+        ("schema", {}),
+        ("schema", {"view": "run"}),
+        ("sql", {"query": "SELECT name FROM run ORDER BY run_id DESC"}),
+    )
+    assert not any(failed for failed, _ in found), found
+    info, check, queries, query, topics, views, view, sql = (json.loads(text) for _, text in found)
+    assert [row["name"] for row in info["rows"]] == ["morning", "noon"]
+    assert all({"cause", "cure", "severity"} <= set(row) for row in check["rows"])
+    assert {"name": "e2e-latency", "title": "End-to-end latency by path"} in queries["rows"]
+    assert "from" in [param["name"] for param in query["parameters"]]
+    assert topics["runs"] == ["morning (1)"]
+    assert [row["topic_name"] for row in topics["rows"]] == ["/chatter"]
+    assert "publication" in views["rows"]
+    assert any("labels" in row.values() for row in view["rows"])
+    assert sql["rows"] == [{"name": "noon"}, {"name": "morning"}]
+    assert hashlib.sha256(small_database.read_bytes()).digest() == before
+
+
+def test_a_flow_is_a_tree(small_database: Path) -> None:
+    with duckdb.connect(str(small_database), read_only=True) as connection:
+        number = connection.execute("SELECT min(publication_id) FROM publication").fetchall()[0][0]
+    ((failed, text),) = ask(small_database, ("flow", {"publication_id": number}))
+    assert not failed
+    assert text.startswith(f"publication {number}, /chatter")
+
+
+def test_answers_are_capped_and_say_so(small_database: Path) -> None:
+    few = one(small_database, "sql", query="FROM range(5)", limit=2)
+    assert [row["range"] for row in few["rows"]] == [0, 1]
+    assert "only the first 2 rows" in few["notes"][0]
+    most = one(small_database, "sql", query="FROM range(9999)", limit=10**9)
+    assert len(most["rows"]) == mcp_server.MOST_ROWS
+    wide = one(small_database, "sql", query="SELECT repeat('x', 3000) AS x FROM range(20)")
+    assert len(json.dumps(wide)) < mcp_server.MOST_CHARACTERS + 1_000
+    assert len(wide["rows"]) == 6
+    assert "only 6 of these 20 rows have room in 20,000 characters" in wide["notes"][-1]
+    rows = one(small_database, "run_query", name="info-topics", internal=True, limit=1)
+    assert len(rows["rows"]) == 1
+    assert "only the first 1 of" in rows["notes"][-1]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (("sql", {"query": "COPY run TO 'x.csv'"}), ["not a statement that only reads", "hint: "]),
+        (("sql", {"query": "FROM read_csv('/etc/passwd')"}), ["more than read this database"]),
+        (("sql", {"query": "FROM '/etc/passwd'"}), ["there is no table of that name"]),
+        (("sql", {"query": "FROM nothing"}), ["nothing"]),
+        (("run_query", {"name": "latency"}), ["no such query", "hint: ", "e2e-latency"]),
+        (("run_query", {"name": "info-runs", "run": "x"}), ["no such run — x", "morning (1)"]),
+        (
+            ("run_query", {"name": "e2e-latency", "parameters": {"paths": "/etc/passwd"}}),
+            ["e2e-latency has no such parameter — paths"],
+        ),
+        (("schema", {"view": "x"}), ["there is no such view — x"]),
+        (("flow", {"topic": "/nothing"}), ["/nothing"]),
+        (("check", {"run": "x"}), ["no such run — x"]),
+    ],
+)
+def test_errors_have_hints(small_database: Path, call: Call, words: list[str]) -> None:
+    ((failed, text),) = ask(small_database, call)
+    assert failed
+    for word in words:
+        assert word in text
+
+
+def test_without_a_database_a_call_says_so(tmp_path: Path) -> None:
+    ((failed, text),) = ask(tmp_path / "none.duckdb", ("info", {}))
+    assert failed
+    assert "no database" in text
+    assert "hint: msgflow ingest TRACE" in text
+    assert not (tmp_path / "none.duckdb").exists()
+
+
+def test_a_call_that_takes_too_long_is_stopped(small_database: Path) -> None:
+    async def talk() -> Any:
+        async with Client(mcp_server.make_server(small_database, seconds=0.5)) as client:
+            text = "SELECT sum(a.range * b.range) FROM range(10000000) AS a, range(10000000) AS b"
+            late = await client.call_tool("sql", {"query": text})
+            after = await client.call_tool("sql", {"query": "SELECT 1 AS one"})
+            return late, after
+
+    late, after = asyncio.run(talk())
+    assert late.is_error
+    assert "it took longer than 0.5 s\nhint: read one run" in late.content[0].text
+    assert not after.is_error
+
+
+def test_a_waiting_agent_keeps_nobody_from_writing(small_database: Path) -> None:
+    async def talk() -> None:
+        async with Client(mcp_server.make_server(small_database)) as client:
+            await client.call_tool("info", {})
+            program = [sys.executable, "-m", "msgflow", "runs", "rename", "morning", "dawn"]
+            subprocess.run([*program, "--db", str(small_database)], check=True)
+            found = await client.call_tool("info", {})
+            assert "dawn" in found.content[0].text
+
+    asyncio.run(talk())
+
+
+def test_without_the_extra_it_says_what_to_install(small_database: Path) -> None:
+    code = (
+        "import sys; sys.modules['mcp'] = None; sys.argv = ['msgflow', 'mcp']\n"
+        "from msgflow.__main__ import main; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: the SDK of the Model Context Protocol is not installed\n\n"
+        "hint: pip install 'ros2-msgflow[mcp]'\n"
+    )
