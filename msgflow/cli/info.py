@@ -47,8 +47,9 @@ def command(
 
     Each section is a named query, `msgflow query info-topics` for instance.
     """
-    from msgflow.cli.output import is_screen, print_lines, print_note, screen_width
+    from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.database import Database
+    from msgflow.query.present import screen_width
 
     with Database(database) as opened:
         results = {

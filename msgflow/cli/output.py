@@ -13,15 +13,13 @@ import typer
 
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
-from msgflow.query.present import MOST_ROWS
+from msgflow.query.present import MOST_ROWS, screen_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from msgflow.query.result import QueryResult
     from msgflow.query.window import Run
-
-_NARROWEST = 40
 
 
 def print_error(message: str, hint: str | None = None) -> None:
@@ -95,11 +93,6 @@ def is_screen() -> bool:
         UsageError: stdout is closed.
     """
     return data_stream().isatty()
-
-
-def screen_width() -> int:
-    """Return how many cells a line of the terminal has, or the variable COLUMNS says."""
-    return max(_NARROWEST, shutil.get_terminal_size((100, 24)).columns)
 
 
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:

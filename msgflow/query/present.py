@@ -7,6 +7,7 @@ query has it; where not even the most important ones have a place, every row is 
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from msgflow.query.result import QueryResult
 
 MOST_ROWS = 50
+_NARROWEST = 40
 GAP = 2
 PATH = "path"
 PATH_ID = "path_id"
@@ -78,8 +80,18 @@ class Presentation:
     notes: tuple[str, ...]
 
 
+def screen_width() -> int:
+    """Return how many cells a line of the terminal has, or the variable COLUMNS says; else 100."""
+    return max(_NARROWEST, shutil.get_terminal_size((100, 24)).columns)
+
+
 def present(
-    result: QueryResult, width: int, *, most_rows: int | None = MOST_ROWS, is_chosen: bool = False
+    result: QueryResult,
+    width: int,
+    *,
+    most_rows: int | None = MOST_ROWS,
+    is_chosen: bool = False,
+    remedy: str = "--wide shows all",
 ) -> Presentation:
     """Return what to show of `result`.
 
@@ -88,6 +100,7 @@ def present(
         width: of the terminal, in cells.
         most_rows: how many rows are shown; all when None.
         is_chosen: somebody asked for these columns, so that all of them are shown.
+        remedy: what notes say of where the rest is.
     """
     keeps_all = is_chosen or result.header is None
     kept, nothing = _that_say_something(result, keeps_all)
@@ -96,7 +109,7 @@ def present(
     columns, paths = _with_numbered_paths(columns)
     notes = []
     if first.num_rows < len(result):
-        notes.append(f"the first {first.num_rows} of {len(result):,} rows: --wide shows all")
+        notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
     shown = columns if keeps_all else _that_fit(result, columns, width)
     names = {column.name for column in shown}
     left_out = [column for column in columns if column.name not in names]
@@ -108,7 +121,7 @@ def present(
         shown, left_out = columns, []
     if nothing:
         notes.append(f"0 or empty in all rows: {', '.join(nothing)}")
-    notes += _of_columns_left_out(left_out) if first.num_rows else []
+    notes += _of_columns_left_out(left_out, remedy) if first.num_rows else []
     widths = tuple(_widths(shown, width)) if is_table else None
     return Presentation(tuple(shown), widths, paths, tuple(notes))
 
@@ -285,7 +298,7 @@ def _widths(columns: list[ShownColumn], width: int) -> list[int]:
     return widths
 
 
-def _of_columns_left_out(columns: list[ShownColumn]) -> list[str]:
+def _of_columns_left_out(columns: list[ShownColumn], remedy: str) -> list[str]:
     """Say which columns have no place, and what stands in those that are alike in all rows."""
     alike = [
         column
@@ -298,5 +311,5 @@ def _of_columns_left_out(columns: list[ShownColumn]) -> list[str]:
         same = ", ".join(f"{column.title} {column.cells[0]}" for column in alike)
         notes.append(f"the same in all rows: {same}")
     if others:
-        notes.append(f"no room for {', '.join(others)}: --wide shows all")
+        notes.append(f"no room for {', '.join(others)}: {remedy}")
     return notes

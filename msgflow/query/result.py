@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 class QueryResult:
     """Rows in the order of the query. Times are integers in nanoseconds.
 
-    `print` shows the first rows as a table, and a notebook does so, too.
+    `print` shows what a terminal shows of them: a table that fits it (the variable COLUMNS counts;
+    100 columns where there is no terminal). A notebook shows the first rows.
 
     Attributes:
         table: the rows.

@@ -6,8 +6,11 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
-from msgflow.query.present import MOST_ROWS
-from msgflow.query.table import cells, table_lines
+from msgflow.query.human import printable
+from msgflow.query.present import MOST_ROWS, present, screen_width
+from msgflow.query.screen import screen_lines
+from msgflow.query.table import cells
+from msgflow.query.wrapping import wrap
 
 if TYPE_CHECKING:
     from msgflow.query.result import QueryResult
@@ -16,9 +19,23 @@ _STYLE = "text-align: {}; white-space: pre-wrap"
 
 
 def shown_text(result: QueryResult) -> str:
-    """Return the first rows as an aligned table, and what is to be said about them."""
-    lines = list(table_lines(_first(result)))
-    return "\n".join([*lines, *(f"note: {note}" for note in _notes(result))])
+    """Return what a terminal would show: the first rows as a table that fits, and notes."""
+    width = screen_width()
+    shown = present(result, width, remedy="to_arrow() has all")
+    runs = ", ".join(f"{run.name} ({run.run_id})" for run in result.runs)
+    head = [("run: " if len(result.runs) == 1 else "runs: ", runs)] if runs else []
+    notes = [*shown.notes, *([] if len(result) else ["no rows"]), *result.notes]
+    lines = [
+        *(line for label, text in head for line in _labelled(label, text, width)),
+        *screen_lines(shown, width),
+        *(line for note in notes for line in _labelled("note: ", note, width)),
+    ]
+    return "\n".join(lines)
+
+
+def _labelled(label: str, text: str, width: int) -> list[str]:
+    first, *more = wrap(printable(text), width - len(label))
+    return [f"{label}{first}", *(" " * len(label) + line for line in more)]
 
 
 def shown_html(result: QueryResult) -> str:

@@ -53,9 +53,9 @@
 -- column: b_loss_affected BIGINT  The same for run B
 -- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
--- needs: main.run, main.flow_path, main.end_to_end, main.callback_instance, main.callback_label,
---     main.take, main.link_transport, main.subscription, main.process, main.node,
---     derive.node_label
+-- needs: derive.known_word, main.run, main.flow_path, main.end_to_end, main.callback_instance,
+--     main.callback_label, main.take, main.link_transport, main.subscription, main.process,
+--     main.node, derive.node_label
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
     skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false,
@@ -89,7 +89,7 @@ WITH thing AS (
         [run_a, run_b], from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     ) AS p
         ON e.path_id = p.path_id
-    WHERE what = 'paths'
+    WHERE what IS NOT DISTINCT FROM 'paths'
     UNION ALL
     SELECT
         i.run_id,
@@ -104,7 +104,7 @@ WITH thing AS (
         false AS is_cut
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    WHERE what = 'callbacks' AND list_contains([run_a, run_b], i.run_id)
+    WHERE what IS NOT DISTINCT FROM 'callbacks' AND list_contains([run_a, run_b], i.run_id)
     UNION ALL
     SELECT
         t.run_id,
@@ -123,12 +123,17 @@ WITH thing AS (
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN main.process AS p ON s.process_id = p.process_id
     LEFT JOIN main.node AS n ON s.node_id = n.node_id
-    WHERE what = 'topics'
+    WHERE what IS NOT DISTINCT FROM 'topics'
         AND list_contains([run_a, run_b], t.run_id)
         AND t.method <> 'callback_only'
 ),
-side (side, run_id) AS (
-    VALUES ('a', run_a), ('b', run_b)
+side AS (
+    SELECT s.side, s.run_id
+    FROM (VALUES ('a', run_a), ('b', run_b)) AS s (side, run_id)
+    WHERE derive.known_word('what', what, ['paths', 'callbacks', 'topics'])
+        AND derive.known_word(
+            'wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair']
+        )
 ),
 sided AS MATERIALIZED (
     SELECT

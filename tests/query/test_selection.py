@@ -313,6 +313,12 @@ def test_macros_need_no_more_than_the_runs(database: Database, short: str, whole
     [
         ("end_to_end([1], from_event := 'start')", "from_event is one of callback_start, publish"),
         ("end_to_end([1], to_event := NULL)", "to_event is one of take, callback_start"),
+        ("comparison('nodes', 1, 1)", "what is one of paths, callbacks, topics, not nodes"),
+        ("comparison(NULL, 1, 1)", "what is one of paths, callbacks, topics, not NULL"),
+        (
+            "comparison('paths', 1, 1, wanted_case := 'fist')",
+            "wanted_case is one of first, last, newest, every_pair, not fist",
+        ),
         ("end_to_end_part([1], flow_case := 'fist')", "flow_case is one of first, last, newest"),
         ("critical_path([1], to_event := 'end')", "not end"),
     ],
