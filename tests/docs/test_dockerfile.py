@@ -1,0 +1,50 @@
+"""The Dockerfile copies what a wheel is made of, and nobody is root in the container."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "Dockerfile").read_text("utf-8")
+
+
+def copied() -> set[str]:
+    lines = re.findall(r"^COPY (?!--from)(.+)$", TEXT, re.MULTILINE)
+    return {source for line in lines for source in line.split()[:-1]}
+
+
+def test_it_copies_what_is_let_through_and_no_more() -> None:
+    lines = (ROOT / ".dockerignore").read_text("utf-8").splitlines()
+    assert {line[1:] for line in lines if line.startswith("!")} == copied()
+    assert "*" in lines
+
+
+def test_a_wheel_can_be_made_of_it(tmp_path: Path) -> None:
+    for name in copied():
+        source = ROOT / name
+        if source.is_dir():
+            ignored = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(source, tmp_path / name, ignore=ignored)
+        else:
+            shutil.copy(source, tmp_path / name)
+    with (tmp_path / "pyproject.toml").open("rb") as stream:
+        included = tomllib.load(stream)["tool"]["hatch"]["build"]["targets"]["wheel"]
+    assert {*included["packages"], *included["force-include"]} <= copied()
+    code = "import sys; sys.path.insert(0, 'packaging'); import checked_hatchling as backend; "
+    code += "print(backend.build_wheel('.'))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert (tmp_path / done.stdout.split()[-1]).is_file()
+
+
+def test_it_runs_msgflow_as_nobody_special() -> None:
+    final = TEXT.rpartition("\nFROM ")[2]
+    assert re.search(r"^USER (?!root|0)\w+$", final, re.MULTILINE)
+    assert 'ENTRYPOINT ["msgflow"]' in final
+    assert TEXT.count("FROM python:3.12-slim") == 2
