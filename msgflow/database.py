@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from msgflow.query.header import Header
     from msgflow.query.value import Value
     from msgflow.query.window import Run
-    from msgflow.verify import Verification
+    from msgflow.verify import TargetsFile, Verification
     from msgflow.view.report import Report
 
 _T = TypeVar("_T")
@@ -574,6 +574,7 @@ class Database:
         self,
         targets: str | Path,
         *,
+        paths: str | Path = DEFAULT_PATHS,
         run: str | int | None = None,
         start: str | int | None = None,
         end: str | int | None = None,
@@ -583,6 +584,7 @@ class Database:
 
         Args:
             targets: YAML; docs/verify.md has its form.
+            paths: the file with the paths that `targets` calls by their names.
             run: a name or an id; the latest run when None.
             start: begin of the time window: epoch ns, an offset from the run's start such as
                 '2.5s', or ISO time.
@@ -602,9 +604,41 @@ class Database:
 
         file = read_targets(Path(targets))
         connection = self.connection
+        places = self._ask(lambda: self._places(file, Path(paths), run))
         return self._ask(
-            lambda: verify(connection, file, run=run, start=start, end=end, skip_first=skip_first)
+            lambda: verify(
+                connection,
+                file,
+                paths=places,
+                run=run,
+                start=start,
+                end=end,
+                skip_first=skip_first,
+            )
         )
+
+    def _places(
+        self, targets: TargetsFile, file: Path, run: str | int | None
+    ) -> dict[str, dict[str, list[str]]]:
+        """Return topics and nodes of the paths that requirements call by their names."""
+        from msgflow.paths import read_paths
+
+        called = [target.path_name for target in targets.targets if target.path_name is not None]
+        if not called:
+            return {}
+        named = read_paths(file)
+        runs = choose_runs(read_runs(self.connection), run)
+        found = {}
+        for text in called:
+            try:
+                path = named.named(text.value)
+            except UsageError as error:
+                targets.file.fail(text.line, error.message, error.hint)
+            named.require(self.connection, runs, path)
+            found[text.value] = {
+                word: [place.value for place in places] for word, places in path.places.items()
+            }
+        return found
 
     def suggest_targets(
         self, *, run: str | int | None = None, skip_first: float | None = None, margin: float = 0.2

@@ -11,6 +11,7 @@ import typer
 from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
+    DEFAULT_PATHS,
     OUTPUT,
     DatabaseOption,
     EndOption,
@@ -43,6 +44,10 @@ def command(
             autocompletion=complete("run"),
         ),
     ] = None,
+    paths: Annotated[
+        Path,
+        typer.Option("--paths", metavar="FILE", help="The file with the paths that have names"),
+    ] = Path(DEFAULT_PATHS),
     start: StartOption = None,
     end: EndOption = None,
     skip_first: SkipFirstOption = None,
@@ -76,7 +81,9 @@ def command(
     from msgflow.export.formats import Format
 
     with Database(database) as opened:
-        verification = opened.verify(targets, run=run, start=start, end=end, skip_first=skip_first)
+        verification = opened.verify(
+            targets, paths=paths, run=run, start=start, end=end, skip_first=skip_first
+        )
     if form is None and output is not None and output.suffix.lower() == ".xml":
         form = VerifyFormat.JUNIT
     if form is VerifyFormat.JUNIT:

@@ -70,7 +70,7 @@ def selected(header: Header, selection: Selection, internal: bool) -> tuple[str,
         UsageError: the query has no such rows or columns.
     """
     names = [column.name for column in header.columns]
-    conditions, bindings = _conditions(header, selection)
+    conditions, bindings = conditions_of(header, selection)
     if selection.where is not None:
         # A comment at its end ends with the line.
         conditions.append(f"(\n{selection.where}\n)")
@@ -109,7 +109,12 @@ ORDER BY {", ".join(f"s.{part}" for part in order)}
     return sql, bindings
 
 
-def _conditions(header: Header, selection: Selection) -> tuple[list[str], dict[str, Value]]:
+def conditions_of(header: Header, selection: Selection) -> tuple[list[str], dict[str, Value]]:
+    """Return what rows have to be by names and paths, for rows called `result`, and what to bind.
+
+    Raises:
+        UsageError: the query has no such columns.
+    """
     conditions: list[str] = []
     bindings: dict[str, Value] = {}
     for kind in KINDS:

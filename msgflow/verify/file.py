@@ -4,6 +4,8 @@ targets:
   - path: [/scan, /cmd_vel]
     latency: p99 < 80 ms
     completeness: ">= 99 %"
+  - path: camera-to-motors
+    latency: max < 200 ms
   - timer: /planner
     rate: 100 Hz ± 5 %
     lateness: [p99 < 1 ms, max < 5 ms]
@@ -49,7 +51,8 @@ class Target:
     Attributes:
         kind: a key of SUBJECTS.
         name: what the file calls it, else how it chooses its subject.
-        topics: of a path, in order; else none.
+        topics: of a path, in order; none of a path that only has a name.
+        path_name: of a path in the file with named paths.
         chosen: fields that choose rows, by name: names or patterns.
         requirements: at least one.
     """
@@ -59,6 +62,7 @@ class Target:
     topics: tuple[Text, ...]
     chosen: dict[str, Text]
     requirements: tuple[Requirement, ...]
+    path_name: Text | None = None
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,8 @@ def _target(file: YamlFile, node: Any) -> Target:
     for key, _ in node.value:
         _refuse_unknown(file, key, kind, (kind, _NAME, *choosing, *metrics))
     fields = file.mapping(node, f"a {kind}", (kind,), (*choosing, *metrics, _NAME))
-    topics = _path(file, fields[kind]) if kind == PATH else ()
+    path_name = _path_name(file, fields[kind]) if kind == PATH else None
+    topics = _path(file, fields[kind]) if kind == PATH and path_name is None else ()
     chosen = {name: file.text(fields[name], name) for name in (kind, *choosing) if name in fields
               and kind != PATH}  # fmt: skip
     requirements = tuple(
@@ -110,11 +115,17 @@ def _target(file: YamlFile, node: Any) -> Target:
         file.fail(
             line_of(node), f"nothing is required of this {kind}", f"give {', '.join(metrics)}"
         )
-    words = [text.value for text in topics] or [text.value for text in chosen.values()]
+    named = [path_name] if path_name else []
+    words = [text.value for text in (*topics, *named)] or [text.value for text in chosen.values()]
     separator = " → " if topics else " "
     given = file.optional(fields, _NAME)
     return Target(
-        kind, given.value if given else separator.join(words), topics, chosen, requirements
+        kind,
+        given.value if given else separator.join(words),
+        topics,
+        chosen,
+        requirements,
+        path_name,
     )
 
 
@@ -149,6 +160,13 @@ def _refuse_unknown(file: YamlFile, key: Any, kind: str, known: tuple[str, ...])
         near = nearest(name, known)
         meant = f"did you mean {near[0]}; " if near else ""
         file.fail(line_of(key), f"a {kind} has no {name}", f"{meant}it has {', '.join(known)}")
+
+
+def _path_name(file: YamlFile, node: Any) -> Text | None:
+    # Topics begin with a slash.
+    if node.id != "scalar" or is_null(node) or str(node.value).startswith("/"):
+        return None
+    return file.text(node, PATH, "the name of a path")
 
 
 def _path(file: YamlFile, node: Any) -> tuple[Text, ...]:
@@ -190,6 +208,7 @@ def _refuse_repeated(file: YamlFile, targets: tuple[Target, ...]) -> None:
         subject = (
             target.kind,
             tuple(text.value for text in target.topics),
+            target.path_name and target.path_name.value,
             tuple(sorted((name, text.value) for name, text in target.chosen.items())),
         )
         for one in target.requirements:

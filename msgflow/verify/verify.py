@@ -13,13 +13,14 @@ from msgflow.query.catalogue import load_query, nearest
 from msgflow.query.header import Column, Header, Param
 from msgflow.query.result import QueryResult
 from msgflow.query.run import read_runs, run_query
+from msgflow.query.selection import Selection, conditions_of
 from msgflow.query.window import Run, choose_one, time_window
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
 from msgflow.verify.worst import FLOWS, KEYS, Worst, find_worst, worst_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import duckdb
 
@@ -99,6 +100,7 @@ def verify(
     connection: duckdb.DuckDBPyConnection,
     targets: TargetsFile,
     *,
+    paths: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
     run: str | int | None = None,
     start: str | int | None = None,
     end: str | int | None = None,
@@ -109,6 +111,8 @@ def verify(
     Args:
         connection: to a database with the public views.
         targets: the requirements.
+        paths: topics and nodes, or globs, by 'from', 'to', 'via' and 'without', of each path that
+            the requirements call by a name.
         run: a name or an id; the latest run when None.
         start: begin of the time window: epoch ns, an offset from the run's start, or ISO time.
         end: its end, likewise.
@@ -121,7 +125,7 @@ def verify(
     one = choose_one(read_runs(connection), run, "a verification")
     window = time_window((one,), start, end, skip_first)
     _require_names(connection, targets, one)
-    work = _Work(connection, one, window)
+    work = _Work(connection, one, window, paths or {})
     rows = [row for target in targets.targets for row in work.rows(target)]
     # What is to be looked at comes first, else the order of the file.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
@@ -141,9 +145,14 @@ class _Work:
     """Measures the targets one after the other."""
 
     def __init__(
-        self, connection: duckdb.DuckDBPyConnection, run: Run, window: tuple[int, int]
+        self,
+        connection: duckdb.DuckDBPyConnection,
+        run: Run,
+        window: tuple[int, int],
+        paths: Mapping[str, Mapping[str, Sequence[str]]],
     ) -> None:
         self._connection = connection
+        self._paths = paths
         self._run = run
         self._window = window
         self.notes: dict[str, None] = {}
@@ -181,7 +190,13 @@ class _Work:
             columns.append(f"({metric.samples})::BIGINT AS samples_{place}")
             columns.append(f"{key} AS key_{place}")
         given: dict[str, Value] = {}
-        if target.kind == PATH:
+        if target.path_name is not None:
+            places = self._paths[target.path_name.value]
+            visited = Selection(
+                via=tuple(places.get("via", ())), without=tuple(places.get("without", ()))
+            )
+            where, given = conditions_of(load_query(name), visited)
+        elif target.kind == PATH:
             given["via"] = [topic.value for topic in target.topics]
             where = ["list_has_all(string_split(path, ' → '), $via)"]
         else:
@@ -190,7 +205,8 @@ class _Work:
                 for field in target.chosen
             ]
             given = {f"wanted_{field}": text.value for field, text in target.chosen.items()}
-        sql = f"SELECT {', '.join(columns)} FROM ({{}}) WHERE {' AND '.join(where)} ORDER BY ALL"
+        condition = " AND ".join(where) or "true"
+        sql = f"SELECT {', '.join(columns)} FROM ({{}}) AS result WHERE {condition} ORDER BY ALL"
         return self._ask(name, sql, target, given)
 
     @staticmethod
@@ -219,7 +235,10 @@ class _Work:
             columns=(),
         )
         own: dict[str, Value] = dict(given)
-        if target.kind == PATH:
+        if target.path_name is not None:
+            places = self._paths[target.path_name.value]
+            own |= {word: ",".join(places[word]) for word in ("from", "to") if word in places}
+        elif target.kind == PATH:
             own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
         start, end = self._window
         has_window = "$start_ns" in header.body
@@ -264,6 +283,8 @@ class _Work:
     def _missing(self, target: Target, requirement: Requirement) -> dict[str, Any]:
         if target.kind == PATH:
             reason = "no message of the first topic led to the last one along this path"
+            if target.path_name is not None:
+                reason = "no message led from the start of this path to its end"
         else:
             reason = f"nothing of this {target.kind} was measured in the time window"
         return self._verdict(target, requirement) | {

@@ -227,3 +227,73 @@ def test_hostile_names_are_text_in_junit(system: Path, tmp_path: Path) -> None:
     for element in root.iter():
         for value in element.attrib.values():
             assert value.isprintable()
+
+
+PATHS = """
+paths:
+  - name: there
+    from: /a
+    to: /b
+  - name: by-node
+    from: /source
+    via: ["/rel*"]
+    without: [/slow]
+  - name: nowhere
+    from: /a
+    to: /b
+    without: [/relay]
+"""
+
+
+def with_paths(system: Path, tmp_path: Path, text: str) -> list[dict[str, Any]]:
+    (tmp_path / "paths.yaml").write_text(PATHS, encoding="utf-8")
+    (tmp_path / "targets.yaml").write_text(text, encoding="utf-8")
+    with Database(system) as database:
+        return rows(
+            database.verify(tmp_path / "targets.yaml", paths=tmp_path / "paths.yaml", run=1)
+        )
+
+
+def test_a_path_may_have_a_name_of_its_file(system: Path, tmp_path: Path, check: Check) -> None:
+    (named,) = with_paths(system, tmp_path, "targets: [{path: there, latency: max < 1 us}]")
+    (listed,) = rows(check("targets: [{path: [/a, /b], latency: max < 1 us}]"))
+    assert (named["target"], named["subject"]) == ("there", "there")
+    for column in ("verdict", "value", "samples", "path", "worst_ns", "see"):
+        assert named[column] == listed[column]
+    assert named["verdict"] == "failed"
+    (other,) = with_paths(
+        system, tmp_path, "targets: [{path: by-node, name: x, completeness: '>= 0 %'}]"
+    )
+    assert other["target"] == "x"
+    assert "/relay" in other["path"]
+    assert "/slow" not in other["path"]
+    (none,) = with_paths(system, tmp_path, "targets: [{path: nowhere, latency: max < 1 us}]")
+    assert none["verdict"] == "not measured"
+    assert "this path" in none["reason"]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message", "hint"),
+    [
+        ("targets:\n  - path: ther\n    latency: max < 1 s", 2, "no path of this name", "there"),
+        (
+            "targets:\n  - path: there\n    latency: max < 1 s\n  - path: there\n"
+            "    latency: max < 2 s",
+            5, "required twice", "line 3",
+        ),
+    ],
+)  # fmt: skip
+def test_a_wrong_name_of_a_path_is_named_with_its_line(
+    system: Path, tmp_path: Path, text: str, line: int, message: str, hint: str
+) -> None:
+    with pytest.raises(UsageError) as raised:
+        with_paths(system, tmp_path, text)
+    assert raised.value.message.startswith(f"{tmp_path / 'targets.yaml'}, line {line}: ")
+    assert message in raised.value.message
+    assert hint in str(raised.value.hint)
+
+
+def test_without_the_file_a_name_means_nothing(system: Path, tmp_path: Path) -> None:
+    (tmp_path / "targets.yaml").write_text("targets: [{path: there, latency: max < 1 s}]")
+    with Database(system) as database, pytest.raises(UsageError, match=r"none\.yaml"):
+        database.verify(tmp_path / "targets.yaml", paths=tmp_path / "none.yaml")
