@@ -41,6 +41,7 @@ def connection() -> duckdb.DuckDBPyConnection:
     con.execute("CREATE TABLE run AS SELECT 1 AS run_id, 'first' AS name, 100::BIGINT AS start_ns")
     con.execute("INSERT INTO run VALUES (2, 'second', 1000000000)")
     con.execute("ALTER TABLE run ADD COLUMN end_ns BIGINT")
+    con.execute("ALTER TABLE run ADD COLUMN labels VARCHAR[]")
     con.execute("UPDATE run SET end_ns = start_ns + 2000000000")
     con.execute(
         "CREATE TABLE message AS SELECT * FROM (VALUES "
