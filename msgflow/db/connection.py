@@ -24,7 +24,7 @@ STORAGE_VERSION = "v1.4.0"
 
 
 def connect(
-    path: Path, *, read_only: bool, memory_limit: str | None = None
+    path: Path, *, read_only: bool, memory_limit: str | None = None, threads: int | None = None
 ) -> duckdb.DuckDBPyConnection:
     """Open an existing, current msgflow database.
 
@@ -32,13 +32,14 @@ def connect(
         path: the database file.
         read_only: open it for reading only; several processes can do so at once.
         memory_limit: most memory that DuckDB takes, such as '2GB'; DuckDB's default when None.
+        threads: that work on one statement; one per core when None.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
-    con = open_file(path, read_only=read_only, memory_limit=memory_limit)
+    con = open_file(path, read_only=read_only, memory_limit=memory_limit, threads=threads)
     try:
         require_current(con, path)
     except BaseException:
@@ -73,7 +74,7 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
 
 
 def open_file(
-    path: Path, *, read_only: bool, memory_limit: str | None = None
+    path: Path, *, read_only: bool, memory_limit: str | None = None, threads: int | None = None
 ) -> duckdb.DuckDBPyConnection:
     """Open a DuckDB file, or create it, whatever is in it.
 
@@ -86,6 +87,8 @@ def open_file(
     config: dict[str, str | bool | int | float | list[str]] = {}
     if memory_limit is not None:
         config["memory_limit"] = memory_limit
+    if threads is not None:
+        config["threads"] = threads
     if not read_only:
         config["storage_compatibility_version"] = STORAGE_VERSION
     with _opening(path):

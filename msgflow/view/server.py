@@ -141,7 +141,8 @@ class Shared:
 
     def _open(self) -> tuple[duckdb.DuckDBPyConnection, Pages]:
         # Each request has a connection of its own to the same database, made of this one.
-        base = connect(self.path, read_only=True, memory_limit=self._memory_limit)
+        # Questions run beside each other, and what a statement needs grows with its threads.
+        base = connect(self.path, read_only=True, memory_limit=self._memory_limit, threads=1)
         return base, Pages()
 
     def require_same(self, generation: str | None) -> None:

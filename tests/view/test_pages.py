@@ -180,7 +180,7 @@ def test_compare(systems: Path, serve: Serve, page: Page) -> None:
     ][: len(rows)]  # fmt: skip
     subjects = {row["subject"] for row in wanted}
     said = page.page.locator("main").inner_text()
-    assert f"{len({row['subject'] for row in differs})} subject" in said
+    assert f"{len({row['subject'] for row in differs})} callback" in said
     assert f"of {len(subjects)} differ" in said
 
 
@@ -206,7 +206,7 @@ def test_compare_shows_what_was_measured_before_intervals(
         for row in wanted
     ][: len(rows)]  # fmt: skip
     said = page.page.locator("main").inner_text()
-    assert f"{len({row['subject'] for row in wanted})} subjects measured" in said
+    assert f"{len({row['subject'] for row in wanted})} callbacks measured" in said
     assert "confidence intervals" in said
     (route,) = held
     route.continue_()

@@ -23,7 +23,7 @@ from tables import decoded
 
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
-from msgflow.view.server import Turns, is_local, listen, serve
+from msgflow.view.server import Shared, Turns, is_local, listen, serve
 
 Serve = Callable[[Path], Served]
 
@@ -268,6 +268,17 @@ def test_what_needs_too_much_memory_alone_says_what_to_do() -> None:
         Turns().ask(ask)
     assert "--memory-limit" in str(error.value.hint)
     assert len(tries) == 2
+
+
+def test_a_statement_has_one_thread(demo: Path, tmp_path: Path) -> None:
+    """What a statement needs of the memory grows with its threads, and questions run together."""
+    path = Path(shutil.copy(demo, tmp_path / "one.duckdb"))
+    shared = Shared(path, "300MB")
+    try:
+        setting = shared.cursor().execute("SELECT current_setting('threads')").fetchall()
+    finally:
+        shared.close()
+    assert setting == [(1,)]
 
 
 def test_other_failures_are_not_tried_again() -> None:

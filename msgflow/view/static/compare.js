@@ -8,6 +8,7 @@ import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
 
 const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (from publication to take)" };
+const ONE_OF = { paths: "path", callbacks: "callback", topics: "topic" };
 const MEASURED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "effect", "a_count", "b_count", "a_share", "b_share"];
 const COMPARED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "effect", "a_count", "b_count", "a_share", "b_share"];
 
@@ -70,8 +71,8 @@ export class ComparePage {
     const subjects = new Set(table.subject);
     const isQuick = table.meta.is_quick;
     clear(this.body,
-      isQuick ? waiting(`${count(subjects.size, "subject")} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
-        : h("p", {}, `${count(changed.size, "subject")} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B).`),
+      isQuick ? waiting(`${count(subjects.size, ONE_OF[this.what])} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
+        : h("p", {}, `${count(changed.size, ONE_OF[this.what])} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. The effect says how rarely values of one run are found among those of the other.`),
       dataTable(table, { label: isQuick ? "measured" : "comparison", only: (row) => isQuick || this.all || differs(row), nothing: "No difference is shown.",
         columns: isQuick ? MEASURED : COMPARED,
         onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),

@@ -48,3 +48,10 @@ export function clear(element, ...children) {
 export function color(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
+
+// Long names may be broken where their parts meet, so that they are not broken within a word.
+const LONG_WORD = 18;
+export function breakable(text) {
+  return String(text).split(" ").flatMap((word, at) => [at ? " " : "",
+    ...(word.length <= LONG_WORD ? [word] : word.split(/(?<=[^/(])(?=\/)|(?<=[(_,])(?=[^\s])|(?<=[a-z0-9])(?=[A-Z])/).flatMap((part, place) => (place ? [h("wbr"), part] : [part])))]);
+}

@@ -1,6 +1,6 @@
 // The first page: what was recorded, what is wrong with it, and what is slow.
 
-import { h, clear } from "./dom.js";
+import { h, clear, breakable } from "./dom.js";
 import { address } from "./state.js";
 import { count, duration, wallClock } from "./words.js";
 import { dataTable, besides } from "./table.js";
@@ -59,11 +59,12 @@ export class OverviewPage {
       if (!order.length) return [h("p", {}, table.rows ? "No flow reached the end of a path." : "There are no paths: no message is known to have been taken."), notes(table.meta.notes)];
       const ids = pathNumbers(table, await app.fetch("path"));
       return [
+        h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. Dark: half of its flows arrived within this time (median); light: 99 % of them (p99). A click shows more."),
         h("ol", { className: "slow" }, order.slice(0, 10).map((row) => h("li", {},
           h("a", { href: address({ page: "paths", path: ids[row] }) },
             h("span", { className: "bar-track" }, bar(table.median_ns[row] / most, "bar-median"), bar(table.p99_ns[row] / most, "bar-p99")),
             h("span", { className: "numbers" }, `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`),
-            h("span", { className: "path-text" }, table.path[row]))))),
+            h("span", { className: "path-text" }, breakable(table.path[row])))))),
         order.length > 10 && h("p", {}, h("a", { href: address({ page: "paths" }) }, `all ${count(order.length, "path")}`)),
         notes(table.meta.notes), command(table.meta.command),
       ];

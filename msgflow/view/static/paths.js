@@ -1,6 +1,6 @@
 // Paths: latency of each, and of the chosen one how it is distributed, over time, and made up.
 
-import { h, svg, clear, color } from "./dom.js";
+import { h, clear, color, breakable } from "./dom.js";
 import { address, current, replace } from "./state.js";
 import { PALE, PART_COLORS, count, duration, partTitle, percent } from "./words.js";
 import { dataTable, besides } from "./table.js";
@@ -9,6 +9,8 @@ import { chart, redrawCharts } from "./chart.js";
 import { pathNumbers } from "./overview.js";
 
 const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected", "lost_reasons"];
+// Shown only where they are not 0 or empty on every path.
+const SELDOM = ["superseded", "cut_by_recording", "loss_affected", "lost_reasons"];
 const FATES = [["reached", "reached the end", "good"], ["superseded", "superseded by a newer input", "color-faint"], ["lost", "lost", "error"], ["cut_by_recording", "cut by the recording", "wait"]];
 
 export class PathsPage {
@@ -36,7 +38,8 @@ export class PathsPage {
     }
     this.list = h("div");
     this.detail = h("div");
-    clear(this.root, h("section", {}, h("h2", {}, count(table.rows, "path")), this.list, notes(table.meta.notes), command(table.meta.command)), this.detail);
+    clear(this.root, h("section", {}, h("h2", {}, count(table.rows, "path")),
+      h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. A flow is what came of one message at its start; its latency goes from the callback that sent it to the end of the callback at the end of the path."), this.list, notes(table.meta.notes), command(table.meta.command)), this.detail);
     await this.choose(row, asked !== this.ids[row]);
   }
 
@@ -44,7 +47,7 @@ export class PathsPage {
     this.row = row;
     if (isNew) { replace({ page: "paths", path: this.ids[row] }); this.app.linksMoved(); }
     clear(this.list, dataTable(this.table, {
-      columns: COLUMNS, label: "paths", sort: { name: "p99_ns", down: true }, picked: (other) => other === this.row,
+      columns: COLUMNS.filter((name) => !SELDOM.includes(name) || this.table[name].some((value) => value)), label: "paths", sort: { name: "p99_ns", down: true }, picked: (other) => other === this.row,
       onPick: (other) => this.choose(other, true), data: (other) => ({ path: String(this.ids[other]) }),
     }));
     clear(this.detail, waiting("counting flows …"));
@@ -67,7 +70,7 @@ export class PathsPage {
     const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null, source: begin,
       flow: Number.isNaN(source.take_id[at]) || source.take_id[at] === null ? `${source.root_kind[at]}:${source.root_id[at]}` : `take:${source.take_id[at]}` });
     return [
-      h("section", {}, h("h2", { className: "path-title" }, table.path[row]), this.fates(row)),
+      h("section", {}, h("h2", { className: "path-title" }, breakable(table.path[row])), this.fates(row)),
       histogram.rows ? h("div", { className: "charts" },
         h("section", {}, h("h3", {}, "Latency over time"),
           h("p", { className: "soft" }, points.rows && points.count.some((n) => n > 1) ? `The slowest flow of each of ${points.rows} pieces of time, and the median of the piece. Click a point to see its flow.` : "Click a point to see its flow."),
@@ -133,7 +136,8 @@ export class PathsPage {
       swatch.style.background = color(shade(kind));
       return h("span", { className: "legend-item" }, swatch, partTitle(kind));
     }));
-    return [stack, legend, dataTable(breakdown, { only: (row) => breakdown.path_id[row] === path, label: "breakdown",
+    return [h("p", { className: "soft" }, "The mean of each part, in the order in which a flow goes through them. Where a message waited for a callback, the trace may not tell whether the network or a busy executor was the reason: that is undecided."),
+      stack, legend, dataTable(breakdown, { only: (row) => breakdown.path_id[row] === path, label: "breakdown",
       columns: ["hop", "part", "node", "what", "median_ns", "mean_ns", "p95_ns", "max_ns", "share", "flows", "overlaps"] }),
     most === 0 && h("p", {}, "All parts are zero."), notes(breakdown.meta.notes), command(breakdown.meta.command)];
   }

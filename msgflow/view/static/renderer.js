@@ -135,7 +135,7 @@ export class Renderer {
     }
     c.fillStyle = lane.type === "row" && lane.isInternal ? colors.soft : colors.ink;
     const room = this.labelWidth - left - 6;
-    c.fillText(fit(c, lane.label, room, lane.type !== "process"), left, y + lane.height / 2);
+    c.fillText(fit(c, lane.label, room, lane.type !== "process" && lane.kind !== "thread"), left, y + lane.height / 2);
     c.fillStyle = colors.line;
     c.fillRect(this.labelWidth - 1, y, 1, lane.height);
   }

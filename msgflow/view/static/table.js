@@ -1,6 +1,6 @@
 // A table beside every chart: sorted by a click, with what its columns mean.
 
-import { h, clear } from "./dom.js";
+import { h, clear, breakable } from "./dom.js";
 import { cell, title, count } from "./words.js";
 
 const SHOWN = 100;
@@ -48,7 +48,7 @@ export function dataTable(table, options = {}) {
         const isNumber = column.type === "integer" || column.type === "double";
         const text = cell(table[column.name][row], column);
         const inside = position === 0 && options.onPick
-          ? h("button", { type: "button", className: "pick" }, text || "–") : text;
+          ? h("button", { type: "button", className: "pick" }, text ? (isNumber ? text : breakable(text)) : "–") : isNumber ? text : breakable(text);
         return h("td", { className: isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}` }, inside);
       });
       return h("tr", {

@@ -233,6 +233,7 @@ export class TimelinePage {
     if (this.linksCut) parts.push("Only a part of the arrows is loaded: zoom in.");
     if (this.gapsCut) parts.push(`${count(this.gapsCut, "shorter gap")} of the recording not shaded.`);
     if (this.hiddenCount && !renderer.flow) parts.push(`${count(this.hiddenCount, "row")} hidden.`);
+    if (held && !renderer.flow) parts.push("A click on a bar shows what led to it and what came of it; dragging moves, Ctrl and the wheel zoom.");
     clear(this.status, parts.join(" "));
   }
 

@@ -22,9 +22,14 @@ const TITLES = {
   topic_name: "topic", is_loss_affected: "touched by losses", rate_hz: "rate",
   callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
   start_at: "begin", length: "duration", subject: "path", a_ns: "A", b_ns: "B",
-  difference_ns: "B − A", change_percent: "change", low_ns: "interval from", high_ns: "to",
+  difference_ns: "B − A", change_percent: "change", low_ns: "95 % interval, from", high_ns: "to",
   a_count: "values of A", b_count: "values of B", share: "share", affected_percent: "affected",
-  seen_ns: "seen", executor_kind: "executor",
+  seen_ns: "seen", executor_kind: "executor", root_at: "began at",
+  publisher_count: "publishers", subscription_count: "subscriptions", publication_count: "messages published",
+  take_count: "messages taken", delayed_min: "delayed, at least", delayed_max: "delayed, at most",
+  busy_worst_ns: "busy, longest", busy_total_min_ns: "busy in all, at least", busy_total_max_ns: "busy in all, at most",
+  meanwhile_node: "kept waiting by", meanwhile_callback: "its callback", overlap_min_ns: "ran meanwhile, at least",
+  overlap_max_ns: "ran meanwhile, at most", worst_ns: "longest", a_share: "share in A", b_share: "share in B",
 };
 
 // Parts of a latency, as path-breakdown names them.
@@ -107,6 +112,7 @@ export function cell(value, column) {
   if (column.unit === "Hz") return `${trimmed(value, 3)} Hz`;
   if (column.unit === "%") return `${trimmed(value, 2)} %`;
   if (column.name === "change_percent") return `${trimmed(value, 2)} %`;
+  if (column.name === "part") return partTitle(value);
   if (typeof value === "number") {
     if (/share$/.test(column.name)) return percent(value);
     return trimmed(value, 3);
