@@ -4,49 +4,70 @@
 --     that did, else with the publication itself. It is a source where no taken message led to it.
 --     The route (derive.flow_caller) is that from an instance that called; else it is empty.
 -- grain: one row per publication on a topic of the application
--- needs: store.publication, store.publisher, store.link_causal, store.callback_instance,
---     derive.flow_caller
+-- needs: store.publication, store.publisher, store.link_causal, derive.flow_call, derive.flow_caller
 WITH called AS (
-    SELECT l.run_id, l.publication_id, i.callback_instance_id, i.take_id, c.route
-    FROM store.link_causal AS l
-    JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
-    JOIN store.callback_instance AS i ON c.caller_id = i.callback_instance_id
-    ANTI JOIN derive.flow_caller AS f ON c.caller_id = f.callback_instance_id
+    SELECT run_id, publication_id, publisher_id, caller_id, take_id, route
+    FROM derive.flow_call AS l
+    ANTI JOIN derive.flow_caller AS f ON l.caller_id = f.callback_instance_id
 ),
-run AS (
-    SELECT l.run_id, l.publication_id, l.callback_instance_id, l.take_id
+message AS (
+    SELECT l.publication_id
     FROM store.link_causal AS l
     ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
+    WHERE l.take_id IS NOT NULL
     UNION ALL
-    SELECT run_id, publication_id, callback_instance_id, take_id FROM called
+    SELECT publication_id FROM called WHERE take_id IS NOT NULL
 ),
-cause AS (
+-- Each publication, and once more for all that published it or called for it. They are grouped, not
+-- joined: what a join looks up stays in memory until the query ends.
+run AS (
     SELECT
-        run_id,
-        publication_id,
-        bool_or(take_id IS NOT NULL) AS has_message,
-        min(CASE WHEN take_id IS NULL THEN callback_instance_id END) AS callback_instance_id
-    FROM run
-    GROUP BY run_id, publication_id
+        run_id, publication_id, publisher_id, NULL::BIGINT AS callback_instance_id,
+        NULL::BIGINT[] AS route
+    FROM store.publication
+    UNION ALL
+    SELECT l.run_id, l.publication_id, l.publisher_id, l.callback_instance_id, NULL
+    FROM store.link_causal AS l
+    ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
+    WHERE l.take_id IS NULL
+    UNION ALL
+    SELECT run_id, publication_id, publisher_id, caller_id, route FROM called WHERE take_id IS NULL
 ),
-route AS (
-    SELECT publication_id, callback_instance_id, min(route) AS route
-    FROM called
-    GROUP BY publication_id, callback_instance_id
+source AS (
+    SELECT
+        r.run_id,
+        r.publication_id,
+        r.publisher_id,
+        min(r.callback_instance_id) AS callback_instance_id,
+        list({'callback_instance_id': r.callback_instance_id, 'route': r.route})
+            FILTER (WHERE r.route IS NOT NULL) AS ways
+    FROM run AS r
+    JOIN store.publisher AS p ON r.publisher_id = p.publisher_id
+    ANTI JOIN message AS m ON r.publication_id = m.publication_id
+    WHERE NOT p.is_internal
+    GROUP BY r.run_id, r.publication_id, r.publisher_id
 )
 SELECT
-    b.run_id,
-    b.publication_id,
-    b.publisher_id,
-    NOT coalesce(c.has_message, false) AS is_source,
-    CASE WHEN c.callback_instance_id IS NULL OR c.has_message THEN 'publication'
-        ELSE 'callback_instance' END AS root_kind,
-    CASE WHEN c.callback_instance_id IS NULL OR c.has_message THEN b.publication_id
-        ELSE c.callback_instance_id END AS root_id,
-    CASE WHEN c.has_message THEN []::BIGINT[] ELSE coalesce(r.route, []) END AS route
+    run_id,
+    publication_id,
+    publisher_id,
+    true AS is_source,
+    CASE WHEN callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
+        AS root_kind,
+    coalesce(callback_instance_id, publication_id) AS root_id,
+    CASE WHEN ways IS NULL THEN []::BIGINT[]
+        ELSE coalesce(
+            list_min(list_filter(
+                ways, lambda way: way.callback_instance_id = source.callback_instance_id
+            )).route,
+            []
+        ) END AS route
+FROM source
+UNION ALL
+SELECT
+    b.run_id, b.publication_id, b.publisher_id, false, 'publication', b.publication_id,
+    []::BIGINT[]
 FROM store.publication AS b
 JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-LEFT JOIN cause AS c ON b.publication_id = c.publication_id
-LEFT JOIN route AS r
-    ON c.publication_id = r.publication_id AND c.callback_instance_id = r.callback_instance_id
+SEMI JOIN message AS m ON b.publication_id = m.publication_id
 WHERE NOT p.is_internal

@@ -53,7 +53,7 @@
 -- column: publication_id BIGINT  Message that is published or under way
 -- needs: derive.known_word, main.end_to_end, derive.flow_chain, main.publication, main.take,
 --     main.callback_instance,
---     main.request, derive.flow_transport, derive.flow_caller, derive.flow_root,
+--     main.request, derive.flow_transport, derive.flow_call, derive.flow_root,
 --     store.callback_instance, store.take, store.link_causal, store.link_request
 CREATE OR REPLACE MACRO main.end_to_end_part(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
@@ -117,13 +117,9 @@ continuation AS MATERIALIZED (
     WHERE list_contains(runs, l.run_id)
     UNION ALL
     SELECT
-        l.publication_id, i.take_id, t.subscription_id, c.caller_id, l.callback_instance_id,
-        l.kind, c.route
-    FROM derive.flow_caller AS c
-    JOIN store.callback_instance AS i ON c.caller_id = i.callback_instance_id
-    LEFT JOIN store.take AS t ON i.take_id = t.take_id
-    JOIN store.link_causal AS l ON c.callback_instance_id = l.callback_instance_id
-    WHERE list_contains(runs, l.run_id)
+        publication_id, take_id, subscription_id, caller_id, callback_instance_id, kind, route
+    FROM derive.flow_call
+    WHERE list_contains(runs, run_id)
 ),
 -- Steps back: from a publication to the message that led to it.
 step AS MATERIALIZED (

@@ -1,0 +1,33 @@
+-- name: derive.flow_call
+-- description: Publications that the callbacks of services led to, with the callback instance on whose
+--     request they ran and the message that it was for, if any.
+-- grain: one row per publication, callback instance that called for it, and way it did so
+-- needs: derive.flow_caller, store.link_request, store.callback_instance, store.take,
+--     store.link_causal
+
+-- What a join looks up stays in memory until the query ends, and how often services were called is
+-- hard to guess: only callback instances that called, and publications of services, are looked up.
+WITH caller AS (
+    SELECT i.callback_instance_id, i.take_id
+    FROM store.callback_instance AS i
+    SEMI JOIN store.link_request AS l ON i.callback_instance_id = l.callback_instance_id
+),
+taking AS (
+    SELECT i.callback_instance_id, i.take_id, t.subscription_id
+    FROM caller AS i
+    LEFT JOIN store.take AS t ON i.take_id = t.take_id
+),
+published AS (
+    SELECT
+        l.run_id, l.callback_instance_id, l.publication_id, l.publisher_id, l.kind
+    FROM store.link_causal AS l
+    SEMI JOIN (
+        SELECT callback_instance_id FROM store.callback_instance WHERE request_id IS NOT NULL
+    ) AS i ON l.callback_instance_id = i.callback_instance_id
+)
+SELECT
+    p.run_id, p.publication_id, p.publisher_id, p.kind, p.callback_instance_id, c.caller_id,
+    c.route, t.take_id, t.subscription_id
+FROM derive.flow_caller AS c
+JOIN taking AS t ON c.caller_id = t.callback_instance_id
+JOIN published AS p ON c.callback_instance_id = p.callback_instance_id
