@@ -88,21 +88,28 @@ part AS (
     SELECT path_id, flow_id, hop, position, 'executor_busy', busy_min_ns, callback_id
     FROM taken
 ),
+-- A flow has a part twice only in a hop with a cache or a service. To tell so many flows apart
+-- everywhere would take most of the memory.
+repeated AS (
+    SELECT DISTINCT path_id, hop FROM whole WHERE part IN ('cache', 'service')
+),
 measured AS (
     SELECT
-        path_id,
-        hop,
-        part,
-        callback_id,
-        min(position) AS position,
-        count(DISTINCT flow_id) AS flows,
-        count(*) FILTER (WHERE duration_ns < 0) AS overlaps,
-        quantile_disc(duration_ns, [0.5, 0.95]) AS quantiles,
-        round(avg(duration_ns))::BIGINT AS mean_ns,
-        max(duration_ns) AS max_ns,
-        sum(duration_ns)::BIGINT AS total_ns
-    FROM part
-    GROUP BY path_id, hop, part, callback_id
+        p.path_id,
+        p.hop,
+        p.part,
+        p.callback_id,
+        min(p.position) AS position,
+        CASE WHEN any_value(r.hop) IS NULL THEN count(*)
+            ELSE count(DISTINCT p.flow_id) FILTER (WHERE r.hop IS NOT NULL) END AS flows,
+        count(*) FILTER (WHERE p.duration_ns < 0) AS overlaps,
+        quantile_disc(p.duration_ns, [0.5, 0.95]) AS quantiles,
+        round(avg(p.duration_ns))::BIGINT AS mean_ns,
+        max(p.duration_ns) AS max_ns,
+        sum(p.duration_ns)::BIGINT AS total_ns
+    FROM part AS p
+    LEFT JOIN repeated AS r ON p.path_id = r.path_id AND p.hop = r.hop
+    GROUP BY p.path_id, p.hop, p.part, p.callback_id
 ),
 message AS (
     SELECT
