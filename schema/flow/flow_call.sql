@@ -1,6 +1,6 @@
 -- name: derive.flow_call
--- description: Publications that the callbacks of services led to, with the callback instance on whose
---     request they ran and the message that it was for, if any.
+-- description: Publications that the callbacks of services led to, with the callback instance on
+--     whose request they ran and the message that it was for, if any.
 -- grain: one row per publication, callback instance that called for it, and way it did so
 -- needs: derive.flow_caller, store.link_request, store.callback_instance, store.take,
 --     store.link_causal

@@ -247,6 +247,6 @@ FROM ranked AS r
 JOIN useful AS u ON r.hop_id = u.hop_id
 JOIN useful AS f ON r.first_hop_id = f.hop_id
 WINDOW run AS (PARTITION BY r.run_id)
--- Nothing is cut here: chains of one length are at most max_paths. But DuckDB, which takes chains for
--- countless, would else look up the small in the large in whatever is joined with them.
+-- Nothing is cut here: chains of one length are at most max_paths. But else DuckDB takes chains for
+-- countless, and keeps tables of all takes to look up a few in whatever is joined to chains.
 LIMIT least(max_depth::DOUBLE * max_paths * len(runs), 1e15)::BIGINT

@@ -4,7 +4,8 @@
 --     that did, else with the publication itself. It is a source where no taken message led to it.
 --     The route (derive.flow_caller) is that from an instance that called; else it is empty.
 -- grain: one row per publication on a topic of the application
--- needs: store.publication, store.publisher, store.link_causal, derive.flow_call, derive.flow_caller
+-- needs: store.publication, store.publisher, store.link_causal, derive.flow_call,
+--     derive.flow_caller
 WITH called AS (
     SELECT run_id, publication_id, publisher_id, caller_id, take_id, route
     FROM derive.flow_call AS l

@@ -54,7 +54,7 @@
 -- needs: derive.known_word, main.end_to_end, derive.flow_chain, main.publication, main.take,
 --     main.callback_instance,
 --     main.request, derive.flow_transport, derive.flow_call, derive.flow_root,
---     store.callback_instance, store.take, store.link_causal, store.link_request
+--     store.callback_instance, store.link_causal, store.link_request
 CREATE OR REPLACE MACRO main.end_to_end_part(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
