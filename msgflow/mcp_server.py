@@ -12,6 +12,8 @@ import threading
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
+import duckdb
+
 from msgflow.database import Database
 from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.version import __version__
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 MOST_ROWS = 1_000
 DEFAULT_ROWS = 50
 MOST_CHARACTERS = 20_000
+MOST_IN_CELL = 2_000
 MEMORY_LIMIT = "2GB"
 MOST_SECONDS = 60.0
 INSTRUCTIONS = """\
@@ -229,6 +232,11 @@ class _Tools:
             try:
                 yield database
             except Exception as error:
+                if isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+                    raise QueryError(
+                        f"it takes more memory than {MEMORY_LIMIT}",
+                        "read one run, a shorter time (start, end), or fewer columns",
+                    ) from error
                 if not is_late.is_set():
                     raise
                 raise QueryError(
@@ -300,7 +308,19 @@ def _rows(result: QueryResult, limit: int = DEFAULT_ROWS) -> str:
     if len(result) > most:
         notes.append(f"only the first {most} of {len(result):,} rows; limit allows {MOST_ROWS:,}")
     first = replace(result, table=result.table.slice(0, most))
-    return _answer(said, json_rows(first), notes)
+    return _answer(said, map(_with_short_cells, json_rows(first)), notes)
+
+
+def _with_short_cells(text: str) -> str:
+    """Return a row as JSON, in which what is long in a cell is cut, which the cell says."""
+    if len(text) <= MOST_IN_CELL:
+        return text
+    row = json.loads(text)
+    for name, value in row.items():
+        cell = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+        if len(cell) > MOST_IN_CELL:
+            row[name] = f"{cell[:MOST_IN_CELL]}… ({len(cell):,} characters)"
+    return json.dumps(row, ensure_ascii=False)
 
 
 def _answer(said: dict[str, Any], rows: Iterable[str], notes: Sequence[str] = ()) -> str:

@@ -11,6 +11,10 @@ def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
     It only reads, and reaches no other file. It needs the extra mcp:
     pip install 'ros2-msgflow\\[mcp]'. The agent's program starts it, not you.
     """
+    from msgflow.cli.stop import STOP
     from msgflow.mcp_server import make_server
 
-    make_server(database).run("stdio")
+    server = make_server(database)
+    # It only reads: a signal ends it at once, also while it waits for the next line.
+    STOP.cease()
+    server.run("stdio")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -83,8 +84,8 @@ def test_answers_are_capped_and_say_so(small_database: Path) -> None:
     assert len(most["rows"]) == mcp_server.MOST_ROWS
     wide = one(small_database, "sql", query="SELECT repeat('x', 3000) AS x FROM range(20)")
     assert len(json.dumps(wide)) < mcp_server.MOST_CHARACTERS + 1_000
-    assert len(wide["rows"]) == 6
-    assert "only 6 of these 20 rows have room in 20,000 characters" in wide["notes"][-1]
+    assert len(wide["rows"]) == 9
+    assert "only 9 of these 20 rows have room in 20,000 characters" in wide["notes"][-1]
     rows = one(small_database, "run_query", name="info-topics", internal=True, limit=1)
     assert len(rows["rows"]) == 1
     assert "only the first 1 of" in rows["notes"][-1]
@@ -160,3 +161,49 @@ def test_without_the_extra_it_says_what_to_install(small_database: Path) -> None
         "error: the SDK of the Model Context Protocol is not installed\n\n"
         "hint: pip install 'ros2-msgflow[mcp]'\n"
     )
+
+
+def test_long_cells_are_cut_and_leave_room_for_the_others(small_database: Path) -> None:
+    query = "SELECT repeat('x', 90000) AS x, range(9000) AS numbers, 7 AS short FROM range(3)"
+    found = one(small_database, "sql", query=query)
+    assert [row["short"] for row in found["rows"]] == [7, 7, 7]
+    most = mcp_server.MOST_IN_CELL
+    assert found["rows"][0]["x"] == "x" * most + "… (90,000 characters)"
+    assert found["rows"][0]["numbers"].endswith(" characters)")
+    assert len(found["rows"][0]["numbers"]) < most + 30
+
+
+def test_what_takes_too_much_memory_says_so(
+    small_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mcp_server, "MEMORY_LIMIT", "20MB")
+    server = mcp_server.make_server(small_database)
+
+    async def call() -> Any:
+        async with Client(server) as client:
+            query = "SELECT list(range) FROM range(30000000)"
+            return await client.call_tool("sql", {"query": query})
+
+    answer = asyncio.run(call())
+    assert answer.is_error
+    assert "more memory than 20MB\nhint: " in answer.content[0].text
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_it_while_it_waits(small_database: Path, number: int, code: int) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "msgflow", "mcp", "--db", str(small_database)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as server:
+        assert server.stdin is not None
+        assert server.stdout is not None
+        server.stdin.write(b'{"jsonrpc": "2.0", "id": 1, "method": "ping"}\n')
+        server.stdin.flush()
+        assert server.stdout.readline()
+        server.send_signal(number)
+        try:
+            assert server.wait(10) == code
+        finally:
+            server.kill()
