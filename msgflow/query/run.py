@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -19,6 +20,7 @@ from msgflow.query.selection import (
     COUNTS,
     CUT_COLUMN,
     INTERNAL_COLUMN,
+    KINDS,
     PLACE,
     Selection,
     selected,
@@ -132,9 +134,20 @@ def run_query(
         notes.append(f"{rows} hidden; --internal shows them")
     if cut:
         notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
+    narrowing = _narrowing(own, selection)
+    if runs and not total and not hidden and narrowing:
+        notes.append(f"nothing fits {' '.join(narrowing)}: try with less")
     if header.note == "clocks" and table.num_rows:
         notes += clock_notes(connection, runs)
     return QueryResult(table, header, runs, notes)
+
+
+def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
+    """Return the options that leave rows out, as they are typed."""
+    given: dict[str, object] = {name: parameters.get(name) for name in ("from", "to")}
+    given |= {name: ",".join(getattr(selection, name)) for name in (*KINDS, "via", "without")}
+    given["where"] = selection.where
+    return [f"--{name} {shlex.quote(str(value))}" for name, value in given.items() if value]
 
 
 def bind(header: Header, given: Mapping[str, Value]) -> dict[str, Value]:

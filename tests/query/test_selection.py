@@ -329,3 +329,17 @@ def test_words_that_macros_do_not_know_are_errors(
     with pytest.raises(QueryError) as raised:
         database.sql(f"SELECT count(*) FROM {call}")
     assert message in raised.value.message
+
+
+def test_what_left_nothing_is_said(database: Database) -> None:
+    """Each name is one of the run, no path has both."""
+    nothing = database.query(
+        "e2e-latency", to="/base/motors", without=["/perception/*", "/lidar/*"]
+    )
+    assert len(nothing) == 0
+    assert "nothing fits --to /base/motors --without '/perception/*,/lidar/*': try with less" in (
+        nothing.notes
+    )
+    assert "nothing fits" not in " ".join(database.query("e2e-latency", to="/base/motors").notes)
+    missed = database.query("callback-duration", where="count < 0")
+    assert missed.notes[-1] == "nothing fits --where 'count < 0': try with less"
