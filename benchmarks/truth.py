@@ -141,8 +141,9 @@ GAP_RECORDINGS = (
 # What is told by time alone depends on how stamps and the trace's clock differ.
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
-# What comes and goes in these does so after a second, and clocks that drift take one to be known.
-WHOLE = ("losses", "restarts", "container_restarts", "host_chain")
+# What comes and goes in these does so after a second; clocks that drift, or are known from few
+# messages, take one to be known.
+WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services")
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
 
 
