@@ -83,6 +83,7 @@ said AS (
             WHEN v.reason IN ('pending_at_end', 'subscription_ended') AND NOT t.is_decided
                 AND t.cause = 'recorded' AND (SELECT NOT has_take FROM truth_layout)
                 THEN 'takes have no event'
+            WHEN t.is_twin THEN 'another message has its stamp'
             WHEN t.is_unseen AND v.reason <> 'receiver_gap' THEN 'a stream is missing'
             -- Objects whose handles were used again may be mixed up where one was not seen.
             WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN

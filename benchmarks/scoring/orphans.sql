@@ -43,7 +43,8 @@ matched AS (
         o.take_id, o.reason, any_value(m.truth) AS truth, bool_or(m.is_undecided) AS is_undecided,
         bool_or(m.is_in_hole) AS is_in_hole, bool_or(m.is_beside_hole) AS is_beside_hole,
         bool_or(m.has_absent) AS has_absent, bool_or(m.is_unnamed) AS is_unnamed,
-        bool_or(m.is_torn) AS is_torn, bool_or(m.is_unseen) AS is_unseen
+        bool_or(m.is_torn) AS is_torn, bool_or(m.is_unseen) AS is_unseen,
+        bool_or(m.is_twin) AS is_twin
     FROM orphan AS o
     JOIN truth_time AS t
         ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
@@ -60,6 +61,8 @@ SELECT
             THEN 'events are missing'
         WHEN m.is_undecided AND m.reason = 'publisher_gap' AND m.is_beside_hole
             THEN 'events are missing'
+        WHEN m.is_twin AND m.reason IN ('ambiguous', 'publisher_not_traced')
+            THEN 'another message has its stamp'
         WHEN m.is_unseen AND m.reason = 'publisher_not_traced' THEN 'a stream is missing'
         WHEN m.truth = 'sent, no event' AND m.reason = 'receiver_gap' AND m.is_torn
             THEN 'events are missing'

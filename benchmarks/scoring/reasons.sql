@@ -1,9 +1,18 @@
 -- What became of the messages of a simulation, and what of that the trace decides. Nothing is
 -- excused but by a hole (see holes.sql) in the very time that the reason is about.
 
--- Whether takes have an event of their own (not before Humble).
+-- Whether takes have an event of their own (not before Humble), and what leaves a ring buffer.
 CREATE OR REPLACE TEMP TABLE truth_layout AS
-SELECT coalesce(bool_or(event = 'ros2:rmw_take'), false) AS has_take FROM simulated_declared;
+SELECT
+    coalesce(bool_or(event = 'ros2:rmw_take'), false) AS has_take,
+    coalesce(bool_or(event = 'ros2:rclcpp_ring_buffer_dequeue'), false) AS has_dequeue
+FROM simulated_declared;
+
+-- Messages of one topic with one stamp.
+CREATE OR REPLACE TEMP TABLE truth_equal_stamp AS
+SELECT publication_id
+FROM simulated_publication
+QUALIFY count(*) OVER (PARTITION BY topic_name, source_timestamp_ns) > 1;
 
 -- Each message and subscription of its topic, on the clock of the subscription: when it could be
 -- taken at the earliest (NULL: the trace does not tell how far the clocks are apart); since when
@@ -138,12 +147,6 @@ of_any AS (
     WHERE l.kind = 'transport' AND l.is_decided
     GROUP BY ALL
 ),
-equal_stamp AS (
-    SELECT topic_name, source_timestamp_ns
-    FROM simulated_publication
-    GROUP BY ALL
-    HAVING count(*) > 1
-),
 unnamed AS (
     SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
 ),
@@ -173,7 +176,7 @@ SELECT
             OR (s.host, s.pid) IN (SELECT (host, pid) FROM unnamed)
             THEN 'initialisation is missing'
         WHEN u.publication_id IN (FROM nameless) THEN 'nothing names its publisher'
-        WHEN q.topic_name IS NOT NULL THEN 'another message has its stamp'
+        WHEN u.publication_id IN (FROM truth_equal_stamp) THEN 'another message has its stamp'
         WHEN u.reason = 'before_subscription' THEN CASE
             WHEN s.has_two_clocks AND (s.arrival_ns + s.longest_ns >= s.created_ns) IS NOT FALSE
                 THEN 'clocks are apart'
@@ -205,8 +208,6 @@ JOIN truth_excuse AS x
     ON u.publication_id = x.publication_id AND u.subscription_id = x.subscription_id
 JOIN truth_link AS l ON l.kind = 'publication' AND u.publication_id::VARCHAR = l.from_id
 LEFT JOIN of_any AS a ON u.subscription_id = a.subscription_id
-LEFT JOIN equal_stamp AS q
-    ON p.topic_name = q.topic_name AND p.source_timestamp_ns = q.source_timestamp_ns
 WHERE l.is_decided;
 
 -- Processes of which it cannot be told which of their subscriptions had a handle.
@@ -234,7 +235,8 @@ SELECT
     bool_or(x.is_in_hole) AS is_in_hole,
     any_value(x.unclear) AS unclear,
     bool_or(coalesce(l.is_decided, false)) AS is_decided,
-    bool_or((u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu)) AS is_unseen
+    bool_or((u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu)) AS is_unseen,
+    bool_or(t.publication_id IN (FROM truth_equal_stamp)) AS is_twin
 FROM simulated_take AS t
 JOIN truth_pair AS s
     ON t.publication_id = s.publication_id AND t.subscription_id = s.subscription_id
@@ -335,7 +337,11 @@ hidden AS (
 SELECT
     t.take_id::VARCHAR AS take_id,
     CASE
-        WHEN t.method = 'callback_only' OR NOT y.has_take AND t.method <> 'ring_buffer'
+        WHEN CASE t.method
+                WHEN 'callback_only' THEN true
+                WHEN 'ring_buffer' THEN NOT y.has_dequeue
+                ELSE NOT y.has_take
+            END
             THEN 'no event'
         WHEN s.has_no_event THEN 'sent, no event'
         WHEN x.is_replay AND t.method = 'ring_buffer' THEN 'kept'
@@ -352,7 +358,8 @@ SELECT
     (t.host, t.pid) IN (FROM unnamed) AS is_unnamed,
     t.publication_id IN (FROM absent) AS has_absent,
     k.cause IS NOT NULL AS is_torn,
-    (u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu) AS is_unseen
+    (u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu) AS is_unseen,
+    t.publication_id IN (FROM truth_equal_stamp) AS is_twin
 FROM simulated_take AS t
 CROSS JOIN truth_layout AS y
 JOIN simulated_transport AS x ON t.take_id = x.take_id
