@@ -141,8 +141,7 @@ class Shared:
 
     def _open(self) -> tuple[duckdb.DuckDBPyConnection, Pages]:
         # Each request has a connection of its own to the same database, made of this one.
-        # Questions run beside each other, and what a statement needs grows with its threads.
-        base = connect(self.path, read_only=True, memory_limit=self._memory_limit, threads=1)
+        base = connect(self.path, read_only=True, memory_limit=self._memory_limit)
         return base, Pages()
 
     def require_same(self, generation: str | None) -> None:

@@ -1,13 +1,12 @@
 -- name: staging.beside_gap
 -- description: Events of calls with a gap right before or right after them on their thread; the
---     first event of a thread, where a gap of its CPU comes earlier, and the last, where one comes
---     later. What such an event belongs to may have lost a part.
+--     last event of a thread, where a gap of its CPU comes later. What such an event belongs to may
+--     have lost a part.
 -- grain: one row per such event and side
 -- needs: staging.callback_gap, staging.predecessor, staging.event, staging.thread,
 --     staging.gap, staging.exposed_trace
-WITH extent AS (
-    SELECT
-        recording_index, cpu_id, min(start_ns) AS start_ns, max(covered_until_ns) AS end_ns
+WITH last_gap AS (
+    SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
     FROM staging.gap
     GROUP BY recording_index, cpu_id
 )
@@ -20,20 +19,11 @@ FROM staging.predecessor AS p
 JOIN staging.callback_gap AS g ON p.event_id = g.event_id
 WHERE g.is_between AND p.sequence = 'call' AND p.previous_event_id IS NOT NULL
 UNION
-SELECT e.event_id, t.thread_id, true
-FROM staging.event AS e
-JOIN staging.thread AS t ON e.event_id = t.first_event_id
-JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
-JOIN extent AS g
-    ON x.recording_index = g.recording_index
-    AND g.cpu_id IN (e.cpu_id, -1)
-    AND e.ts_ns > g.start_ns
-UNION
 SELECT e.event_id, t.thread_id, false
 FROM staging.event AS e
 JOIN staging.thread AS t ON e.event_id = t.last_event_id
 JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
-JOIN extent AS g
+JOIN last_gap AS g
     ON x.recording_index = g.recording_index
     AND g.cpu_id IN (e.cpu_id, -1)
     AND e.ts_ns <= g.end_ns

@@ -135,7 +135,10 @@ judged AS (
                 g.covered_until_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns, false
             )
         ) AS has_gap,
-        bool_and(s.last_seen_ns < s.at_ns) AS has_none_left,
+        coalesce(
+            bool_and(s.last_seen_ns < s.at_ns) FILTER (WHERE s.is_known),
+            bool_and(s.last_seen_ns < s.at_ns)
+        ) AS has_none_left,
         bool_or(s.last_seen_ns < s.at_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
         bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless
     FROM sent AS s

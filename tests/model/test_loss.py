@@ -502,23 +502,6 @@ def test_a_callback_whose_take_is_in_the_gap(system: RosSystem, analyse: Analyse
     assert model.column("SELECT is_loss_affected FROM callback_instance") == [True]
 
 
-@pytest.mark.parametrize(("cpu", "is_marked"), [(0, True), (1, False)])
-def test_what_a_thread_does_first_behind_a_gap(
-    system: RosSystem, analyse: Analyse, cpu: int, *, is_marked: bool
-) -> None:
-    """What came before of it may be in the gap of its CPU."""
-    system.node(Thread(100), 0x1, "reader")
-    system.lose()
-    thread = Thread(100, 101, cpu=cpu)
-    for _ in range(2):
-        system.add("ros2:rcl_take", thread, message=0xB)
-        system.add("ros2:rclcpp_take", thread, message=0xB)
-        system.start(thread, 0xC1)
-        system.end(thread, 0xC1)
-    model = analyse(system)
-    assert model.column("SELECT is_loss_affected FROM take ORDER BY taken_ns") == [is_marked, False]
-
-
 def test_a_callback_with_the_rest_of_its_take(system: RosSystem, analyse: Analyse) -> None:
     """The layers with the stamp are in the gap, the last one is not; then a call without any.
 

@@ -262,13 +262,13 @@ def test_one_of_two_senders_was_not_recorded_then(
     assert found == expected
 
 
-def test_all_that_may_have_sent_ended(con: duckdb.DuckDBPyConnection) -> None:
-    """Also who might send, as the topic of a publisher is not known."""
+def test_all_that_are_known_to_send_ended(con: duckdb.DuckDBPyConnection) -> None:
+    """And not who might; of whom alone it tells, too."""
     ended = [OTHER.format("NULL"), seen_until(STAMP - 1)]
-    assert reason(con, TAKE, SENDER, RECORDED, *ended) == "unknown"
-    assert reason(con, seen_until(STAMP - 1, 2)) == "publisher_trace_ends"
-    assert reason(con, "DELETE FROM store.publisher WHERE process_id = 1") == "publisher_trace_ends"
+    assert reason(con, TAKE, SENDER, RECORDED, *ended) == "publisher_trace_ends"
+    assert reason(con, "DELETE FROM store.publisher WHERE process_id = 1") == "publisher_not_traced"
     assert reason(con, seen_until(STAMP, 2)) == "publisher_not_traced"
+    assert reason(con, seen_until(STAMP - 1, 2)) == "publisher_trace_ends"
 
 
 @pytest.mark.parametrize(

@@ -270,17 +270,6 @@ def test_what_needs_too_much_memory_alone_says_what_to_do() -> None:
     assert len(tries) == 2
 
 
-def test_a_statement_has_one_thread(demo: Path, tmp_path: Path) -> None:
-    """What a statement needs of the memory grows with its threads, and questions run together."""
-    path = Path(shutil.copy(demo, tmp_path / "one.duckdb"))
-    shared = Shared(path, "300MB")
-    try:
-        setting = shared.cursor().execute("SELECT current_setting('threads')").fetchall()
-    finally:
-        shared.close()
-    assert setting == [(1,)]
-
-
 def test_other_failures_are_not_tried_again() -> None:
     tries: list[int] = []
 
