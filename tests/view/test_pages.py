@@ -36,8 +36,11 @@ def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, r
     latency.sort(key=lambda row: -(row["p99_ns"] or 0))
     durations = ("median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns")
     counts = ("roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected")
-    # What is 0 on every path is left out.
-    counts = tuple(name for name in counts if any(row[name] for row in latency))
+    # Of these, what is 0 on every path is left out.
+    seldom = ("superseded", "cut_by_recording", "loss_affected")
+    counts = tuple(
+        name for name in counts if name not in seldom or any(row[name] for row in latency)
+    )
     reasons = ["lost_reasons"] if any(row["lost_reasons"] for row in latency) else []
     wanted = [
         [

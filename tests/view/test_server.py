@@ -23,7 +23,7 @@ from tables import decoded
 
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
-from msgflow.view.server import Shared, Turns, is_local, listen, serve
+from msgflow.view.server import Turns, is_local, listen, serve
 
 Serve = Callable[[Path], Served]
 
