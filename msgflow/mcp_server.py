@@ -56,9 +56,26 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
     except ImportError:
         raise UsageError(
             "the SDK of the Model Context Protocol is not installed",
-            "pip install 'ros2-msgflow[mcp]'",
+            "in a checkout of msgflow: pip install '.[mcp]', or uv tool install '.[mcp]'",
         ) from None
-    server: MCPServer[Any] = MCPServer(
+
+    class StrictServer(MCPServer[Any]):
+        """A server that refuses arguments that its tools do not have; the SDK drops them."""
+
+        async def list_tools(self) -> Any:
+            known = await super().list_tools()
+            for tool in known:
+                tool.input_schema["additionalProperties"] = False
+            return known
+
+        async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:
+            schemas = {tool.name: tool.input_schema for tool in await self.list_tools()}
+            if name in schemas:
+                with _as_tool_errors():
+                    _refuse_unknown(name, arguments, list(schemas[name].get("properties", {})))
+            return await super().call_tool(name, arguments, context)
+
+    server = StrictServer(
         "msgflow", instructions=INSTRUCTIONS, version=__version__, log_level="ERROR"
     )
     tools = _Tools(path, seconds)
@@ -257,6 +274,31 @@ def _as_tool_errors() -> Iterator[None]:
     except MsgflowError as error:
         hint = "" if error.hint is None else f"\nhint: {error.hint}"
         raise ToolError(f"{error.message}{hint}") from error
+
+
+def _refuse_unknown(tool: str, arguments: dict[str, Any], known: Sequence[str]) -> None:
+    """Refuse arguments that a tool does not have; those of a query say where they belong."""
+    unknown = [word for word in arguments if word not in known]
+    if not unknown:
+        return
+    hint = f"it has {', '.join(known)}" if known else "it has none: call it without"
+    if tool == "run_query":
+        inner = _parameters_of(arguments.get("name"))
+        if misplaced := {word: arguments[word] for word in unknown if word in inner}:
+            given = json.dumps(misplaced, ensure_ascii=False, default=str)
+            hint = f"put what is the query's own into parameters: {given}"
+        elif inner:
+            hint += f"; in parameters, {arguments['name']} takes {', '.join(inner)}"
+    raise UsageError(f"{tool} has no such argument — {', '.join(unknown)}", hint)
+
+
+def _parameters_of(query: object) -> list[str]:
+    """Return the names of a query's parameters; of none where there is no such query."""
+    from msgflow.query.catalogue import load_query, query_names
+
+    if not isinstance(query, str) or query not in query_names():
+        return []
+    return [param.name for param in load_query(query).params]
 
 
 def _own(name: str, parameters: dict[str, Any]) -> dict[str, Any]:

@@ -147,7 +147,7 @@ def perfetto(
     responses. Also: executor states, arrows for all links, gaps, and counters for
     rates and for messages not yet taken.
 
-    Needs the package perfetto (msgflow's extra of that name).
+    Needs the package perfetto: pip install perfetto, or in a checkout '.\\[perfetto]'.
     """
     from msgflow.cli.output import count, print_runs, print_status
     from msgflow.database import Database

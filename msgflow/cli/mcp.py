@@ -8,8 +8,8 @@ from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption
 def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
     """Serve the database to an agent, over stdin and stdout (Model Context Protocol).
 
-    It only reads, and reaches no other file. It needs the extra mcp:
-    pip install 'ros2-msgflow\\[mcp]'. The agent's program starts it, not you.
+    It only reads, and reaches no other file. It needs the extra mcp; in a checkout:
+    pip install '.\\[mcp]'. The agent's program starts it, not you.
     """
     from msgflow.cli.stop import STOP
     from msgflow.mcp_server import make_server

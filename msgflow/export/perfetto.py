@@ -74,7 +74,7 @@ def write_perfetto(
     except ImportError:
         raise UsageError(
             "the package that writes Perfetto traces is not installed — perfetto",
-            "pip install perfetto, or install msgflow with its extra: msgflow[perfetto]",
+            "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'",
         ) from None
     with replacing(path) as temporary, temporary.open("wb") as file:
         writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)

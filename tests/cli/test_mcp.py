@@ -116,6 +116,43 @@ def test_errors_have_hints(small_database: Path, call: Call, words: list[str]) -
         assert word in text
 
 
+@pytest.mark.parametrize(
+    ("tool", "given", "hint"),
+    [
+        ("info", {"run": "1"}, "it has none: call it without"),
+        ("check", {"limit": 1}, "it has run"),
+        ("list_queries", {"query": "x"}, "it has name"),
+        (
+            "run_query",
+            {"name": "e2e-latency", "to": "/echo", "run": "1"},
+            'put what is the query\'s own into parameters: {"to": "/echo"}',
+        ),
+        ("run_query", {"name": "e2e-latency", "topics": ["/x"]}, "in parameters, e2e-latency takes"),
+        ("run_query", {"name": "no-query", "to": "/echo"}, "it has name, parameters, run"),
+        ("schema", {"name": "run"}, "it has view"),
+        ("sql", {"query": "SELECT 1", "run": "1"}, "it has query, limit"),
+        ("flow", {"topic": "/chatter", "node": "/x"}, "it has topic, at, publication_id"),
+    ],
+)
+def test_arguments_that_a_tool_does_not_have_are_refused(
+    small_database: Path, tool: str, given: dict[str, Any], hint: str
+) -> None:
+    ((failed, text),) = ask(small_database, (tool, given))
+    assert failed
+    assert f"{tool} has no such argument — " in text
+    assert f"hint: {hint}" in text or f"; {hint}" in text
+
+
+def test_the_schemas_say_that_nothing_else_is_taken(small_database: Path) -> None:
+    async def talk() -> Any:
+        async with Client(mcp_server.make_server(small_database)) as client:
+            return await client.list_tools()
+
+    tools = asyncio.run(talk()).tools
+    assert len(tools) == 7
+    assert all(tool.input_schema["additionalProperties"] is False for tool in tools)
+
+
 def test_without_a_database_a_call_says_so(tmp_path: Path) -> None:
     ((failed, text),) = ask(tmp_path / "none.duckdb", ("info", {}))
     assert failed
@@ -159,7 +196,7 @@ def test_without_the_extra_it_says_what_to_install(small_database: Path) -> None
     assert done.returncode == 2
     assert done.stderr == (
         "error: the SDK of the Model Context Protocol is not installed\n\n"
-        "hint: pip install 'ros2-msgflow[mcp]'\n"
+        "hint: in a checkout of msgflow: pip install '.[mcp]', or uv tool install '.[mcp]'\n"
     )
 
 

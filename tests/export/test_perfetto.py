@@ -324,7 +324,9 @@ def test_without_the_package_it_is_said(
     monkeypatch.setitem(sys.modules, "perfetto", None)
     with Database(small_database) as database, pytest.raises(UsageError, match="perfetto") as error:
         database.export_perfetto(tmp_path / "a.pftrace")
-    assert "msgflow[perfetto]" in str(error.value.hint)
+    assert error.value.hint == (
+        "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'"
+    )
     assert not (tmp_path / "a.pftrace").exists()
 
 
