@@ -25,9 +25,14 @@ def command(
         ),
     ] = None,
     memory_limit: Annotated[
-        str,
-        typer.Option("--memory-limit", metavar="SIZE", help="Maximum memory for queries"),
-    ] = "300MB",
+        str | None,
+        typer.Option(
+            "--memory-limit",
+            metavar="SIZE",
+            help="Maximum memory for queries",
+            show_default="200MB, more while a query needs it",
+        ),
+    ] = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Show the database in the browser: timeline, paths, graph, executors, comparison.

@@ -24,7 +24,7 @@ STORAGE_VERSION = "v1.4.0"
 
 
 def connect(
-    path: Path, *, read_only: bool, memory_limit: str | None = None, threads: int | None = None
+    path: Path, *, read_only: bool, memory_limit: str | None = None, may_grow: bool = False
 ) -> duckdb.DuckDBPyConnection:
     """Open an existing, current msgflow database.
 
@@ -32,14 +32,14 @@ def connect(
         path: the database file.
         read_only: open it for reading only; several processes can do so at once.
         memory_limit: most memory that DuckDB takes, such as '2GB'; DuckDB's default when None.
-        threads: that work on one statement; one per core when None.
+        may_grow: the limit can be changed later: only where nobody else's SQL is run.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
-    con = open_file(path, read_only=read_only, memory_limit=memory_limit, threads=threads)
+    con = open_file(path, read_only=read_only, memory_limit=memory_limit, may_grow=may_grow)
     try:
         require_current(con, path)
     except BaseException:
@@ -74,11 +74,12 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
 
 
 def open_file(
-    path: Path, *, read_only: bool, memory_limit: str | None = None, threads: int | None = None
+    path: Path, *, read_only: bool, memory_limit: str | None = None, may_grow: bool = False
 ) -> duckdb.DuckDBPyConnection:
     """Open a DuckDB file, or create it, whatever is in it.
 
-    The connection reaches no other file and no network, and its settings cannot be changed.
+    The connection reaches no other file and no network, and its settings cannot be changed,
+    but for the memory limit where that may grow.
 
     Raises:
         DatabaseError: it is locked by another process, or no DuckDB file.
@@ -87,8 +88,6 @@ def open_file(
     config: dict[str, str | bool | int | float | list[str]] = {}
     if memory_limit is not None:
         config["memory_limit"] = memory_limit
-    if threads is not None:
-        config["threads"] = threads
     if not read_only:
         config["storage_compatibility_version"] = STORAGE_VERSION
     with _opening(path):
@@ -99,7 +98,8 @@ def open_file(
             con.execute("SET temp_directory = ?", [str(spill_directory(path))])
             con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
             shut_in(con)
-            con.execute("SET lock_configuration = true")
+            if not may_grow:
+                con.execute("SET lock_configuration = true")
     remove_abandoned(path, is_ours_alone=not read_only)
     remove_abandoned_workspaces(path.absolute().parent)
     return con
@@ -125,10 +125,8 @@ def shut_in(con: duckdb.DuckDBPyConnection, *, beside: Sequence[Path] = ()) -> N
 
 
 def _is_shut_in(con: duckdb.DuckDBPyConnection) -> bool:
-    row = con.execute(
-        "SELECT current_setting('lock_configuration') "
-        "AND NOT current_setting('enable_external_access')"
-    ).fetchone()
+    # This cannot be taken back, whether the configuration is locked or not.
+    row = con.execute("SELECT NOT current_setting('enable_external_access')").fetchone()
     return row is not None and bool(row[0])
 
 

@@ -19,6 +19,7 @@ from msgflow.db import migrate, objects
 from msgflow.db.check import run_checks
 from msgflow.db.connection import attach, open_memory, shut_in
 from msgflow.db.derive import derive
+from msgflow.db.memory import Memory
 from msgflow.db.runs import require_run_name
 from msgflow.db.spill import most_spilled
 from msgflow.db.store import delete, store
@@ -27,7 +28,6 @@ from msgflow.errors import DatabaseError, TraceError, UsageError
 from msgflow.ingest import judge, model, staging
 from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
-from msgflow.ingest.memory import Memory
 from msgflow.links import declare_links, read_links
 from msgflow.query.failure import database_errors, in_words
 from msgflow.query.interrupt import interruptible, noted_interrupts
@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from msgflow.links import LinksFile
     from msgflow.query.interrupt import Interrupts
     from msgflow.trace import Progress, TraceInfo
+
+# What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
+_KEPT_BLOCKS = "256MB"
 
 
 @dataclass(frozen=True)
@@ -165,6 +168,7 @@ def ingest(
                 contextlib.closing(open_memory()) as con,
             ):
                 memory = Memory(con, memory_limit)
+                con.execute("SET block_allocator_memory = ?", [_KEPT_BLOCKS])
                 con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(database)}B"])
                 con.execute("SET preserve_insertion_order = false")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.ingest.memory import Memory
+    from msgflow.db.memory import Memory
     from msgflow.query.header import Header
 
 

@@ -27,6 +27,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Route
 
 from msgflow.db.connection import connect
+from msgflow.db.memory import Memory
 from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 from msgflow.query.run import first_line
 from msgflow.view import assets
@@ -41,7 +42,9 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
-DEFAULT_MEMORY = "300MB"
+# Enough for most of what pages ask of ten million events. What needs more gets it, alone.
+USUAL_MEMORY = "200MB"
+_GROWTH = 4
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1
@@ -77,9 +80,13 @@ class Identity:
 
 
 class Turns:
-    """Lets questions run together; one that then has too little memory is asked again, alone."""
+    """Lets questions run together; one that then has too little memory is asked again, alone.
 
-    def __init__(self) -> None:
+    Then the memory limit grows for it, as far as it may.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
         self._changed = threading.Condition()
         self._running = 0
         self._is_alone = False
@@ -90,22 +97,23 @@ class Turns:
         Raises:
             MsgflowError: what the question raises; of memory only where it has too little alone.
         """
-        try:
-            with self._turn(alone=False):
-                return question()
-        except (duckdb.OutOfMemoryException, QueryError) as error:
-            if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
-                raise
-        try:
-            with self._turn(alone=True):
-                return question()
-        except (duckdb.OutOfMemoryException, QueryError) as error:
-            if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
-                raise
-            raise QueryError(
-                "this takes more memory than the server may use",
-                "start it with more: msgflow ui --memory-limit 2GB",
-            ) from error
+        with self._turn(alone=False):
+            answer = _if_memory_suffices(question)
+        if answer is not None:
+            return answer
+        with self._turn(alone=True):
+            try:
+                # In large steps: what fails on the way has worked nearly to its end.
+                self._memory.grow(_GROWTH)
+                while (answer := _if_memory_suffices(question)) is None:
+                    if not self._memory.grow(_GROWTH):
+                        raise QueryError(
+                            "this takes more memory than the server may use",
+                            "start it with more: msgflow ui --memory-limit 2GB",
+                        )
+            finally:
+                self._memory.reset()
+        return answer
 
     @contextmanager
     def _turn(self, *, alone: bool) -> Iterator[None]:
@@ -122,6 +130,15 @@ class Turns:
                 self._changed.notify_all()
 
 
+def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
+    try:
+        return question()
+    except (duckdb.OutOfMemoryException, QueryError) as error:
+        if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+            raise
+    return None
+
+
 class Shared:
     """The open database, shared by all requests, and opened anew when its file is another.
 
@@ -130,19 +147,22 @@ class Shared:
         turns: of questions.
     """
 
-    def __init__(self, path: Path, memory_limit: str) -> None:
+    def __init__(self, path: Path, memory_limit: str | None) -> None:
         self.path = path
         self.generation = 1
-        self.turns = Turns()
         self._memory_limit = memory_limit
         self._lock = threading.Lock()
         self._identity = _identity(path)
-        self._base, self.pages = self._open()
+        self._open()
 
-    def _open(self) -> tuple[duckdb.DuckDBPyConnection, Pages]:
+    def _open(self) -> None:
         # Each request has a connection of its own to the same database, made of this one.
-        base = connect(self.path, read_only=True, memory_limit=self._memory_limit)
-        return base, Pages()
+        self._base = connect(
+            self.path, read_only=True, memory_limit=self._memory_limit or USUAL_MEMORY,
+            may_grow=True,
+        )  # fmt: skip
+        self.turns = Turns(Memory(self._base.cursor(), self._memory_limit, default=USUAL_MEMORY))
+        self.pages = Pages()
 
     def require_same(self, generation: str | None) -> None:
         """Raise where the page was made of another file than is there now.
@@ -160,7 +180,7 @@ class Shared:
                 ) from None
             if identity != self._identity:
                 self._close()
-                self._base, self.pages = self._open()
+                self._open()
                 self._identity = identity
                 self.generation += 1
         if generation is not None and generation != str(self.generation):
@@ -407,7 +427,7 @@ def serve(
     path: Path,
     *,
     port: int | None = None,
-    memory_limit: str = DEFAULT_MEMORY,
+    memory_limit: str | None = None,
     started: Callable[[str], None] = lambda address: None,
 ) -> None:
     """Serve the pages of a database until Ctrl-C.
@@ -415,7 +435,8 @@ def serve(
     Args:
         path: the database.
         port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
-        memory_limit: most memory that DuckDB takes, such as '300MB'.
+        memory_limit: most memory that DuckDB takes, such as '1GB'; when None it takes little, and
+            more for a question that needs it, as long as that runs.
         started: called with the address, which has the token, once it can be opened.
 
     Raises:
@@ -429,7 +450,7 @@ def serve(
 
 @contextmanager
 def running(
-    path: Path, *, port: int | None, memory_limit: str
+    path: Path, *, port: int | None, memory_limit: str | None
 ) -> Iterator[tuple[_Server, socket.socket, str]]:
     """Prepare a server; see `serve`."""
     shared = Shared(path, memory_limit)

@@ -127,7 +127,11 @@ def test_errors_have_hints(small_database: Path, call: Call, words: list[str]) -
             {"name": "e2e-latency", "to": "/echo", "run": "1"},
             'put what is the query\'s own into parameters: {"to": "/echo"}',
         ),
-        ("run_query", {"name": "e2e-latency", "topics": ["/x"]}, "in parameters, e2e-latency takes"),
+        (
+            "run_query",
+            {"name": "e2e-latency", "topics": ["/x"]},
+            "in parameters, e2e-latency takes",
+        ),
         ("run_query", {"name": "no-query", "to": "/echo"}, "it has name, parameters, run"),
         ("schema", {"name": "run"}, "it has view"),
         ("sql", {"query": "SELECT 1", "run": "1"}, "it has query, limit"),

@@ -20,7 +20,7 @@ class Served:
     """A server in a thread of this process."""
 
     def __init__(self, path: Path) -> None:
-        self._running = running(path, port=0, memory_limit="700MB")
+        self._running = running(path, port=0, memory_limit=None)
         self.server, listener, self.address = self._running.__enter__()
         self._ready = threading.Event()
         self.server.started_with = self._ready.set

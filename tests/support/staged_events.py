@@ -21,10 +21,10 @@ import pyarrow as pa
 
 from msgflow.db.connection import attach, open_memory
 from msgflow.db.derive import derive
+from msgflow.db.memory import Memory
 from msgflow.db.store import delete, store
 from msgflow.ingest import model, reconciled, staging
 from msgflow.ingest.catalogue import load
-from msgflow.ingest.memory import Memory
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
 

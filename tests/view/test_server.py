@@ -21,6 +21,7 @@ import pytest
 from served import Served
 from tables import decoded
 
+from msgflow.db.memory import Memory
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
 from msgflow.view.server import Turns, is_local, listen, serve
@@ -250,7 +251,7 @@ def test_memory_that_others_took_is_waited_for() -> None:
         finally:
             memory.release()
 
-    turns = Turns()
+    turns = Turns(Memory(duckdb.connect(), "100MB"))
     with ThreadPoolExecutor(3) as pool:
         answers = [pool.submit(turns.ask, ask) for _ in range(3)]
     assert [answer.result() for answer in answers] == [b"answer"] * 3
@@ -265,9 +266,29 @@ def test_what_needs_too_much_memory_alone_says_what_to_do() -> None:
         raise duckdb.OutOfMemoryException("no memory")
 
     with pytest.raises(QueryError) as error:
-        Turns().ask(ask)
+        Turns(Memory(duckdb.connect(), "100MB")).ask(ask)
     assert "--memory-limit" in str(error.value.hint)
     assert len(tries) == 2
+
+
+def test_what_needs_more_memory_alone_gets_it_while_it_runs() -> None:
+    tries: list[str] = []
+    with duckdb.connect() as con:
+        memory = Memory(con, None, default="100MB")
+
+        def limit() -> str:
+            return str(con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0])
+
+        def ask() -> bytes:
+            tries.append(limit())
+            if len(tries) < 3:
+                raise QueryError("the query failed") from duckdb.OutOfMemoryException("no memory")
+            return b"answer"
+
+        usual = limit()
+        assert Turns(memory).ask(ask) == b"answer"
+        assert tries == [usual, "381.1 MiB", "1.4 GiB"]
+        assert limit() == usual == "95.3 MiB"
 
 
 def test_other_failures_are_not_tried_again() -> None:
@@ -278,5 +299,5 @@ def test_other_failures_are_not_tried_again() -> None:
         raise QueryError("the query failed") from duckdb.BinderException("no such column")
 
     with pytest.raises(QueryError):
-        Turns().ask(ask)
+        Turns(Memory(duckdb.connect(), None)).ask(ask)
     assert len(tries) == 1

@@ -1,6 +1,7 @@
-"""Memory that grows when it has to: nobody should have to guess it for a trace.
+"""Memory that grows when it has to: nobody should have to guess it for a recording.
 
-Most of what an ingest does spills to disk, but some statements have to hold all events of a thread.
+Most of what an ingest does spills to disk, but some statements have to hold all events of a
+thread. What joins look up stays in memory, and some queries have hundreds of joins.
 """
 
 from __future__ import annotations
@@ -23,19 +24,17 @@ DEFAULT_LIMIT = "560MB"
 _LOADING_LIMIT = "352MB"
 _SHARE_OF_MACHINE = 0.7
 
-# What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
-_KEPT_BLOCKS = "256MB"
-
 
 class Memory:
     """The memory limit of a connection: fixed by the user, or growing from a modest default."""
 
-    def __init__(self, con: duckdb.DuckDBPyConnection, limit: str | None) -> None:
+    def __init__(
+        self, con: duckdb.DuckDBPyConnection, limit: str | None, *, default: str = DEFAULT_LIMIT
+    ) -> None:
         self._con = con
         self._is_fixed = limit is not None
-        self._limit = limit or DEFAULT_LIMIT
+        self._first = self._limit = limit or default
         self._set(self._limit)
-        con.execute("SET block_allocator_memory = ?", [_KEPT_BLOCKS])
 
     @contextlib.contextmanager
     def loading(self) -> Iterator[None]:
@@ -62,19 +61,29 @@ class Memory:
             except duckdb.OutOfMemoryException as error:
                 if is_of_the_file(error):  # nor can more be spilled
                     raise
-                if self._is_fixed or not self._double():
+                if not self.grow(2):
                     raise DatabaseError(
                         f"the traces need more memory than {self._limit}",
                         "give more with --memory-limit, or read a shorter part of the recording",
                     ) from error
 
-    def _double(self) -> bool:
+    def grow(self, times: int) -> bool:
+        """Allow so many times as much; tell whether the user and the machine let that happen."""
+        if self._is_fixed:
+            return False
         now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
-        wanted = 2 * _bytes(now)
+        wanted = times * _bytes(now)
         if wanted > _SHARE_OF_MACHINE * _machine_bytes():
             return False
         self._set(f"{wanted}B")
         return True
+
+    def reset(self) -> None:
+        """Allow as much as at first again."""
+        # What is in use now cannot be taken away: then the next one who asks for this does it.
+        with contextlib.suppress(duckdb.OutOfMemoryException):
+            self._con.execute("SET memory_limit = ?", [self._first])
+            self._limit = self._first
 
     def _set(self, limit: str) -> None:
         try:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import duckdb
 import pytest
 
+from msgflow.db.memory import Memory
 from msgflow.errors import DatabaseError
-from msgflow.ingest.memory import Memory
 
 # Holds all its rows in memory at once, whatever may spill.
 HUNGRY = "SELECT len(list(range)) FROM range(20000000)"
