@@ -4,7 +4,7 @@
 --     kind are affected: events that were discarded, time in gaps, callback instances without an
 --     end, objects whose creation was not recorded (without those of ROS itself), takes without a
 --     publication, messages with an unknown fate, and links that lost events may have spoilt. The
---     last rows give the share of the whole run.
+--     last rows give the share of the whole run, also where it is 0.
 -- grain: one row per trace, process, topic or run, and measure
 -- param: all BOOLEAN = false     Also show measures with nothing affected
 -- column: run_id BIGINT          Run
@@ -16,6 +16,7 @@
 -- column: affected_percent DOUBLE [%]  Share affected
 -- column: is_internal BOOLEAN    ROS uses the topic for itself
 -- brief: scope, subject, measure, affected, total, affected_percent
+-- answer: affected
 -- needs: main.trace, main.loss_interval, main.process, main.host, main.callback_instance,
 --     main.node, main.publisher, main.subscription, main.callback, main.take, main.stat_orphan,
 --     main.stat_delivery, main.link_transport, main.link_causal, main.run

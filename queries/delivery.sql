@@ -3,10 +3,11 @@
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Skipped: newer messages took their place in the queue. Lost: they did not arrive
 --     or could not be taken. Unconnected: the two were not connected yet or any more, or the
---     recording ended. Unknown: events are lost, or the trace does not decide. Together with
---     delivered, these counts add up to what was published. Only the depth of the queue decides
---     whether a message counts as overwritten or as lost on the way; incompatible QoS, lifespan and
---     best effort do not show in a trace.
+--     recording ended. Unknown: events are lost, or the trace does not decide; such messages may
+--     have been delivered. Together with delivered, these counts add up to what was published. The
+--     shares are of messages whose fate is known: delivered, skipped or lost. Only the depth of the
+--     queue decides whether a message counts as overwritten or as lost on the way; incompatible
+--     QoS, lifespan and best effort do not show in a trace.
 -- grain: one row per topic and subscription
 -- column: run_id BIGINT             Run
 -- column: topic_name VARCHAR [topic]  Topic
@@ -17,14 +18,16 @@
 -- column: lost BIGINT               Of these, lost
 -- column: unconnected BIGINT        Of these, before or after the two were connected
 -- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, without those unconnected
+-- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, skipped or lost
+-- column: lost_percent DOUBLE [%]   Share lost, of the same
 -- column: orphans BIGINT            Takes in the time window whose publication is not known
 -- column: reasons VARCHAR           Why messages were not taken, with counts
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, published, delivered_percent, skipped, lost, reasons, delivered,
---     unconnected, unknown, orphans, orphan_reasons
+-- brief: topic_name, subscriber, delivered, lost, unknown, delivered_percent, skipped,
+--     lost_percent, published, reasons, unconnected, orphans, orphan_reasons
+-- answer: delivered, lost, unknown
 -- needs: main.stat_delivery, main.stat_orphan, main.publication, main.take, main.subscription,
 --     main.node, main.process
 WITH outcome AS (
@@ -76,7 +79,8 @@ SELECT
     coalesce(d.lost, 0) AS lost,
     coalesce(d.unconnected, 0) AS unconnected,
     coalesce(d.unknown, 0) AS unknown,
-    100 * d.delivered / nullif(d.published - d.unconnected, 0) AS delivered_percent,
+    100 * d.delivered / nullif(d.delivered + d.skipped + d.lost, 0) AS delivered_percent,
+    100 * d.lost / nullif(d.delivered + d.skipped + d.lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,
     d.reasons,
     o.orphan_reasons,

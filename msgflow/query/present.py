@@ -1,6 +1,7 @@
 """What a terminal shows of a result: the stage between the rows and their lines.
 
-Columns that say nothing are left out and named. Paths are numbered and stand below the table once.
+Columns that say nothing are left out and named, unless `answer` in the header of the query has
+them: that nothing was lost is an answer. Paths are numbered and stand below the table once.
 What then still does not fit loses its least important columns, as `brief` in the header of the
 query has it; where not even the most important ones have a place, every row is a record.
 """
@@ -130,13 +131,14 @@ def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str]
     """Return the columns that have something to say, and those that are 0 or empty throughout."""
     if keeps_all or not len(result):
         return list(result.columns), []
+    answer = () if result.header is None else result.header.answer
     kept, nothing = [], []
     for name in result.columns:
         if name == RUN and len(result.runs) == 1:
             continue
         if name == PATH_ID and PATH in result.columns:
             continue
-        if _is_nothing(result.table[name]):
+        if name not in answer and _is_nothing(result.table[name]):
             nothing.append(_title(result, name))
         else:
             kept.append(name)

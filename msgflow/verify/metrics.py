@@ -158,8 +158,8 @@ SUBJECTS: dict[str, Subject] = {
                 "published - unconnected",
             ),
             "completeness": Metric(
-                "delivery", "delivered_percent / 100", Dimension.SHARE, (),
-                "published - unconnected",
+                "delivery", "delivered / nullif(published - unconnected, 0)", Dimension.SHARE,
+                (), "published - unconnected",
             ),
         },
         {

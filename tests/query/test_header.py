@@ -30,6 +30,7 @@ FULL = """\
 --     When
 -- needs: main.a,
 --     main.b
+-- answer: median_ns
 -- brief: start_ns,
 --     median_ns
 -- severity: warning
@@ -67,6 +68,7 @@ def test_everything_is_parsed() -> None:
     assert header.needs == ("main.a", "main.b")
     assert header.severity == "warning"
     assert header.brief == ("start_ns", "median_ns")
+    assert header.answer == ("median_ns",)
     assert header.body == "SELECT 1\n-- a comment of the body\n"
 
 

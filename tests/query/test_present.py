@@ -145,6 +145,30 @@ def test_long_results_stop_and_say_how_many_rows_there_are() -> None:
     assert len(present(result, 100, most_rows=55).columns[0].cells) == 55
 
 
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
+    quality = result_of(
+        "data-quality",
+        [{"scope": "run", "subject": "morning", "measure": "orphan_takes", "total": 4214}] * 2,
+    )
+    assert "affected" in [column.title for column in present(quality, width).columns]
+    assert all("affected," not in note for note in present(quality, width).notes)
+    delivery = result_of(
+        "delivery",
+        [
+            {
+                "topic_name": "/perception/camera/image", "subscriber": "/perception/detector",
+                "published": 299, "delivered": 298, "unconnected": 1, "delivered_percent": 100.0,
+                "lost_percent": 0.0, "reasons": "pending_at_end 1", "subscription_id": 4,
+            },
+        ] * 2,
+    )  # fmt: skip
+    titles = {column.title for column in present(delivery, width).columns}
+    assert {"delivered", "lost", "unknown"} <= titles
+    assert width < 100 or "delivered_percent" in titles
+    assert "skipped" not in titles
+
+
 def test_columns_that_somebody_chose_are_all_shown() -> None:
     chosen = CASES["paths"].with_columns(["lost", "run_id", "p95", "path"])
     shown = present(chosen, 100, is_chosen=True)
