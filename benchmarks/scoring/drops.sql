@@ -85,6 +85,8 @@ said AS (
                 THEN 'takes have no event'
             WHEN t.is_twin THEN 'another message has its stamp'
             WHEN t.is_unseen AND v.reason <> 'receiver_gap' THEN 'a stream is missing'
+            -- A recording whose last part is missing ends before it.
+            WHEN t.is_behind_all AND v.reason = 'pending_at_end' THEN 'nothing later is recorded'
             -- Objects whose handles were used again may be mixed up where one was not seen.
             WHEN (t.host, t.pid) IN (SELECT (host, pid) FROM truth_mixed) THEN
                 'initialisation is missing'

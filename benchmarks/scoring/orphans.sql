@@ -44,7 +44,8 @@ matched AS (
         bool_or(m.is_in_hole) AS is_in_hole, bool_or(m.is_beside_hole) AS is_beside_hole,
         bool_or(m.has_absent) AS has_absent, bool_or(m.is_unnamed) AS is_unnamed,
         bool_or(m.is_torn) AS is_torn, bool_or(m.is_unseen) AS is_unseen,
-        bool_or(m.is_twin) AS is_twin
+        bool_or(m.is_twin) AS is_twin, bool_or(m.has_silent) AS has_silent,
+        bool_or(m.is_taken_beside_hole) AS is_taken_beside_hole
     FROM orphan AS o
     JOIN truth_time AS t
         ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
@@ -73,9 +74,15 @@ SELECT
         WHEN m.truth = 'sent, no event' AND m.reason = 'ambiguous' THEN 'the link is not decided'
         -- Whoever publishes anything may have sent a message of a topic that is not known.
         WHEN (m.is_undecided OR m.truth = 'sent, no event') AND m.reason = 'publisher_gap'
-            AND m.is_unnamed
+            AND (m.is_unnamed OR m.has_silent)
             THEN 'initialisation is missing'
         WHEN m.is_undecided AND m.reason IN ('ambiguous', 'unknown') THEN 'the link is not decided'
+        -- Its handle may be another's by then, and what says so is missing.
+        WHEN m.truth = 'recorded' AND m.reason = 'receiver_gap' AND m.is_unnamed
+            THEN 'initialisation is missing'
+        -- What has no event is not told from what lost it.
+        WHEN m.truth = 'no event' AND m.reason = 'receiver_gap' AND m.is_taken_beside_hole
+            THEN 'events are missing'
         -- One of them was recorded, and another one that was not may have sent it.
         WHEN m.reason = 'unknown' AND m.has_absent THEN 'several publishers'
     END AS undecided,

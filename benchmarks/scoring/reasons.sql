@@ -150,6 +150,13 @@ of_any AS (
 unnamed AS (
     SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
 ),
+-- What came through a ring buffer.
+buffered AS (
+    SELECT DISTINCT (t.subscription_id, p.host, p.pid, p.publisher_handle)
+    FROM simulated_take AS t
+    JOIN simulated_publication AS p ON t.publication_id = p.publication_id
+    WHERE t.method = 'ring_buffer'
+),
 -- Publications of which every event that names the publisher is missing.
 nameless AS (
     SELECT p.publication_id
@@ -180,8 +187,13 @@ SELECT
         WHEN u.reason = 'before_subscription' THEN CASE
             WHEN s.has_two_clocks AND (s.arrival_ns + s.longest_ns >= s.created_ns) IS NOT FALSE
                 THEN 'clocks are apart'
+            -- Its own events are some microseconds apart.
+            WHEN NOT s.has_two_clocks AND w.ts_ns + 10_000 >= s.created_ns THEN 'created meanwhile'
         END
         WHEN u.reason = 'overwritten' THEN CASE
+            WHEN (u.subscription_id, p.host, p.pid, p.publisher_handle) IN (FROM buffered)
+                AND (SELECT NOT has_dequeue FROM truth_layout)
+                THEN 'no event of ring buffers'
             WHEN a.last_stamp_ns > p.source_timestamp_ns IS NOT TRUE THEN 'nothing later taken'
             WHEN s.has_earlier IS NOT TRUE THEN 'nothing earlier taken'
         END
@@ -208,6 +220,9 @@ JOIN truth_excuse AS x
     ON u.publication_id = x.publication_id AND u.subscription_id = x.subscription_id
 JOIN truth_link AS l ON l.kind = 'publication' AND u.publication_id::VARCHAR = l.from_id
 LEFT JOIN of_any AS a ON u.subscription_id = a.subscription_id
+LEFT JOIN (
+    SELECT publication_id, max(ts_ns) AS ts_ns FROM simulated_dds_event GROUP BY publication_id
+) AS w ON u.publication_id = w.publication_id
 WHERE l.is_decided;
 
 -- Processes of which it cannot be told which of their subscriptions had a handle.
@@ -236,8 +251,12 @@ SELECT
     any_value(x.unclear) AS unclear,
     bool_or(coalesce(l.is_decided, false)) AS is_decided,
     bool_or((u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu)) AS is_unseen,
-    bool_or(t.publication_id IN (FROM truth_equal_stamp)) AS is_twin
+    bool_or(t.publication_id IN (FROM truth_equal_stamp)) AS is_twin,
+    bool_or(coalesce(t.dequeue_ns, t.rmw_ns) > e.ts_ns) AS is_behind_all
 FROM simulated_take AS t
+LEFT JOIN (
+    SELECT host, max(ts_ns) AS ts_ns FROM truth_recorded GROUP BY host
+) AS e ON t.host = e.host
 JOIN truth_pair AS s
     ON t.publication_id = s.publication_id AND t.subscription_id = s.subscription_id
 JOIN truth_excuse AS x
@@ -316,8 +335,24 @@ beside_hole AS (
         ON s.host = h.host
         AND s.stamped_ns + 1_000_000 > h.begin_ns AND s.stamped_ns - 1_000_000 < h.end_ns
 ),
+taken_beside_hole AS (
+    SELECT t.take_id
+    FROM simulated_take AS t
+    JOIN truth_hole AS h
+        ON t.host = h.host AND coalesce(t.pid = h.pid, true)
+        AND coalesce(t.dequeue_ns, t.rmw_ns) + 1_000_000 > h.begin_ns
+        AND coalesce(t.dequeue_ns, t.rmw_ns) - 1_000_000 < h.end_ns
+),
 unnamed AS (
     SELECT DISTINCT host, pid FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\'
+),
+-- Since when there is an event of each process whose initialisation is missing: before, it may have
+-- been there and have sent anything.
+silent AS (
+    SELECT host, pid, min(ts_ns) AS until_ns
+    FROM truth_recorded
+    SEMI JOIN unnamed USING (host, pid)
+    GROUP BY host, pid
 ),
 decided AS (
     SELECT to_id, bool_or(is_decided) AS is_decided
@@ -355,7 +390,9 @@ SELECT
         AS is_undecided,
     t.take_id IN (FROM hidden) AS is_in_hole,
     t.take_id IN (FROM beside_hole) AS is_beside_hole,
+    t.take_id IN (FROM taken_beside_hole) AS is_taken_beside_hole,
     (t.host, t.pid) IN (FROM unnamed) AS is_unnamed,
+    s.stamped_ns < (SELECT max(until_ns) FROM silent) AS has_silent,
     t.publication_id IN (FROM absent) AS has_absent,
     k.cause IS NOT NULL AS is_torn,
     (u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu) AS is_unseen,

@@ -101,10 +101,37 @@ repeated AS (
     LEFT JOIN buffered AS b ON l.subscription_id = b.subscription_id
     WHERE l.method <> 'ring_buffer' AND (b.subscription_id IS NOT NULL OR s.is_inferred)
 ),
+-- Before Iron no event shows that a publisher passes messages on within its process. Callbacks get
+-- messages in this way, and none gets what comes from that publisher through the middleware.
+silent AS (
+    SELECT l.publisher_id, l.subscription_id
+    FROM link AS l
+    JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    JOIN store.subscription AS s
+        ON l.subscription_id = s.subscription_id AND p.process_id = s.process_id
+    ANTI JOIN (
+        SELECT process_id FROM store.publication WHERE run_id = only_run AND intra_ns IS NOT NULL
+    ) AS e ON p.process_id = e.process_id
+    SEMI JOIN (
+        SELECT c.subscription_id
+        FROM store.callback_instance AS i
+        JOIN store.callback AS c ON i.callback_id = c.callback_id
+        WHERE i.run_id = only_run AND i.is_intra_process
+    ) AS b ON l.subscription_id = b.subscription_id
+    LEFT JOIN store.callback_instance AS c ON l.take_id = c.take_id
+    GROUP BY l.publisher_id, l.subscription_id
+    HAVING count(c.callback_instance_id) = 0
+),
 copy AS (
     SELECT r.take_id
     FROM repeated AS r
     ANTI JOIN store.callback_instance AS c ON r.take_id = c.take_id
+    UNION
+    SELECT l.take_id
+    FROM link AS l
+    JOIN silent AS n
+        ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
+    WHERE l.method <> 'ring_buffer'
 )
 SELECT
     l.run_id,

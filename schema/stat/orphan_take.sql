@@ -5,7 +5,8 @@
 --     the topic (known senders), those with one whose topic is not known or of which initialisation
 --     is missing (possible senders), and all with any publisher where the topic is not known. What
 --     comes out of a ring buffer has no stamp: it was put in after the message before it, which
---     came from there.
+--     came from there. A stamp that a message of another topic has, behind a gap since the
+--     subscription was created: another subscription may have its handle by then.
 -- grain: one row per take whose publication is not known
 -- needs: store.take, store.link_transport, store.subscription, store.publisher, store.node,
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
@@ -172,6 +173,18 @@ kept AS (
         g.covered_until_ns >= b.since_ns AS has_gap
     FROM buffered AS b
     ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id AND b.taken_ns >= g.start_ns
+),
+replaced AS (
+    SELECT o.take_id
+    FROM (
+        SELECT DISTINCT o.take_id, o.process_id, o.created_ns, o.taken_ns
+        FROM orphan AS o
+        JOIN store.publication AS b ON o.stamp_ns = b.source_timestamp_ns
+        JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+        WHERE b.run_id = of_run AND o.stamp_ns <> 0 AND p.topic_name <> o.topic_name
+    ) AS o
+    ASOF JOIN gap AS g ON o.process_id = g.process_id AND o.taken_ns >= g.start_ns
+    WHERE g.covered_until_ns >= o.created_ns
 )
 SELECT
     of_run::BIGINT AS run_id,
@@ -195,6 +208,7 @@ SELECT
             FROM store.nearest_message
             WHERE run_id = of_run AND publication_id IS NULL
         ) THEN 'ambiguous'
+        WHEN o.take_id IN (SELECT take_id FROM replaced) THEN 'receiver_gap'
         WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)
             THEN 'publisher_not_traced'
         ELSE 'unknown'

@@ -4,7 +4,7 @@
 --     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
 --     message in the queue would have ended it. A wait tells only where a single thread reads, and
 --     only if it lasted ten times as long as messages usually need, at least a millisecond. A
---     reader that gets no CPU seems to wait, too.
+--     reader that gets no CPU seems to wait, too: then it takes the message when it wakes up.
 --     `overwritten` and `lost_in_transport` are told apart by the depth of the queue alone. Where
 --     the subscription took a message in that time that could not be identified, nothing is said;
 --     nor that messages were overwritten where it took none of the publisher, and no later one.
@@ -160,6 +160,7 @@ waiting AS (
         CASE WHEN w.end_ns IS NOT NULL THEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns END
             AS due_by_ns,
         least(w.end_ns, k.any_taken_ns, k.next_arrival_ns) AS waits_until_ns,
+        w.end_ns AS wakes_ns,
         k.next_arrival_ns < w.end_ns
         AND k.any_taken_ns >= w.end_ns
         AND (
@@ -191,6 +192,9 @@ bounded AS (
             least(publisher_taken_ns, waited_ns),
             least(greatest(arrival_ns, last_seen_ns) + longest_ns, replaced_ns)
         ) AS until_ns,
+        -- Who waits for the CPU takes what came when it gets it.
+        CASE WHEN waited_ns IS NOT NULL THEN least(publisher_taken_ns, wakes_ns + patience_ns) END
+            AS awake_until_ns,
         coalesce(any_taken_ns, least(last_seen_ns, replaced_ns)) AS gone_ns,
         min(CASE WHEN arrival_ns > last_seen_ns THEN arrival_ns END) OVER (
             PARTITION BY subscription_id
@@ -207,7 +211,8 @@ facts AS (
         q.position - o.position AS newer_count
     FROM bounded AS b
     JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id
-    ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id AND b.until_ns >= g.start_ns
+    ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id
+        AND coalesce(b.awake_until_ns, b.until_ns) >= g.start_ns
     ASOF LEFT JOIN gap AS i ON b.process_id = i.process_id AND b.arrival_ns >= i.start_ns
     ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = of_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns

@@ -248,3 +248,54 @@ def test_a_copy_for_a_reader_that_never_gets_its_turn(
     assert model.rows("SELECT method, is_copy FROM link_transport") == [("exact", is_reader)]
     delivered = "SELECT count(*) FROM stat_delivery WHERE status = 'delivered'"
     assert model.value(delivered) == (0 if is_reader else 1)
+
+
+@pytest.mark.parametrize(
+    ("called_by_buffer", "called_by_take", "is_in_process", "shows_intra", "is_copy"),
+    [
+        (True, False, True, False, True),
+        # No callback shows that its subscription reads a buffer.
+        (False, False, True, False, False),
+        # One message of the publisher came to a callback through the middleware.
+        (True, True, True, False, False),
+        # Another process passes nothing on in this one.
+        (True, False, False, False, False),
+        # Where publishers show that they pass messages on, this one would have.
+        (True, False, True, True, False),
+    ],
+)
+def test_copies_before_publishers_said_that_they_pass_messages_on(
+    system: RosSystem,
+    analyse: Analyse,
+    *,
+    called_by_buffer: bool,
+    called_by_take: bool,
+    is_in_process: bool,
+    shows_intra: bool,
+    is_copy: bool,
+) -> None:
+    """Humble and older: callbacks tell alone what came from within the process."""
+    talker = TALKER if is_in_process else Thread(200)
+    system.publisher(talker, 0x10, "/a")
+    system.publisher(TALKER, 0x11, "/b")
+    system.subscription(LISTENER, 0x20, "/a", callback=0xCB)
+    system.add("ros2:rclcpp_subscription_init", LISTENER, subscription_handle=0x20,
+               subscription=0x3020)  # fmt: skip
+    system.subscription_callback(LISTENER, 0x3020, 0xCC)
+    for number in (1, 2):
+        system.publish(talker, 0x10, number)
+        system.take(LISTENER, 0x20, number)
+        if called_by_take and number == 1:
+            system.start(LISTENER, 0xCB)
+            system.end(LISTENER, 0xCB)
+        if called_by_buffer:
+            system.start(LISTENER, 0xCC, intra=True)
+            system.end(LISTENER, 0xCC)
+        system.idle(LISTENER)
+    if shows_intra:
+        system.add("ros2:rclcpp_intra_publish", TALKER, publisher_handle=0x11, message=0xA)
+    model = analyse(system)
+    assert model.rows("SELECT method, is_copy FROM link_transport ORDER BY take_id") == [
+        ("exact", is_copy),
+        ("exact", is_copy),
+    ]

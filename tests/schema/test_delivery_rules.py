@@ -226,6 +226,30 @@ def test_a_gap_hides_a_take_for_as_long_as_messages_need(
     assert delivery.reason(missing) == reason
 
 
+@pytest.mark.parametrize(
+    ("start", "taken", "reason"),
+    [
+        (320 * MS + 3 * MS, None, "receiver_gap"),
+        (320 * MS + 3 * MS + 1, None, "not_delivered"),
+        # What the publisher sent next has been taken: the queue was empty.
+        (320 * MS + 2 * MS, 320 * MS + 2 * MS, "receiver_gap"),
+        (320 * MS + 2 * MS + 1, 320 * MS + 2 * MS, "not_delivered"),
+    ],
+)
+def test_a_gap_hides_what_a_reader_takes_when_it_wakes_up(
+    delivery: Delivery, start: int, taken: int | None, reason: str
+) -> None:
+    """A reader that seemed to wait may have been kept from the CPU: it takes the message then."""
+    delivery.lives()
+    usually(delivery, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.waits(290 * MS, 320 * MS)
+    if taken is not None:
+        delivery.publish(taken, taken)
+    delivery.misses(start, start + MS)
+    assert delivery.reason(missing) == reason
+
+
 @pytest.mark.parametrize(("until", "reason"), [(0, "receiver_gap"), (-1, "lost_in_transport")])
 def test_a_gap_that_ends_before_a_message_arrives(
     delivery: Delivery, until: int, reason: str

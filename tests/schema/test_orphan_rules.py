@@ -24,6 +24,7 @@ CREATE TABLE store.subscription (run_id BIGINT DEFAULT 1, subscription_id BIGINT
     process_id BIGINT DEFAULT 9, topic_name VARCHAR DEFAULT '/a', created_ns BIGINT,
     is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
 CREATE TABLE store.publisher (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
+    publisher_id BIGINT,
     topic_name VARCHAR DEFAULT '/a', created_ns BIGINT DEFAULT 0,
     is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
 CREATE TABLE store.node (run_id BIGINT DEFAULT 1, process_id BIGINT, is_inferred BOOLEAN);
@@ -390,3 +391,34 @@ def test_the_first_message_was_put_behind_the_creation(
 ) -> None:
     made = f"UPDATE store.subscription SET created_ns = {created}"
     assert reason(con, BUFFERED, made, recorded(9, 0, 100 * MS)) == expected
+
+
+@pytest.mark.parametrize(
+    ("topic", "stamp", "created", "taken", "expected"),
+    [
+        ("/b", STAMP, 400 * MS, STAMP + MS, "receiver_gap"),
+        # Its own topic, another message, or none.
+        ("/a", STAMP, 400 * MS, STAMP + MS, "publisher_not_traced"),
+        ("/b", STAMP + 1, 400 * MS, STAMP + MS, "publisher_not_traced"),
+        # The subscription was created in the gap, or at its end, or behind it.
+        ("/b", STAMP, 420 * MS, STAMP + MS, "receiver_gap"),
+        ("/b", STAMP, 420 * MS + 1, STAMP + MS, "publisher_not_traced"),
+        # The take was before the gap.
+        ("/b", STAMP, 400 * MS, 410 * MS, "receiver_gap"),
+        ("/b", STAMP, 400 * MS, 410 * MS - 1, "publisher_not_traced"),
+    ],
+)
+def test_a_message_of_another_topic_behind_a_gap(
+    con: duckdb.DuckDBPyConnection,
+    topic: str, stamp: int, created: int, taken: int, expected: str,
+) -> None:  # fmt: skip
+    """The handle may be that of another subscription by then."""
+    con.execute("INSERT INTO store.publisher (publisher_id, topic_name) VALUES (7, ?)", [topic])
+    con.execute(
+        "INSERT INTO store.publication (publication_id, publisher_id, source_timestamp_ns) "
+        "VALUES (1, 7, ?)",
+        [stamp],
+    )
+    con.execute("UPDATE store.subscription SET created_ns = ?", [created])
+    con.execute("INSERT INTO store.take (taken_ns) VALUES (?)", [taken])
+    assert reason(con, SENDER, RECORDED, missed(410 * MS, 420 * MS, process=9)) == expected
