@@ -35,10 +35,10 @@ demo: $(VENV)/.installed
 	@echo
 	@echo 'What to try next:'
 	@echo '  export MSGFLOW_DB=$(CURDIR)/$(DEMO)/msgflow.duckdb; . $(BIN)/activate'
-	@echo '  msgflow check                            what is wrong with the recording'
-	@echo '  msgflow query critical-path              why the slowest message was late'
-	@echo '  msgflow query interference               which callbacks keep which waiting'
-	@echo '  msgflow flow --topic /camera/image       one message: its causes and effects'
+	@echo '  msgflow check                                    what is wrong with the recording'
+	@echo '  msgflow query critical-path --to /control/cmd    why the slowest command was late'
+	@echo '  msgflow query interference                       which callbacks keep which waiting'
+	@echo '  msgflow flow --topic /camera/image               one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 
 test: $(VENV)/.developed babeltrace chromium

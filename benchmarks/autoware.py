@@ -153,7 +153,7 @@ def _compare(database: msgflow.Database, run_a: int, run_b: int, delay_ms: int) 
         print(
             f"  {row['statistic']:6} {row['a_ns'] / 1e6:8.2f} {row['b_ns'] / 1e6:8.2f}"
             f" {ms[0]:>8} [{ms[1]}, {ms[2]}] ms, {row['verdict']},"
-            f" delta {row['cliffs_delta']:.3f} {row['effect']}: {branch}"
+            f" delta {row['cliffs_delta']:.3f} {row['separation']}: {branch}"
         )
 
 

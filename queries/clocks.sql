@@ -7,7 +7,7 @@
 -- column: run_id BIGINT                       Run
 -- column: hosts VARCHAR [host]  Hosts that have it
 -- column: method VARCHAR                      'messages', 'packets' (those of kernel traces as
---     well) or 'file'; 'none': as recorded
+--     well) or 'file'; 'reference': others are corrected to it; 'none': as recorded
 -- column: reference VARCHAR                   Hosts of the clock that this one is corrected to;
 --     empty: not brought together with others
 -- column: offset_ns BIGINT [ns]               Added to its times
@@ -31,7 +31,14 @@ WITH named AS (
 SELECT
     c.run_id,
     n.hosts,
-    c.method,
+    CASE
+        WHEN c.method = 'none' AND c.clock_id IN (
+            SELECT o.reference_clock_id
+            FROM main.clock AS o
+            WHERE o.clock_id <> o.reference_clock_id
+        ) THEN 'reference'
+        ELSE c.method
+    END AS method,
     r.hosts AS reference,
     c.offset_ns,
     c.uncertainty_ns,

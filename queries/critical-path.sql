@@ -50,6 +50,8 @@
 -- column: publication_id BIGINT    Message
 -- column: take_id BIGINT           Take at the end of the flow
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
+-- column: path VARCHAR [path]      Nodes and topics of the flow; only in its first row
+-- heading: rank, latency_ns, take_id, path
 -- brief: rank, at_ns, duration_ns, share, activity, node, what, is_certain, pieces, hop, part
 -- note: clocks
 -- needs: main.critical_path, main.flow_path, main.callback_instance, main.callback_label,
@@ -102,6 +104,7 @@ piece AS (
         c.publication_id,
         c.take_id,
         c.latency_ns,
+        c.path_id,
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
             AND c.part = c.activity AS is_layer
     FROM main.critical_path(
@@ -128,16 +131,16 @@ folded AS (
         CASE WHEN is_layer THEN 'publish' ELSE any_value(part) END AS part,
         CASE WHEN is_layer THEN 'publish' ELSE any_value(activity) END AS activity,
         node, what, is_certain, min(from_ns) AS from_ns, callback_instance_id, publication_id,
-        take_id, latency_ns
+        take_id, latency_ns, path_id
     FROM piece
     GROUP BY
         run_id, flow_rank, hop, node, what, is_certain, callback_instance_id, publication_id,
-        take_id, latency_ns, is_layer, CASE WHEN is_layer THEN 0 ELSE position END
+        take_id, latency_ns, path_id, is_layer, CASE WHEN is_layer THEN 0 ELSE position END
 ),
 sorted AS (
     SELECT
         run_id, flow_rank, position, at_ns, duration_ns, hop, part, activity, node, what,
-        is_certain, from_ns, callback_instance_id, publication_id, take_id, latency_ns,
+        is_certain, from_ns, callback_instance_id, publication_id, take_id, latency_ns, path_id,
         CASE
             WHEN $by = 'node' THEN coalesce(node, '')
             WHEN $by = 'part' THEN activity
@@ -145,39 +148,81 @@ sorted AS (
             ELSE position::VARCHAR
         END AS row_key
     FROM folded
+),
+summed AS MATERIALIZED (
+    SELECT
+        run_id,
+        flow_rank,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(at_ns) END AS at_ns,
+        sum(duration_ns)::BIGINT AS duration_ns,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(hop) END AS hop,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(part) END AS part,
+        CASE
+            WHEN $by = 'piece' AND row_key = 'rest' THEN 'rest'
+            WHEN $by <> 'node' THEN any_value(activity)
+        END AS activity,
+        CASE
+            WHEN $by = 'node' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(node)
+        END AS node,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(what) END AS what,
+        round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
+        count(*) AS pieces,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(is_certain) END AS is_certain,
+        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(from_ns) END AS from_ns,
+        CASE
+            WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(callback_instance_id)
+        END AS callback_instance_id,
+        CASE
+            WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(publication_id)
+        END AS publication_id,
+        take_id,
+        latency_ns,
+        path_id,
+        row_key,
+        min(position) AS position
+    FROM sorted
+    GROUP BY run_id, flow_rank, take_id, latency_ns, path_id, row_key
+),
+ordered AS (
+    SELECT
+        *,
+        row_number() OVER (
+            PARTITION BY run_id, flow_rank
+            ORDER BY
+                row_key = 'rest',
+                CASE WHEN $by = 'piece' THEN position END,
+                duration_ns DESC,
+                row_key
+        ) AS place
+    FROM summed
+),
+named AS (
+    SELECT path_id, path
+    FROM main.flow_path(
+        $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths, only_paths := true
+    )
+    WHERE path_id IN (SELECT path_id FROM summed)
 )
 SELECT
-    run_id,
-    flow_rank AS rank,
-    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(at_ns) END AS at_ns,
-    sum(duration_ns)::BIGINT AS duration_ns,
-    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(hop) END AS hop,
-    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(part) END AS part,
-    CASE
-        WHEN $by = 'piece' AND row_key = 'rest' THEN 'rest'
-        WHEN $by <> 'node' THEN any_value(activity)
-    END AS activity,
-    CASE
-        WHEN $by = 'node' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(node)
-    END AS node,
-    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(what) END AS what,
-    round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
-    count(*) AS pieces,
-    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(is_certain) END AS is_certain,
-    CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(from_ns) END AS from_ns,
-    CASE
-        WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(callback_instance_id)
-    END AS callback_instance_id,
-    CASE
-        WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(publication_id)
-    END AS publication_id,
-    take_id,
-    latency_ns
-FROM sorted
-GROUP BY run_id, flow_rank, take_id, latency_ns, row_key
-ORDER BY
-    run_id, flow_rank,
-    row_key = 'rest',
-    CASE WHEN $by = 'piece' THEN min(position) END,
-    sum(duration_ns) DESC,
-    row_key
+    s.run_id,
+    s.flow_rank AS rank,
+    s.at_ns,
+    s.duration_ns,
+    s.hop,
+    s.part,
+    s.activity,
+    s.node,
+    s.what,
+    s.share,
+    s.pieces,
+    s.is_certain,
+    s.from_ns,
+    s.callback_instance_id,
+    s.publication_id,
+    s.take_id,
+    s.latency_ns,
+    -- A flow of a thousand hops has thousands of rows and a path as long: it is told once.
+    n.path
+FROM ordered AS s
+LEFT JOIN named AS n ON s.path_id = n.path_id AND s.place = 1
+ORDER BY s.run_id, s.flow_rank, s.place

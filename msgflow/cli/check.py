@@ -41,13 +41,17 @@ def command(
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
     With warnings only, the exit code is 0. An audit of the database that failed
-    when the run was ingested (msgflow db check) is a finding too.
+    when the run was ingested (msgflow db check) is a finding too. Of a run with
+    several clocks it is said how far their times can be compared.
     """
     from msgflow.cli.output import count, print_lines, print_status
     from msgflow.database import Database
+    from msgflow.query.clocks import clock_verdicts
 
     with Database(database) as opened:
         findings = opened.findings(run=run)
+        runs = opened.query("clocks", run=run).runs if opened.runs() else ()
+        verdicts = clock_verdicts(opened.connection, runs, only_several=True)
         names = {known.run_id: f"{known.name} ({known.run_id})" for known in opened.runs()}
     labels = names if run == "all" and len(names) > 1 else {}
     print_lines(_json(findings) if form is CheckFormat.JSON else _text(findings, labels))
@@ -55,6 +59,8 @@ def command(
         count(len({f.name for f in findings if f.severity == severity}), severity)
         for severity in ("error", "warning")
     ]
+    for verdict in verdicts:
+        print_status(verdict)
     print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)
@@ -77,7 +83,13 @@ def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
 
 
 def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterator[str]:
+    from msgflow.cli.output import is_screen
     from msgflow.query.human import format_cell
+    from msgflow.query.wrapping import wrap
+
+    def fitting(text: str, room: int) -> list[str]:
+        # In a pipe what people search for stays in one line.
+        return wrap(text, room) if is_screen() else [text]
 
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)
     for number, group in groupby(_numbered(findings), key=lambda item: item[0]):
@@ -85,10 +97,15 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
         first = places[0]
         if number > 1:
             yield ""
-        yield f"{number}. {first.severity}: {first.title} ({first.name})"
+        head, *more = fitting(f"{first.severity}: {first.title} ({first.name})", width - 4)
+        yield f"{number}. {head}"
+        yield from (f"   {line}" for line in more)
         for finding in places[:_PLACES_SHOWN]:
             run = f"run {run_labels[finding.run_id]}: " if run_labels else ""
-            yield f"   {format_cell(run + finding.subject)} — {format_cell(finding.detail)}"
+            text = f"{format_cell(run + finding.subject)} — {format_cell(finding.detail)}"
+            first_line, *more = fitting(text, width - 5)
+            yield f"   {first_line}"
+            yield from (f"     {line}" for line in more)
         if len(places) > _PLACES_SHOWN:
             yield f"   … and {len(places) - _PLACES_SHOWN} more; --format json has them all"
         for label, text in (

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from msgflow.cli.default_command import with_default
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     DatabaseOption,
@@ -15,12 +16,15 @@ from msgflow.cli.options import (
     WideOption,
 )
 
-app = typer.Typer(help="Synchronise the clocks of several hosts.")
+app = typer.Typer(
+    cls=with_default("show"),
+    help="Synchronise the clocks of several hosts; without a command: show.",
+)
 
 
 @app.callback()
 def group() -> None:
-    """Synchronise the clocks of several hosts."""
+    """Synchronise the clocks of several hosts; without a command: show."""
 
 
 @app.command("apply")
@@ -45,7 +49,7 @@ def apply(
         print_runs(runs)
         for one in runs:
             clocks = opened.query("clocks", run=one.run_id).to_arrow().to_pylist()
-            corrected = [clock for clock in clocks if clock["method"] != "none"]
+            corrected = [clock for clock in clocks if clock["method"] not in ("none", "reference")]
             print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks show")
             pairs = opened.query("clock-pairs", run=one.run_id).to_arrow().to_pylist()
             if how == "messages" and pairs:
@@ -69,13 +73,17 @@ def show(
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """List the clocks and their corrections (the query clocks)."""
-    from msgflow.cli.output import print_result
+    """List the clocks and their corrections (the query clocks), and say whether times compare."""
+    from msgflow.cli.output import print_result, print_status
     from msgflow.database import Database
+    from msgflow.query.clocks import clock_verdicts
 
     with Database(database) as opened:
         result = opened.query("clocks", run=run)
+        verdicts = clock_verdicts(opened.connection, result.runs)
     print_result(result, form, output, wide=wide)
+    for verdict in verdicts:
+        print_status(verdict)
 
 
 @app.command("pairs")

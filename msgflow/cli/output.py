@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, cast
 
 import typer
+from rich.cells import cell_len
 
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
     from msgflow.query.result import QueryResult
     from msgflow.query.window import Run
+
+
+# Narrower than this, text is not wrapped beside a name.
+_LEAST_ROOM = 20
 
 
 def print_error(message: str, hint: str | None = None) -> None:
@@ -37,7 +42,17 @@ def print_note(text: str) -> None:
 
 def print_status(text: str) -> None:
     """Print what was done."""
-    typer.echo(_shown(text), err=True)
+    typer.echo("\n".join(_fitting(_shown(text), "  ")), err=True)
+
+
+def is_asked() -> bool:
+    """Tell whether there is somebody to ask: stdin and stderr are a terminal."""
+    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+
+
+def confirm(question: str) -> bool:
+    """Ask on the terminal whether to go on; without an answer it is a no."""
+    return typer.confirm(_shown(question), err=True)
 
 
 def print_result(
@@ -81,7 +96,7 @@ def print_result(
         else:
             write_result(result, form, terminal(stdout) if stdout.isatty() else stdout)
     if path is None and not len(result):
-        print_note("no rows")
+        print_note(result.when_empty)
     for note in result.notes:
         print_note(note)
 
@@ -154,6 +169,29 @@ def print_lines(lines: Iterable[str]) -> None:
     stream.flush()
 
 
+def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None = None) -> None:
+    """Write names and what they are, side by side; on a terminal what they are may wrap.
+
+    Raises:
+        UsageError: stdout is closed.
+    """
+    from msgflow.query.wrapping import wrap
+
+    every = [*([titles] if titles else []), *rows]
+    width = max(cell_len(name) for name, _ in every)
+    room = max(_LEAST_ROOM, screen_width() - width - 2) if is_screen() else None
+    wrapped = [(name, [text] if room is None else wrap(text, room)) for name, text in every]
+    lines = [
+        f"{name if place == 0 else '':{width}}  {line}"
+        for name, texts in wrapped
+        for place, line in enumerate(texts)
+    ]
+    if titles:
+        longest = max(cell_len(line) for _, texts in wrapped for line in texts)
+        lines.insert(len(wrapped[0][1]), "─" * (width + 2 + longest))
+    print_lines(lines)
+
+
 def count(number: int, thing: str) -> str:
     """Return '1 row', '1,234 rows'."""
     return f"{number:,} {thing}" if number == 1 else f"{number:,} {thing}s"
@@ -214,12 +252,21 @@ def _shown(text: str) -> str:
     return printable(text, keep="\n\r\t")
 
 
-def _labelled(label: str, color: str, text: str) -> None:
-    text = _shown(text)
-    if sys.stderr is not None and sys.stderr.isatty() and "\n" not in text:
-        from msgflow.query.wrapping import wrap
+def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
+    """Return the lines of a text that goes to stderr: on a terminal none is wider than it."""
+    if sys.stderr is None or not sys.stderr.isatty() or "\n" in text:
+        return [text]
+    from msgflow.query.wrapping import wrap
 
-        indent = " " * (len(label) + 2)
-        text = f"\n{indent}".join(wrap(text, screen_width() - len(indent)))
+    width = screen_width()
+    if used + cell_len(text) <= width:
+        return [text]
+    first, *more = wrap(text, width - max(used, len(indent)))
+    return [first, *(indent + line for line in more)]
+
+
+def _labelled(label: str, color: str, text: str) -> None:
+    indent = " " * (len(label) + 2)
+    text = "\n".join(_fitting(_shown(text), indent, len(indent)))
     styled = label if os.environ.get("NO_COLOR") else typer.style(label, fg=color, bold=True)
     typer.echo(f"{styled}: {text}", err=True)

@@ -53,8 +53,6 @@ def group(
         if list_queries:
             refuse_list(context.invoked_subcommand)
         return
-    from msgflow.cli.output import print_lines
-    from msgflow.query.table import lay_out
+    from msgflow.cli.output import print_list
 
-    rows = [(header.name, header.title) for header in load_queries()]
-    print_lines(lay_out(("query", "title"), rows, (False, False)))
+    print_list([(header.name, header.title) for header in load_queries()], ("query", "title"))

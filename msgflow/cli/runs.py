@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.completion import complete
+from msgflow.cli.default_command import with_default
 from msgflow.cli.options import (
     DEFAULT_DATABASE,
     DatabaseOption,
@@ -14,9 +15,11 @@ from msgflow.cli.options import (
     OutputOption,
     WideOption,
 )
-from msgflow.errors import UsageError
+from msgflow.errors import ExitCode, UsageError
 
-app = typer.Typer(help="List, rename, label and remove runs.")
+app = typer.Typer(
+    cls=with_default("list"), help="List, rename, label and remove runs; without a command: list."
+)
 _RunArgument = Annotated[
     str,
     typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
@@ -25,7 +28,7 @@ _RunArgument = Annotated[
 
 @app.callback()
 def group() -> None:
-    """List, rename, label and remove runs."""
+    """List, rename, label and remove runs; without a command: list."""
 
 
 @app.command("list")
@@ -109,15 +112,27 @@ def remove(
             autocompletion=complete("run", "all"),
         ),
     ],
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="Ask nothing on a terminal either")
+    ] = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Remove a run with all that is known of it; what other runs have stays as it is.
 
+    On a terminal it asks first, unless --yes is given; a script is not asked.
     The file keeps its size, and the next ingest uses the space again.
     """
-    from msgflow.cli.output import print_status
+    from msgflow.cli.output import confirm, is_asked, print_status
     from msgflow.database import Database
+    from msgflow.query.window import choose_runs
 
     with Database(database) as opened:
+        if not yes and is_asked():
+            runs = choose_runs(opened.runs(), run)
+            # While somebody thinks, others can use the database.
+            opened.close()
+            if not confirm(f"remove {', '.join(f'{one.name} ({one.run_id})' for one in runs)}?"):
+                print_status("nothing was removed")
+                raise typer.Exit(ExitCode.INTERRUPTED)
         for one in opened.remove_runs(run):
             print_status(f"run {one.run_id} removed: {one.name}")

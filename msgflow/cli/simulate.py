@@ -15,12 +15,10 @@ def _list(is_asked: bool) -> None:
     """Print each system and what it is, then end."""
     if not is_asked:
         return
+    from msgflow.cli.output import print_list
     from msgflow.sim import scenarios
 
-    known = scenarios()
-    width = max(map(len, known))
-    for name, scenario in known.items():
-        typer.echo(f"{name:{width}}  {scenario.description}")
+    print_list([(name, scenario.description) for name, scenario in scenarios().items()])
     raise typer.Exit
 
 

@@ -93,6 +93,9 @@ def command(
     else:
         chosen = None if form is None else Format(form.value)
         print_result(verification.result, chosen, output, wide=wide)
+    if form is VerifyFormat.JUNIT or output is not None:
+        for line in verification.unmet():
+            print_status(line)
     numbers = {
         verdict: verification.count(verdict) for verdict in ("passed", "failed", "not measured")
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,13 +17,16 @@ if TYPE_CHECKING:
 
     from msgflow.query.result import QueryResult
 
+_NONE = "none shown"
+_CHANGED = ("longer", "shorter", "both", "only in A", "only in B")
 _SQL = """\
 -- name: changes
 -- title: What changed
 -- description: A comparison with a row for each subject, the greatest change of a median first.
 -- grain: one row per path, callback or topic
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics),
---     'only in A', 'only in B' or 'none shown'
+--     'only in A', 'only in B', 'none shown' (the intervals contain 0), or why there is none:
+--     'too few values', 'too few independent values', 'too few resamples'
 -- column: of VARCHAR                Statistics that are longer or shorter
 -- column: a_median_ns BIGINT [ns]   Median in run A
 -- column: b_median_ns BIGINT [ns]   Median in run B
@@ -30,20 +34,23 @@ _SQL = """\
 -- column: a_p95_ns BIGINT [ns]      95 % of the values of run A are at most this
 -- column: b_p95_ns BIGINT [ns]      95 % of the values of run B are at most this
 -- column: p95_percent DOUBLE [%]    Change of that
--- column: effect VARCHAR            How much the values differ as a whole (Cliff's delta)
+-- column: separation VARCHAR        How well the values of the two runs can be told apart, by
+--     Cliff's delta; not how large the change is
 -- column: a_share DOUBLE            Share that arrived in run A
 -- column: b_share DOUBLE            Share that arrived in run B
 -- column: a_count BIGINT            Values of run A
 -- column: b_count BIGINT            Values of run B
 -- column: path VARCHAR              Path, callback or topic
--- brief: path, change, a_median_ns, b_median_ns, median_percent, of, a_p95_ns, b_p95_ns,
---     p95_percent, effect, a_count, b_count
+-- brief: path, change, median_percent, a_median_ns, b_median_ns, of, a_p95_ns, b_p95_ns,
+--     p95_percent, separation, a_count, b_count
 WITH subject AS (
     SELECT
         subject,
         bool_or(verdict = 'B is longer') AS is_longer,
         bool_or(verdict = 'B is shorter') AS is_shorter,
         any_value(verdict) FILTER (WHERE verdict LIKE 'only in %') AS only_in,
+        bool_or(verdict = 'no difference shown') AS is_estimated,
+        any_value(verdict) FILTER (WHERE statistic = 'median') AS of_median,
         string_agg(statistic, ', ') FILTER (WHERE verdict IN ('B is longer', 'B is shorter'))
             AS statistics,
         any_value(a_ns) FILTER (WHERE statistic = 'median') AS a_median_ns,
@@ -52,7 +59,7 @@ WITH subject AS (
         any_value(a_ns) FILTER (WHERE statistic = 'p95') AS a_p95_ns,
         any_value(b_ns) FILTER (WHERE statistic = 'p95') AS b_p95_ns,
         any_value(change_percent) FILTER (WHERE statistic = 'p95') AS p95_percent,
-        any_value(effect) AS effect,
+        any_value(separation) AS separation,
         any_value(a_share) AS a_share,
         any_value(b_share) AS b_share,
         any_value(a_count) AS a_count,
@@ -65,10 +72,12 @@ SELECT
         WHEN is_longer AND is_shorter THEN 'both'
         WHEN is_longer THEN 'longer'
         WHEN is_shorter THEN 'shorter'
-        ELSE coalesce(only_in, 'none shown')
+        WHEN only_in IS NOT NULL THEN only_in
+        WHEN is_estimated THEN 'none shown'
+        ELSE of_median
     END AS change,
     statistics AS of,
-    a_median_ns, b_median_ns, median_percent, a_p95_ns, b_p95_ns, p95_percent, effect, a_share,
+    a_median_ns, b_median_ns, median_percent, a_p95_ns, b_p95_ns, p95_percent, separation, a_share,
     b_share, a_count, b_count, subject AS path
 FROM subject
 WHERE NOT $only_different OR is_longer OR is_shorter OR only_in IS NOT NULL
@@ -83,14 +92,26 @@ def changes(result: QueryResult, only_different: bool) -> QueryResult:
         result: rows of `main.comparison`.
         only_different: leave out those of which no difference is shown.
     """
-    table = _summed(result.table, only_different)
-    notes = list(result.notes)
-    subjects = len(result.table["subject"].unique())
-    if table.num_rows < subjects:
-        notes.insert(
-            0, f"{subjects - table.num_rows} of {subjects} show no difference: --all lists them"
-        )
-    return replace(result, table=table, header=_header(), notes=notes)
+    every = _summed(result.table, only_different=False)
+    table = _summed(result.table, only_different) if only_different else every
+    notes, when_empty = list(result.notes), result.when_empty
+    alike = Counter(every["change"].to_pylist())
+    for change in _CHANGED:
+        alike.pop(change, None)
+    if only_different and alike:
+        subjects = every.num_rows
+        none = alike.pop(_NONE, 0)
+        parts = [f"{none} with no difference shown"] if none else []
+        parts += [f"{number} with {reason}" for reason, number in sorted(alike.items())]
+        text = f"{subjects} compared, {', '.join(parts)}: --all lists them"
+        if table.num_rows:
+            notes.insert(0, text)
+        else:
+            names = " and ".join(run.name for run in result.runs)
+            between = f" between {names}" if names else ""
+            said = text if parts[1:] or not none else f"{subjects} compared, --all lists them"
+            when_empty = f"no difference found{between}: {said}"
+    return replace(result, table=table, header=_header(), notes=notes, when_empty=when_empty)
 
 
 def _summed(compared: pa.Table, only_different: bool) -> pa.Table:

@@ -46,6 +46,40 @@ ORDER BY c.clock_id
 """
 
 
+# The bound of two clocks is the sum of theirs, and that of the reference is 0.
+_GROUPS = """
+WITH named AS (
+    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
+    FROM main.host
+    GROUP BY clock_id
+),
+known AS (
+    SELECT clock_id, max(uncertainty_ns) AS greatest_ns
+    FROM main.clock_uncertainty
+    GROUP BY clock_id
+),
+bound AS (
+    SELECT
+        c.run_id, c.clock_id, n.hosts,
+        coalesce(c.reference_clock_id, -c.clock_id) AS together,
+        coalesce(k.greatest_ns, c.uncertainty_ns) AS bound_ns
+    FROM main.clock AS c
+    JOIN named AS n ON c.clock_id = n.clock_id
+    LEFT JOIN known AS k ON c.clock_id = k.clock_id
+    WHERE list_contains($runs, c.run_id)
+)
+SELECT
+    run_id,
+    string_agg(hosts, ', ' ORDER BY clock_id),
+    count(*),
+    CASE WHEN bool_and(bound_ns IS NOT NULL) THEN list_sum(max(bound_ns, 2)) / 1e6 END,
+    run_id IN (SELECT run_id FROM main.diagnostic WHERE name = 'clock_not_synchronised')
+FROM bound
+GROUP BY run_id, together
+ORDER BY run_id, min(clock_id)
+"""
+
+
 def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
     """Return what limits times between hosts, a sentence each.
 
@@ -72,6 +106,42 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
         for run_id, reference, hosts, least, greatest in uncertainties
         if run_id == run.run_id
     ]
+
+
+def clock_verdicts(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], *, only_several: bool = False
+) -> list[str]:
+    """Return for each run whether the times of its hosts can be compared, a sentence each.
+
+    Args:
+        connection: to a database with the public views.
+        runs: the runs.
+        only_several: leave out runs with one clock, of which nothing can be wrong.
+    """
+    rows = connection.execute(_GROUPS, {"runs": [run.run_id for run in runs]}).fetchall()
+    verdicts = []
+    for run in runs:
+        groups = [tuple(row[1:]) for row in rows if row[0] == run.run_id]
+        if not groups or (only_several and len(groups) == 1 and groups[0][1] == 1):
+            continue
+        label = "" if len(runs) == 1 else f"run {run.name} ({run.run_id}): "
+        verdicts.append(label + _verdict(groups))
+    return verdicts
+
+
+def _verdict(groups: Sequence[tuple[str, int, float | None, bool]]) -> str:
+    if len(groups) > 1:
+        cure = "FILE" if groups[0][3] else "messages"
+        return (
+            f"the clocks of {' | '.join(hosts for hosts, *_ in groups)} are not synchronised: times"
+            f" between them cannot be compared; cure: msgflow clocks apply {cure}"
+        )
+    ((hosts, clocks, greatest_ms, _),) = groups
+    if clocks == 1:
+        return f"one clock ({hosts}): all times can be compared"
+    if greatest_ms is None:
+        return f"the clocks of {hosts} are together, as far as the file with their offsets is right"
+    return f"the clocks of {hosts} are together within ±{greatest_ms:.3f} ms"
 
 
 def _wrong_by(least_ms: float | None, greatest_ms: float | None) -> str:

@@ -11,15 +11,17 @@
     -- column: median_ns BIGINT [ns]  Half of the flows took no longer
     -- brief: path, median_ns
     -- answer: lost
+    -- heading: rank, latency_ns
     -- note: clocks
     -- needs: flow_path, stat_end_to_end
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 `note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ.
 `brief` names the columns that a narrow terminal is to show, the most important first, `answer`
-those that stay where they are 0 in all rows, since this is what people ask for, `slowest` the one
-that `--slowest N` goes by. The unit of a column may also be what it names: 'node', 'topic',
-'callback', 'host' or 'path', for the options that choose rows by them.
+those that stay where they are 0 in all rows, since this is what people ask for, `heading` those
+that stand above a table on a terminal, once for each value of the first, on which the others
+depend, `slowest` the one that `--slowest N` goes by. The unit of a column may also be what it
+names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choose rows by them.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "needs",
-    "brief", "answer", "slowest",
+    "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
@@ -119,6 +121,7 @@ class Header:
         path: the file.
         brief: columns for where not all have a place, the most important first.
         answer: columns that are shown also where they are 0 or empty throughout.
+        heading: columns that are told once, above the rows: the first tells which rows they are of.
         slowest: column by which rows are the slowest, else None.
     """
 
@@ -138,6 +141,7 @@ class Header:
     path: Path
     brief: tuple[str, ...] = ()
     answer: tuple[str, ...] = ()
+    heading: tuple[str, ...] = ()
     slowest: str | None = None
 
 
@@ -184,7 +188,7 @@ def parse(text: str, path: Path) -> Header:
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
     _check_names(columns, path)
-    for key in ("brief", "answer", "slowest"):
+    for key in ("brief", "answer", "heading", "slowest"):
         for name in _names(single.get(key, "")):
             if name not in [column.name for column in columns]:
                 raise _error(path, 1, f"{key} names a column that there is not: {name!r}")
@@ -205,6 +209,7 @@ def parse(text: str, path: Path) -> Header:
         path=path,
         brief=_names(single.get("brief", "")),
         answer=_names(single.get("answer", "")),
+        heading=_names(single.get("heading", "")),
         slowest=single.get("slowest"),
     )
 

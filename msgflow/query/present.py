@@ -69,12 +69,14 @@ class Presentation:
     """What is shown of a result.
 
     Attributes:
+        headings: what stands above the rows, a line each.
         columns: in the order of the result, the number of the path first.
         widths: of the columns; None where each row is a record.
         paths: that the numbers mean, from 1 on.
         notes: what is left out, a sentence each.
     """
 
+    headings: tuple[str, ...]
     columns: tuple[ShownColumn, ...]
     widths: tuple[int, ...] | None
     paths: tuple[str, ...]
@@ -108,6 +110,9 @@ def present(
     first = result.table if most_rows is None else result.table.slice(0, most_rows)
     columns = [_column(result, name, first[name]) for name in kept]
     columns, paths = _with_numbered_paths(columns)
+    headings: tuple[str, ...] = ()
+    if not keeps_all:
+        columns, headings = _with_headings(result, columns)
     notes = []
     if first.num_rows < len(result):
         notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
@@ -124,7 +129,7 @@ def present(
         notes.append(f"0 or empty in all rows: {', '.join(nothing)}")
     notes += _of_columns_left_out(left_out, remedy) if first.num_rows else []
     widths = tuple(_widths(shown, width)) if is_table else None
-    return Presentation(tuple(shown), widths, paths, tuple(notes))
+    return Presentation(headings, tuple(shown), widths, paths, tuple(notes))
 
 
 def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str], list[str]]:
@@ -248,6 +253,36 @@ def _with_numbered_paths(
     column = _measured(PATH, PATH, [numbers.get(text, text) for text in texts], True)
     others = [other for other in columns if other.name != PATH]
     return ([column] if len(paths) > 1 else []) + others, paths
+
+
+def _with_headings(
+    result: QueryResult, columns: list[ShownColumn]
+) -> tuple[list[ShownColumn], tuple[str, ...]]:
+    """Return the columns without those that stand above the rows, and what stands there."""
+    by_name = {column.name: column for column in columns}
+    names = () if result.header is None else result.header.heading
+    said = [by_name[name] for name in names if name in by_name]
+    if len(said) < 2 or said[0].name != names[0] or not said[0].cells:
+        return columns, ()
+    key, *others = said
+    rows: dict[str, tuple[str, ...]] = {}
+    for number, *cells in zip(*(column.cells for column in said), strict=True):
+        rows.setdefault(number, tuple(cells))
+    if len(rows) == len(key.cells) > 1:
+        return columns, ()
+    # What one row says needs no number; else the number says which rows it is of.
+    is_alone = len(rows) == 1
+    lines = tuple(
+        ("" if is_alone else f"{key.title} {number}: ")
+        + ", ".join(
+            f"{column.title} {cell}"
+            for column, cell in zip(others, cells, strict=True)
+            if cell != NULL
+        )
+        for number, cells in rows.items()
+    )
+    left = [column for column in columns if column not in (said if is_alone else others)]
+    return left, lines
 
 
 def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[ShownColumn]:

@@ -32,12 +32,14 @@ class QueryResult:
         header: of the named query, which holds the units; None for plain SQL.
         runs: the runs that were read; empty for plain SQL.
         notes: what the rows do not say themselves (hidden rows, truncation), a sentence each.
+        when_empty: what to say where there are no rows.
     """
 
     table: pa.Table
     header: Header | None = None
     runs: tuple[Run, ...] = ()
     notes: list[str] = field(default_factory=list)
+    when_empty: str = "no rows"
 
     def __len__(self) -> int:
         return int(self.table.num_rows)

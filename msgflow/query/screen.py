@@ -20,6 +20,8 @@ _SPARED = 4
 
 def screen_lines(shown: Presentation, width: int) -> Iterator[str]:
     """Yield the lines of what is shown, none longer than `width`."""
+    for heading in shown.headings:
+        yield from wrap(heading, width)
     if shown.columns and shown.columns[0].cells:
         if shown.widths is None:
             yield from _records(shown.columns, width)

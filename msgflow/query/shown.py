@@ -24,7 +24,7 @@ def shown_text(result: QueryResult) -> str:
     shown = present(result, width, remedy="to_arrow() has all")
     runs = ", ".join(f"{run.name} ({run.run_id})" for run in result.runs)
     head = [("run: " if len(result.runs) == 1 else "runs: ", runs)] if runs else []
-    notes = [*shown.notes, *([] if len(result) else ["no rows"]), *result.notes]
+    notes = [*shown.notes, *([] if len(result) else [result.when_empty]), *result.notes]
     lines = [
         *(line for label, text in head for line in _labelled(label, text, width)),
         *screen_lines(shown, width),
@@ -70,6 +70,6 @@ def _first(result: QueryResult) -> QueryResult:
 def _notes(result: QueryResult) -> list[str]:
     count = len(result)
     if not count:
-        return ["no rows", *result.notes]
+        return [result.when_empty, *result.notes]
     cut = [f"the first {MOST_ROWS} of {count:,} rows"] if count > MOST_ROWS else []
     return [*cut, *result.notes]

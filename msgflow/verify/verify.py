@@ -89,6 +89,15 @@ class Verification:
         verdicts: list[str] = self.result.table["verdict"].to_pylist()
         return verdicts.count(Verdict(verdict))
 
+    def unmet(self) -> list[str]:
+        """Return what failed or was not measured, a line each: what, and what was found instead."""
+        return [
+            f"{row['verdict']}: {row['subject'] or row['target']}: {row['metric']}"
+            f" {row['condition']}: {row['measured'] or row['reason']}"
+            for row in self.result.table.to_pylist()
+            if row["verdict"] != Verdict.PASSED
+        ]
+
     def to_junit(self, *, allow_not_measured: bool = False) -> str:
         """Return the verdicts as JUnit XML: what was not measured is an error, or skipped."""
         from msgflow.verify.junit import junit_xml

@@ -53,14 +53,19 @@ def critical_path(
     options = " ".join(
         f"--{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in asked.items()
     )
+    # The page shows the path itself.
     return encode(
-        result.to_arrow(),
+        result.to_arrow().drop_columns(["path"]),
         meta={
             "from": asked["from"],
             "to": asked["to"],
             "take_id": asked["flow"],
             "notes": result.notes,
-            "columns": {column.name: column.description for column in header.columns},
+            "columns": {
+                column.name: column.description
+                for column in header.columns
+                if column.name != "path"
+            },
             "command": f"msgflow query critical-path {options} --run {shlex.quote(run.name)}",
         },
         origin_ns=origin_ns,

@@ -1,7 +1,8 @@
 -- name: main.comparison
 -- kind: macro
 -- description: How a run differs from another one, by path, callback or topic: what was measured in
---     each, the difference with a bootstrap confidence interval, and how large the effect is.
+--     each, the difference with a bootstrap confidence interval, and how well the values of the two
+--     can be told apart.
 --     Values that follow each other are alike, so blocks of neighbouring values are resampled
 --     (circular block bootstrap). The length of a block is estimated from the values of each run.
 --     An interval needs ten blocks in either run, and five independent values beyond a quantile;
@@ -38,7 +39,10 @@
 --     for an interval, 'too few resamples', 'not estimated' (maximum), 'only in A' or 'only in B'
 -- column: cliffs_delta DOUBLE  How often a value of B exceeds one of A, minus how often it is the
 --     other way round: -1 to 1
--- column: effect VARCHAR  'negligible', 'small', 'medium' or 'large'; NULL: fewer than 20 values
+-- column: separation VARCHAR  How well the values of the two runs can be told apart, by
+--     cliffs_delta: 'negligible', 'small', 'medium' or 'large'. It says nothing of how large the
+--     change is: a change of 1 % separates them well if they vary by less. NULL: fewer than 20
+--     values
 -- column: a_count BIGINT  Values of run A
 -- column: b_count BIGINT  Values of run B
 -- column: a_independent BIGINT  How many independent values the values of run A are worth for this
@@ -171,7 +175,7 @@ ranked AS (
     FROM sided
     WHERE value_ns IS NOT NULL
 ),
-effect AS (
+dominance AS (
     SELECT
         subject,
         2 * (
@@ -199,7 +203,7 @@ centred AS MATERIALIZED (
         (s.value_ns > m.quantiles[3])::BIGINT AS p99_part
     FROM sided AS s
     JOIN measured AS m ON s.side = m.side AND s.subject = m.subject
-    JOIN effect AS e ON s.subject = e.subject
+    JOIN dominance AS e ON s.subject = e.subject
     WHERE s.value_ns IS NOT NULL AND m.number >= 20
 ),
 variance AS (
@@ -442,7 +446,7 @@ judged AS (
         p.b_ns - p.a_ns + round(s.ends[1])::BIGINT AS low_ns,
         p.b_ns - p.a_ns + round(s.ends[2])::BIGINT AS high_ns
     FROM paired AS p
-    LEFT JOIN effect AS e ON p.subject = e.subject
+    LEFT JOIN dominance AS e ON p.subject = e.subject
     LEFT JOIN spread AS s ON p.subject = s.subject AND p.statistic = s.statistic
 )
 SELECT
@@ -465,7 +469,7 @@ SELECT
         WHEN abs(cliffs_delta) < 0.33 THEN 'small'
         WHEN abs(cliffs_delta) < 0.474 THEN 'medium'
         WHEN cliffs_delta IS NOT NULL THEN 'large'
-    END AS effect,
+    END AS separation,
     a_count,
     b_count,
     floor(a_independent + 1e-9)::BIGINT AS a_independent,

@@ -61,7 +61,7 @@ def test_offset_and_drift_are_recovered(
     )
     assert result.exit_code == 0, result.stderr
     alpha, beta = clocks(database)
-    assert (alpha["offset_ns"], alpha["uncertainty_ns"], alpha["method"]) == (0, 0, "none")
+    assert (alpha["offset_ns"], alpha["uncertainty_ns"], alpha["method"]) == (0, 0, "reference")
     assert (beta["reference"], beta["method"]) == ("alpha", "messages")
     hosts = json.loads(drifting.meta.read_text())["hosts"]
     assert hosts["beta"]["clock_drift_ppb"] == 20_000
@@ -105,8 +105,16 @@ def test_a_database_is_corrected_and_restored(
     count = sum(pair["message_count"] for pair in pairs)
     assert f"by {count:,} messages and 0 network packets" in result.stderr
 
+    for words in (("clocks", "show"), ("check",)):
+        said = msgflow(*words, "--db", database).stderr
+        assert "the clocks of alpha, beta are together within ±0." in said
+
     assert msgflow("clocks", "apply", "none", "--db", database).exit_code == 0
     assert contents(database) == recorded
+    for words in (("clocks", "show"), ("check",)):
+        said = msgflow(*words, "--db", database).stderr
+        assert "the clocks of alpha | beta are not synchronised: times between them cannot" in said
+        assert "be compared; cure: msgflow clocks apply messages\n" in said
 
 
 def test_a_file_with_offsets(msgflow: Msgflow, drifting: Simulation, tmp_path: Path) -> None:
@@ -129,6 +137,11 @@ def test_a_file_with_offsets(msgflow: Msgflow, drifting: Simulation, tmp_path: P
     assert "line 2: the run has no host or clock of that name — gamma" in result.stderr
     assert "alpha (" in result.stderr
     assert contents(database) == before
+    (tmp_path / "unsure.yaml").write_text("beta: -7000000\n")
+    msgflow("clocks", "apply", tmp_path / "unsure.yaml", "--db", database)
+    said = msgflow("clocks", "show", "--db", database).stderr
+    assert "alpha, beta are together, as far as the file with their offsets is right" in said
+    msgflow("clocks", "apply", "none", "--db", database)
     refused = tmp_path / "refused.duckdb"
     result = msgflow("ingest", drifting.directory, "--db", refused, "--clock-sync", file)
     assert result.exit_code == 2
@@ -161,6 +174,9 @@ def test_containers_share_a_clock_and_have_equal_pids(msgflow: Msgflow, tmp_path
     assert msgflow(*arguments).exit_code == 0
     (clock,) = clocks(database)
     assert (clock["hosts"], clock["method"]) == ("box-1, box-2", "none")
+    shown = msgflow("clocks", "show", "--db", database).stderr
+    assert "one clock (box-1, box-2): all times can be compared\n" in shown
+    assert "clock" not in msgflow("check", "--db", database).stderr
     with open_db(database) as opened:
         processes = opened.sql(
             "SELECT count(*), count(DISTINCT pid), count(DISTINCT (host_id, pid)) FROM process"

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from msgflow.sim import Recording, simulate
+
 HEAVY = ("duckdb", "pyarrow", "sqlalchemy", "alembic", "pandas", "polars", "bt2")
 NEVER_IN_QUERY = ("sqlalchemy", "alembic", "duckdb_engine", "pandas", "polars", "bt2")
 SLOW = "SELECT count(*) FROM range(1000000) a, range(10000000) b WHERE a.range * b.range % 7 = 3"
@@ -147,14 +149,14 @@ def test_an_interrupt_ends_a_query_with_code_130(small_database: Path) -> None:
     assert errors == "error: interrupted\n"
 
 
-def on_terminal(arguments: list[str], width: int = 40) -> bytes:
-    """Return what a program writes to stdout when that is a terminal."""
+def on_terminal(arguments: list[str], width: int = 40, *, with_stderr: bool = False) -> bytes:
+    """Return what a program writes to stdout when that is a terminal, and to stderr."""
     leader, follower = pty.openpty()
     process = subprocess.Popen(
         arguments,
         stdout=follower,
-        stderr=subprocess.DEVNULL,
-        env=os.environ | {"COLUMNS": str(width), "TERM": "xterm-256color"},
+        stderr=follower if with_stderr else subprocess.DEVNULL,
+        env=os.environ | {"COLUMNS": str(width), "TERM": "xterm-256color", "NO_COLOR": "1"},
     )
     os.close(follower)
     parts = []
@@ -167,7 +169,7 @@ def on_terminal(arguments: list[str], width: int = 40) -> bytes:
             break
         parts.append(part)
     os.close(leader)
-    assert process.wait(timeout=30) == 0
+    assert process.wait(timeout=30) in ((0, 1) if with_stderr else (0,))
     return b"".join(parts).replace(b"\r\n", b"\n")
 
 
@@ -204,6 +206,30 @@ def test_a_table_fits_the_terminal(
         command(*arguments, "--db", small_database), capture_output=True, check=True
     ).stdout
     assert wide == piped
+
+
+@pytest.mark.parametrize("width", [60, 80, 100])
+@pytest.mark.parametrize(
+    "arguments", [("query",), ("simulate", "--list"), ("check",), ("clocks", "show"), ("runs",)]
+)
+def test_no_line_is_wider_than_the_terminal(
+    two_hosts_far_apart: Path, arguments: tuple[str, ...], width: int
+) -> None:
+    options = ("--db", two_hosts_far_apart) if arguments[0] in ("check", "clocks", "runs") else ()
+    shown = on_terminal(command(*arguments, *options), width, with_stderr=True).decode()
+    assert len(shown.splitlines()) > 1
+    assert [line for line in shown.splitlines() if len(line) > width] == []
+
+
+@pytest.fixture(scope="module")
+def two_hosts_far_apart(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two hosts without synchronisation, whose traces have long paths and are damaged."""
+    directory = tmp_path_factory.mktemp("far")
+    traces = directory / ("a_long_name_of_a_session_" * 5)
+    simulate("two_hosts", traces, factor=0.1, recording=Recording(cut_streams=2))
+    database = directory / "far.duckdb"
+    subprocess.run(command("ingest", traces, "--db", database, "--quiet"), check=True)
+    return database
 
 
 def test_parquet_is_not_written_to_a_terminal(small_database: Path) -> None:

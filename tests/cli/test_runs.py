@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pty
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -68,6 +73,52 @@ def test_remove_leaves_the_others_as_they_were(
         assert not any(check.row_count for check in run_checks(opened.connection, 2))
     assert msgflow("ingest", tmp_path / "before", "--db", database).exit_code == 0
     assert names(msgflow, database) == ["after", "before"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "options", "code", "left"),
+    [
+        (b"n\n", [], 130, ["before", "after"]),
+        (b"\n", [], 130, ["before", "after"]),
+        (b"y\n", [], 0, ["after"]),
+        (b"", ["--yes"], 0, ["after"]),
+    ],
+)
+def test_on_a_terminal_it_asks_before_it_removes(
+    msgflow: Msgflow, database: Path, answer: bytes, options: list[str], code: int, left: list[str]
+) -> None:
+    leader, follower = pty.openpty()
+    program = [sys.executable, "-m", "msgflow", "runs", "remove", "before", *options]
+    with subprocess.Popen(
+        [*program, "--db", str(database)], stdin=follower, stdout=follower, stderr=follower
+    ) as process:
+        os.close(follower)
+        os.write(leader, answer)
+        said = b""
+        # Linux says by an error that nobody holds the other end any more.
+        with contextlib.suppress(OSError):
+            while part := os.read(leader, 65536):
+                said += part
+        assert process.wait(timeout=30) == code
+    os.close(leader)
+    assert (b"remove before (1)? [y/N]" in said) == (not options)
+    assert (b"nothing was removed" in said) == (code == 130)
+    assert names(msgflow, database) == left
+
+
+def test_without_a_command_runs_are_listed_and_clocks_shown(
+    msgflow: Msgflow, database: Path
+) -> None:
+    for group, command in (("runs", "list"), ("clocks", "show")):
+        for words in ([], ["--format", "json"]):
+            bare = msgflow(group, *words, "--db", database)
+            assert bare.exit_code == 0
+            named = msgflow(group, command, *words, "--db", database)
+            assert (bare.stdout, bare.stderr) == (named.stdout, named.stderr)
+        text = msgflow(group, "--help")
+        assert text.exit_code == 0
+        assert f"without a command: {command}" in " ".join(text.stdout.split())
+        assert msgflow(group, "lists").exit_code == 2
 
 
 def test_remove_all_leaves_no_row(msgflow: Msgflow, database: Path) -> None:

@@ -64,6 +64,21 @@ def test_a_file_that_ends_with_xml_is_junit(demo: Msgflow, tmp_path: Path) -> No
     assert result.stdout == ""
 
 
+@pytest.mark.parametrize("name", ["verdicts.xml", "verdicts.json", "verdicts.csv"])
+def test_with_a_file_it_says_what_failed(demo: Msgflow, tmp_path: Path, name: str) -> None:
+    file = tmp_path / "targets.yaml"
+    file.write_text(
+        "targets:\n  - topic: /imu/data\n    rate: 1 Hz ± 5 %\n"
+        "  - topic: /lidar/points\n    rate: 10 Hz ± 5 %\n"
+    )
+    result = demo("verify", file, "-o", tmp_path / name)
+    assert result.exit_code == 1
+    *_, failed, summary = result.stderr.splitlines()
+    assert failed.startswith("failed: /imu/driver → /imu/data: rate 1 Hz ± 5 %: ")
+    assert failed.endswith(" Hz")
+    assert summary == "1 passed, 1 failed, 0 not measured"
+
+
 def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
     assert demo("ingest", tmp_path / "trace", "--name", "good2", "--replace").exit_code == 0
     simulate("demo", tmp_path / "other", factor=0.1, seed=2)

@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from msgflow.query.changes import changes
 from msgflow.query.result import QueryResult
+from msgflow.query.window import Run
 
 A_TO_B = "/a → /t → /b"
 
@@ -18,7 +19,8 @@ def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, 
             "subject": subject, "statistic": statistic, "verdict": verdict, "a_ns": 1_000,
             "b_ns": None if difference_ns is None else 1_000 + difference_ns,
             "change_percent": None if difference_ns is None else difference_ns / 10,
-            "effect": None, "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20, **more,
+            "separation": None, "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20,
+            **more,
         }
         for statistic, verdict in verdicts.items()
     ]  # fmt: skip
@@ -27,7 +29,7 @@ def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, 
 ROWS = [
     *compared(A_TO_B, {"median": "B is longer", "p95": "no difference shown"}, 100),
     *compared("/same", {"median": "no difference shown", "p95": "too few values"}, 500),
-    *compared("/both", {"median": "B is shorter", "p95": "B is longer"}, -300, effect="large"),
+    *compared("/both", {"median": "B is shorter", "p95": "B is longer"}, -300, separation="large"),
     *compared("/gone", {"median": "only in A", "p95": "only in A"}, None, b_count=0),
 ]
 RESULT = QueryResult(pa.Table.from_pylist(ROWS), notes=["a note"])
@@ -44,8 +46,32 @@ def test_a_row_for_each_that_differs_the_greatest_change_first() -> None:
     assert rows[2]["a_median_ns"] == 1_000
     assert rows[2]["b_median_ns"] == 1_100
     assert rows[2]["median_percent"] == 10.0
-    assert rows[1]["effect"] == "large"
-    assert found.notes == ["1 of 4 show no difference: --all lists them", "a note"]
+    assert rows[1]["separation"] == "large"
+    assert found.notes == ["4 compared, 1 with no difference shown: --all lists them", "a note"]
+    assert found.when_empty == "no rows"
+
+
+def test_no_difference_says_how_much_was_compared_and_what_could_not_be() -> None:
+    rows = [
+        *compared("/same", {"median": "no difference shown", "p95": "too few values"}, 0),
+        *compared("/few", {"median": "too few values", "max": "not estimated"}, 0),
+        *compared("/alike", {"median": "too few independent values"}, 0),
+    ]
+    runs = (Run(1, "before", 0), Run(2, "after", 0))
+    result = QueryResult(pa.Table.from_pylist(rows), runs=runs)
+    found = changes(result, only_different=True)
+    assert not len(found)
+    assert found.when_empty == (
+        "no difference found between before and after: 3 compared, 1 with no difference shown,"
+        " 1 with too few independent values, 1 with too few values: --all lists them"
+    )
+    assert "note: no difference found" in str(found)
+    every = changes(result, only_different=False).to_arrow().to_pylist()
+    assert {row["path"]: row["change"] for row in every} == {
+        "/same": "none shown",
+        "/few": "too few values",
+        "/alike": "too few independent values",
+    }
 
 
 def test_all_of_them() -> None:
@@ -55,3 +81,12 @@ def test_all_of_them() -> None:
     )
     assert found.notes == ["a note"]
     assert found.columns == tuple(column.name for column in (found.header or 0).columns)  # type: ignore[union-attr]
+
+
+def test_where_all_was_measured_the_words_are_few() -> None:
+    runs = (Run(1, "before", 0), Run(2, "after", 0))
+    rows = compared("/same", {"median": "no difference shown"}, 0)
+    found = changes(QueryResult(pa.Table.from_pylist(rows), runs=runs), only_different=True)
+    assert found.when_empty == (
+        "no difference found between before and after: 1 compared, --all lists them"
+    )

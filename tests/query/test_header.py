@@ -31,6 +31,7 @@ FULL = """\
 -- needs: main.a,
 --     main.b
 -- answer: median_ns
+-- heading: start_ns, median_ns
 -- brief: start_ns,
 --     median_ns
 -- severity: warning
@@ -69,6 +70,7 @@ def test_everything_is_parsed() -> None:
     assert header.severity == "warning"
     assert header.brief == ("start_ns", "median_ns")
     assert header.answer == ("median_ns",)
+    assert header.heading == ("start_ns", "median_ns")
     assert header.body == "SELECT 1\n-- a comment of the body\n"
 
 

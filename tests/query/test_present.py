@@ -169,6 +169,41 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
     assert "skipped" not in titles
 
 
+def pieces(rank: int, latency_ns: int, path: str) -> list[dict[str, Any]]:
+    return [
+        {
+            "rank": rank, "at_ns": at_ns, "duration_ns": 7, "node": "/n", "share": 0.5,
+            "activity": "callback", "take_id": 10 * rank, "latency_ns": latency_ns,
+            "path": None if at_ns else path,
+        }
+        for at_ns in (0, 7)
+    ]  # fmt: skip
+
+
+def test_what_holds_of_several_rows_stands_above_them_once() -> None:
+    lines = lines_of(result_of("critical-path", pieces(1, 12_000_000, CAMERA)), 100)
+    assert lines[0] == "latency 12.000 ms, take_id 10"
+    assert "take_id" not in lines[1]
+    assert any(line.startswith("path  /camera/driver") for line in lines)
+    rows = pieces(1, 12_000_000, CAMERA) + pieces(2, 11_000_000, SHORT)
+    several = result_of("critical-path", rows)
+    lines = lines_of(several, 100)
+    assert lines[:2] == [
+        "rank 1: latency 12.000 ms, take_id 10, path 1",
+        "rank 2: latency 11.000 ms, take_id 20, path 2",
+    ]
+    assert lines[2].split()[:2] == ["rank", "at"]
+    assert any(line.startswith("path 2  /camera/driver") for line in lines)
+    assert present(several, 100, is_chosen=True).headings == ()
+    assert present(several.with_columns(["rank", "share"]), 100).headings == ()
+
+
+def test_rows_of_which_each_has_its_own_heading_have_none() -> None:
+    rows = [pieces(rank, 12_000_000, CAMERA)[0] for rank in (1, 2)]
+    assert present(result_of("critical-path", rows), 100).headings == ()
+    assert present(result_of("critical-path", []), 100).headings == ()
+
+
 def test_columns_that_somebody_chose_are_all_shown() -> None:
     chosen = CASES["paths"].with_columns(["lost", "run_id", "p95", "path"])
     shown = present(chosen, 100, is_chosen=True)

@@ -9,8 +9,8 @@ import { chart, redrawCharts } from "./chart.js";
 
 const KINDS_OF = { paths: "paths (end-to-end latency)", callbacks: "callbacks (duration)", topics: "topics (from publication to take)" };
 const ONE_OF = { paths: "path", callbacks: "callback", topics: "topic" };
-const MEASURED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "effect", "a_count", "b_count", "a_share", "b_share"];
-const COMPARED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "effect", "a_count", "b_count", "a_share", "b_share"];
+const MEASURED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "separation", "a_count", "b_count", "a_share", "b_share"];
+const COMPARED = ["subject", "statistic", "a_ns", "b_ns", "difference_ns", "change_percent", "low_ns", "high_ns", "verdict", "separation", "a_count", "b_count", "a_share", "b_share"];
 
 export class ComparePage {
   constructor(app, root) {
@@ -72,7 +72,7 @@ export class ComparePage {
     const isQuick = table.meta.is_quick;
     clear(this.body,
       isQuick ? waiting(`${count(subjects.size, ONE_OF[this.what])} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
-        : h("p", {}, `${count(changed.size, ONE_OF[this.what])} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. The effect says how rarely values of one run are found among those of the other.`),
+        : h("p", {}, `${count(changed.size, ONE_OF[this.what])} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. Separation says how rarely values of one run are found among those of the other, not how far apart they are.`),
       dataTable(table, { label: isQuick ? "measured" : "comparison", only: (row) => isQuick || this.all || differs(row), nothing: "No difference is shown.",
         columns: isQuick ? MEASURED : COMPARED,
         onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),
