@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +19,9 @@ from msgflow.cli.options import (
     RunOption,
 )
 from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    from msgflow.database import Database
 
 _START = "Which message"
 
@@ -85,15 +88,47 @@ def command(
         int | None,
         typer.Option("--response", metavar="ID", help="response_id", rich_help_panel=_START),
     ] = None,
+    slowest: Annotated[
+        int | None,
+        typer.Option(
+            "--slowest",
+            metavar="N",
+            min=1,
+            max=100,
+            help="The N slowest flows, each back from its last message; --from and --to choose",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    from_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--from",
+            metavar="NAME",
+            help="With --slowest: topics or nodes where flows start; globs",
+            autocompletion=complete("place"),
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    to: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--to",
+            metavar="NAME",
+            help="With --slowest: topics or nodes where flows end; globs",
+            autocompletion=complete("place"),
+            rich_help_panel=_START,
+        ),
+    ] = None,
     run: RunOption = None,
     direction: Annotated[
-        Direction,
+        Direction | None,
         typer.Option(
             "--direction",
             help="Follow what it caused, what caused it, or both",
+            show_default="both; with --slowest backward",
             rich_help_panel=SELECTION,
         ),
-    ] = Direction.BOTH,
+    ] = None,
     depth: Annotated[
         int,
         typer.Option(
@@ -163,34 +198,70 @@ def command(
         raise UsageError(f"a page has a name that ends with .html — {html}", "--html FILE.html")
     if html is not None and (output is not None or form is not None):
         raise UsageError("--html goes without --format and -o", "ask twice")
+    if slowest is None and (from_ or to):
+        raise UsageError("--from and --to choose among the slowest flows", "--slowest 1")
+    if slowest is not None and slowest > 1 and (html is not None or form is FlowFormat.JSON):
+        raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
     with Database(database) as opened:
-        flow = opened.flow(
-            topic,
-            at=at,
-            publication_id=publication,
-            take_id=take,
-            callback_instance_id=callback_instance,
-            request_id=request,
-            response_id=response,
-            run=run,
-            direction=direction.value,
-            depth=depth,
-            limit=limit,
-            internal=internal,
-        )
-        size = None if html is None else opened.flow_page(flow, html)
-    print_runs([flow.run])
+        starts: dict[str, Any] = {
+            "topic": topic,
+            "at": at,
+            "publication_id": publication,
+            "take_id": take,
+            "callback_instance_id": callback_instance,
+            "request_id": request,
+            "response_id": response,
+        }
+        found = [starts | {"run": run}]
+        if slowest is not None:
+            if given := [name for name, value in starts.items() if value is not None]:
+                raise UsageError(
+                    f"--slowest chooses the message itself — {given[0]}", "leave out one of them"
+                )
+            ends = _slowest_takes(opened, slowest, from_, to, run, internal)
+            found = [{"take_id": number} for number in ends]
+        way = direction or (Direction.BOTH if slowest is None else Direction.BACKWARD)
+        flows = [
+            opened.flow(**start, direction=way.value, depth=depth, limit=limit, internal=internal)
+            for start in found
+        ]
+        size = None if html is None else opened.flow_page(flows[0], html)
+    print_runs([flows[0].run])
     if size is not None:
         print_status(f"{size:,} bytes written to {html}: open it in a browser")
         return
     if form is FlowFormat.JSON:
-        print_text(lambda width, color: flow.to_json(), output)
+        print_text(lambda width, color: flows[0].to_json(), output)
     else:
         from msgflow.export.flow_tree import tree_text
 
         print_text(
-            lambda width, color: tree_text(flow, is_absolute=absolute, width=width, color=color),
+            lambda width, color: "\n\n".join(
+                tree_text(flow, is_absolute=absolute, width=width, color=color) for flow in flows
+            ),
             output,
         )
-    for note in flow.notes:
+    for note in dict.fromkeys(note for flow in flows for note in flow.notes):
         print_note(note)
+
+
+def _slowest_takes(
+    database: Database,
+    number: int,
+    from_: list[str] | None,
+    to: list[str] | None,
+    run: str | None,
+    internal: bool,
+) -> list[int]:
+    """Return with which takes the slowest flows end, the slowest first."""
+    words: dict[str, Any] = {
+        "from_": ",".join(from_ or []) or None,
+        "to": ",".join(to or []) or None,
+    }
+    rows = database.query("flows", run=run, internal=internal, slowest=number, **words)
+    ends = [row["take_id"] for row in rows.to_arrow().to_pylist() if row["take_id"] is not None]
+    if not ends:
+        raise UsageError(
+            "no flow arrived at the end of a path", "msgflow query e2e-latency lists the paths"
+        )
+    return list(dict.fromkeys(ends))

@@ -180,7 +180,7 @@ def _order(header: Header, selection: Selection) -> list[str]:
     if selection.slowest is not None:
         if header.slowest is None:
             raise UsageError(
-                f"the rows of {header.name} are not slow or fast — --slowest",
+                f"{header.name} has no --slowest: its rows have no duration of their own",
                 "--sort COLUMN:desc --limit N",
             )
         if selection.sort or selection.limit is not None:

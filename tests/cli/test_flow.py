@@ -11,6 +11,7 @@ from msgflow import Database
 from msgflow.cli import flow as command
 from msgflow.database import DEFAULT_DEPTH, DEFAULT_VERTICES
 from msgflow.query.flow import DIRECTIONS, MOST_VERTICES
+from msgflow.sim import simulate
 
 Msgflow = Callable[..., Result]
 
@@ -63,6 +64,11 @@ def test_json_and_files(msgflow: Msgflow, small_database: Path, tmp_path: Path) 
         (("--publication", "1", "-o", "a.xlsx"), "no format has this suffix — a.xlsx"),
         (("--publication", "1", "-o", "a.csv"), ".txt, .json"),
         (("--publication", "1", "--html", "a.html", "--format", "json"), "--html"),
+        (("--publication", "1", "--slowest", "1"), "publication_id"),
+        (("--publication", "1", "--to", "/chatter"), "--to"),
+        (("--slowest", "2", "--format", "json"), "--slowest 2"),
+        (("--slowest", "1"), "no flow arrived"),
+        (("--slowest", "1", "--to", "/nothing"), "/nothing"),
     ],
 )
 def test_mistakes_have_code_2(
@@ -73,6 +79,21 @@ def test_mistakes_have_code_2(
     assert result.stdout == ""
     assert message in result.stderr
     assert "\n\nhint: " in result.stderr
+
+
+def test_the_slowest_flows_are_those_of_the_query(msgflow: Msgflow, tmp_path: Path) -> None:
+    simulate("demo", tmp_path / "trace", factor=0.1)
+    assert msgflow("ingest", tmp_path / "trace").exit_code == 0
+    with Database(Path("msgflow.duckdb")) as database:
+        rows = database.query("flows", to="/control/cmd", slowest=2).to_arrow()
+        takes = rows["take_id"].to_pylist()
+        trees = [str(database.flow(take_id=take, direction="backward")) for take in takes]
+    result = msgflow("flow", "--slowest", 2, "--to", "/control/cmd")
+    assert result.exit_code == 0
+    assert result.stdout == "\n\n".join(trees) + "\n"
+    assert result.stdout.startswith(f"take {takes[0]}, /control/cmd")
+    forward = msgflow("flow", "--slowest", 1, "--to", "/control/cmd", "--direction", "forward")
+    assert forward.stdout.splitlines()[1:] != result.stdout.splitlines()[1:]
 
 
 def test_a_page_is_written_in_place_of_the_tree(

@@ -171,7 +171,11 @@ def test_the_nearest_column_is_named(database: Database) -> None:
     [
         ("clocks", {"node": "/a"}, "clocks has no column with a node — --node /a"),
         ("info-runs", {"via": "/a"}, "info-runs has no paths — --via /a"),
-        ("e2e-latency", {"slowest": 3}, "the rows of e2e-latency are not slow or fast"),
+        (
+            "e2e-latency",
+            {"slowest": 3},
+            "e2e-latency has no --slowest: its rows have no duration of their own",
+        ),
         ("flows", {"slowest": 3, "limit": 3}, "--slowest N goes without --sort and --limit"),
         ("flows", {"sort": "latency:down"}, "rows are sorted asc or desc — latency:down"),
         ("flows", {"limit": 0}, "--limit is at least 1 — 0"),
