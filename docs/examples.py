@@ -4,8 +4,9 @@
 
 A block that begins with ```console has commands, each behind `$ `, and what they print in a
 terminal of 100 columns. A block ```sql is answered by the block ```text behind it. Blocks that
-begin with ```sh setup run first, and show nothing; pages with the same setup share what it made. A
-test keeps the pages equal to what the commands print.
+begin with ```sh setup run first, and show nothing; pages with the same setup share what it made,
+and a page without one starts from the database of the demo. A test keeps the pages equal to what
+the commands print.
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ import termios
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PAGES = ("why-late.md", "tour.md", "cookbook.md")
+PAGES = ("why-late.md", "tour.md", "cookbook.md", "../README.md")
+# What pages without a setup of their own start from: the database of `make demo`.
+DEMO = """\
+msgflow simulate demo trace
+msgflow ingest trace --clock-sync messages
+"""
 COLUMNS = 100
 SETUP = re.compile(r"^```sh setup\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -87,7 +93,7 @@ def pages(names: tuple[str, ...] = PAGES) -> dict[str, str]:
     with tempfile.TemporaryDirectory() as temporary:
         for name in names:
             text = (HERE / name).read_text("utf-8")
-            setup = "".join(SETUP.findall(text))
+            setup = "".join(SETUP.findall(text)) or DEMO
             if setup not in prepared:
                 prepared[setup] = Path(temporary) / str(len(prepared))
                 prepared[setup].mkdir()

@@ -8,7 +8,7 @@
 -- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
 --     empty them.
 -- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
---     --num-subbuf=8 CHANNEL before the events are enabled (ros2 trace: --subbuffer-size-ust), with
+--     --num-subbuf=4 CHANNEL before the events are enabled (ros2 trace: --subbuffer-size-ust), with
 --     the size given above; or enable fewer events, or write to a faster disk.
 -- grain: one row per trace
 -- severity: error
