@@ -252,13 +252,23 @@ def _shown(text: str) -> str:
     return printable(text, keep="\n\r\t")
 
 
+def _width_of_stderr() -> int:
+    """Return how wide the terminal is that stderr goes to, whatever stdout is."""
+    if os.environ.get("COLUMNS", "").isdigit():
+        return screen_width()
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns or screen_width()
+    except (OSError, ValueError):
+        return screen_width()
+
+
 def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
     """Return the lines of a text that goes to stderr: on a terminal none is wider than it."""
     if sys.stderr is None or not sys.stderr.isatty() or "\n" in text:
         return [text]
     from msgflow.query.wrapping import wrap
 
-    width = screen_width()
+    width = _width_of_stderr()
     if used + cell_len(text) <= width:
         return [text]
     first, *more = wrap(text, width - max(used, len(indent)))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import pty
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -219,6 +223,30 @@ def test_no_line_is_wider_than_the_terminal(
     shown = on_terminal(command(*arguments, *options), width, with_stderr=True).decode()
     assert len(shown.splitlines()) > 1
     assert [line for line in shown.splitlines() if len(line) > width] == []
+
+
+def test_notes_fit_the_terminal_also_where_the_answer_goes_elsewhere(
+    two_hosts_far_apart: Path,
+) -> None:
+    leader, follower = pty.openpty()
+    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+    process = subprocess.Popen(
+        command("query", "e2e-latency", "--db", two_hosts_far_apart),
+        stdout=subprocess.DEVNULL,
+        stderr=follower,
+        env=environment | {"NO_COLOR": "1"},
+    )
+    os.close(follower)
+    said = b""
+    with contextlib.suppress(OSError):
+        while part := os.read(leader, 65536):
+            said += part
+    os.close(leader)
+    assert process.wait(timeout=30) == 0
+    lines = said.decode().splitlines()
+    assert any("not synchronised" in line for line in lines)
+    assert [line for line in lines if len(line) > 60] == []
 
 
 @pytest.fixture(scope="module")
