@@ -19,7 +19,7 @@
 -- column: callback_id BIGINT        Identity of the callback that waited
 -- column: meanwhile_callback_id BIGINT  Identity of the callback that ran
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
--- brief: node, callback, meanwhile_node, meanwhile_callback, worst_ns, share, waits,
+-- brief: node, meanwhile_node, worst_ns, share, callback, meanwhile_callback, waits,
 --     overlap_max_ns, overlap_min_ns, instances
 -- needs: main.executor_wait, main.executor_interference, main.callback_label
 WITH together AS (
