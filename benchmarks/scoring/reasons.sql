@@ -325,11 +325,28 @@ absent AS (
     WHERE s.topic_name IN (FROM shared_topic)
         OR EXISTS (FROM simulated_unrecorded WHERE event LIKE '%\_init' ESCAPE '\')
 ),
--- Stamped while events of the host were lost: what says who sent it may be missing.
+-- Stamped while events of its host, or of another one that publishes on the topic, were lost: what
+-- says who sent it may be missing.
+apart AS (
+    SELECT
+        publication_host, take_host,
+        median(take_rmw_ns - publication_rmw_ns - latency_ns) AS apart_ns
+    FROM simulated_transport
+    WHERE publication_host <> take_host
+    GROUP BY ALL
+),
+possible AS (
+    SELECT publication_id, host, stamped_ns FROM sent
+    UNION
+    SELECT s.publication_id, o.host, s.stamped_ns + a.apart_ns
+    FROM sent AS s
+    JOIN sender AS o ON s.topic_name = o.topic_name
+    JOIN apart AS a ON s.host = a.publication_host AND o.host = a.take_host
+),
 beside_hole AS (
     SELECT t.take_id
     FROM simulated_take AS t
-    JOIN sent AS s ON t.publication_id = s.publication_id
+    JOIN possible AS s ON t.publication_id = s.publication_id
     -- The stamp is of another clock than the hole.
     JOIN truth_hole AS h
         ON s.host = h.host

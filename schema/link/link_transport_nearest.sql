@@ -5,7 +5,7 @@
 -- grain: one row per take whose publication is known by time
 -- param: only_run BIGINT  Run to look at
 -- needs: store.nearest_message, store.take, store.subscription, store.publication,
---     derive.exposed_trace, derive.recording_gap
+--     derive.publication_beside_gap
 CREATE OR REPLACE MACRO derive.link_transport_nearest(only_run) AS TABLE
 WITH received AS (
     SELECT
@@ -20,25 +20,12 @@ WITH received AS (
         PARTITION BY t.subscription_id, t.source_timestamp_ns ORDER BY t.take_id
     ) = 1
 ),
-sent AS (
+sent AS MATERIALIZED (
     SELECT
-        r.run_id, r.take_id, r.subscription_id, r.publication_id, r.candidate_count,
-        b.publisher_id, b.trace_id, b.start_ns,
-        coalesce(b.next_event_ns, b.end_ns + 5000000) AS until_ns
+        r.run_id, r.take_id, r.subscription_id, r.publication_id, r.candidate_count, b.publisher_id
     FROM received AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
     WHERE b.run_id = only_run
-),
-affected AS (
-    SELECT s.take_id
-    FROM (
-        SELECT e.take_id, e.start_ns, e.until_ns, x.recording_id
-        FROM sent AS e
-        JOIN derive.exposed_trace AS x ON e.trace_id = x.trace_id
-    ) AS s
-    ASOF JOIN derive.recording_gap AS g
-        ON s.recording_id = g.recording_id AND s.until_ns >= g.start_ns
-    WHERE g.covered_until_ns >= s.start_ns
 )
 SELECT
     s.run_id,
@@ -48,6 +35,6 @@ SELECT
     s.subscription_id,
     'nearest' AS method,
     s.candidate_count,
-    a.take_id IS NOT NULL AS is_loss_affected
+    a.publication_id IS NOT NULL AS is_loss_affected
 FROM sent AS s
-LEFT JOIN affected AS a ON s.take_id = a.take_id
+LEFT JOIN derive.publication_beside_gap('sent') AS a ON s.publication_id = a.publication_id

@@ -6,12 +6,13 @@
 --     writes for much of the time, or what the thread did next is not known, the delays that are
 --     usual for it bound the search. A message with a publication of several publishers, or one
 --     of two messages that may both be of one publication, or one of a burst where the clock is
---     not known sharply, has none: that would be a guess. Nor has one where the difference of the
+--     not known sharply, or one that was stamped sooner after a publication than is usual, where
+--     another may be lost, has none: that would be a guess. Nor has one where the difference of the
 --     clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock,
---     derive.clock_limit
+--     derive.publication_beside_gap, derive.clock_limit
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
 -- No clock jumps there and back within a stretch: where only one tells nothing it went on.
 WITH observed AS (
@@ -170,9 +171,13 @@ usual AS (
     WHERE w.place = 1 AND w.goes_on
     GROUP BY w.publisher_id
 ),
--- Of a publisher that was never seen to go on, what is usual on its host is expected.
+-- Of a publisher that was never seen to go on, what is usual on its host is expected. What comes
+-- much sooner than nearly all others may be of another publication, if one may be lost.
 usual_of_clock AS (
-    SELECT clock_id, quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns
+    SELECT
+        clock_id,
+        quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns
     FROM within
     WHERE place = 1 AND goes_on
     GROUP BY clock_id
@@ -180,7 +185,8 @@ usual_of_clock AS (
 plausible AS (
     SELECT
         w.publisher_id, w.source_timestamp_ns, w.publication_id, w.place, w.is_crowded,
-        w.place = 2 AND w.delay_ns <= u.usual_ns AS is_rival
+        w.place = 2 AND w.delay_ns <= u.usual_ns AS is_rival,
+        coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false) AS is_hasty
     FROM within AS w
     LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
     LEFT JOIN usual_of_clock AS c ON w.clock_id = c.clock_id
@@ -192,13 +198,21 @@ plausible AS (
         )
     END
 ),
+hasty AS MATERIALIZED (
+    SELECT DISTINCT publication_id FROM plausible WHERE is_hasty
+),
+doubtful AS (
+    FROM derive.publication_beside_gap('hasty')
+),
 matched AS (
     SELECT
         publisher_id, source_timestamp_ns, publication_id, bool_or(is_rivalled) AS is_rivalled
     FROM (
         SELECT
             *,
-            is_crowded OR bool_or(is_rival) OVER (PARTITION BY publication_id) AS is_rivalled
+            is_crowded
+            OR bool_or(is_rival) OVER (PARTITION BY publication_id)
+            OR (is_hasty AND publication_id IN (FROM doubtful)) AS is_rivalled
         FROM plausible
     )
     WHERE place = 1 OR is_rival

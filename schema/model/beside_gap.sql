@@ -1,10 +1,11 @@
 -- name: staging.beside_gap
 -- description: Events of calls with a gap right before or right after them on their thread; the
---     last event of a thread, where a gap of its CPU comes later. What such an event belongs to may
---     have lost a part.
+--     last event of a thread, where a gap of its CPU comes later; its first one, where a gap of its
+--     CPU came before, once its process was there. What such an event belongs to may have lost a
+--     part.
 -- grain: one row per such event and side
 -- needs: staging.callback_gap, staging.predecessor, staging.event, staging.thread,
---     staging.gap, staging.exposed_trace
+--     staging.process, staging.gap, staging.exposed_trace
 WITH last_gap AS (
     SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
     FROM staging.gap
@@ -27,3 +28,14 @@ JOIN last_gap AS g
     ON x.recording_index = g.recording_index
     AND g.cpu_id IN (e.cpu_id, -1)
     AND e.ts_ns <= g.end_ns
+UNION
+SELECT e.event_id, t.thread_id, true
+FROM staging.event AS e
+JOIN staging.thread AS t ON e.event_id = t.first_event_id
+JOIN staging.process AS p ON t.process_id = p.process_id
+JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
+JOIN staging.gap AS g
+    ON x.recording_index = g.recording_index
+    AND g.cpu_id IN (e.cpu_id, -1)
+    AND g.start_ns < e.ts_ns
+    AND g.covered_until_ns >= p.first_seen_ns

@@ -526,6 +526,37 @@ def test_a_callback_with_the_rest_of_its_take(system: RosSystem, analyse: Analys
     ) == [("callback_only", True, "receiver_gap"), ("callback_only", False, "no_stamp")]
 
 
+@pytest.mark.parametrize("cpu", [0, 1])
+def test_a_thread_that_is_first_seen_behind_a_gap(
+    system: RosSystem, analyse: Analyse, cpu: int
+) -> None:
+    """The layer with the stamp is lost, if its CPU lost anything; a later take has all."""
+    thread = Thread(100, cpu=cpu)
+    system.add_packet(0, 100, lost_packets=0)
+    system.add_packet(0, 5_000, cpu=1)
+    system.add_packet(1_010, 5_000, lost_packets=2)
+    system.add("ros2:rcl_take", thread, ts=1_010, message=0xB)
+    system.add("ros2:rclcpp_take", thread, message=0xB)
+    system.take(thread, 0x30, 1)
+    model = analyse(system)
+    is_lost = cpu == 0
+    assert model.rows(
+        "SELECT t.is_loss_affected, o.reason FROM take AS t JOIN stat_orphan AS o USING (take_id) "
+        "ORDER BY taken_ns"
+    ) == [(is_lost, "receiver_gap" if is_lost else "no_stamp"), (False, "publisher_not_traced")]
+
+
+def test_a_thread_that_began_behind_a_gap(system: RosSystem, analyse: Analyse) -> None:
+    """Its process did: nothing of it is lost."""
+    system.add_packet(0, 100, lost_packets=0)
+    system.add_packet(600, 5_000, lost_packets=2)
+    system.add("ros2:callback_end", Thread(100), ts=50, callback=0xC1)
+    system.add("ros2:rcl_init", Thread(200), ts=1_000, context_handle=0x1, version="4.1.1")
+    system.add("ros2:rcl_take", Thread(200, 201), ts=1_010, message=0xB)
+    system.add("ros2:rclcpp_take", Thread(200, 201), message=0xB)
+    assert analyse(system).column("SELECT is_loss_affected FROM take") == [False]
+
+
 def test_links_of_a_run_that_meets_a_gap_are_marked(system: RosSystem, analyse: Analyse) -> None:
     thread = Thread(100)
     system.publisher(thread, 0x10, "/a")

@@ -17,6 +17,7 @@ RULES = (
     "sharp_difference",
     "stamp_pair",
     "stamp_clock",
+    "publication_beside_gap",
     "nearest_message",
 )
 # What the rules look at, without the store that it is told from.
@@ -31,6 +32,13 @@ CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
     message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);
+CREATE TABLE derive.exposed_trace (trace_id BIGINT, recording_id BIGINT);
+INSERT INTO derive.exposed_trace VALUES (1, 7);
+CREATE TABLE derive.recording_gap (recording_id BIGINT DEFAULT 7, start_ns BIGINT,
+    covered_until_ns BIGINT);
+CREATE VIEW store.publication AS
+    SELECT publication_id, 1 AS trace_id, written_ns AS start_ns, written_ns AS end_ns,
+        next_event_ns FROM published;
 CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHERE run_id = only_run;
 CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
 """

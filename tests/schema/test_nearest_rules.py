@@ -202,6 +202,53 @@ def test_two_messages_of_one_publication(
     assert time + delay + 1 not in found
 
 
+def lose(con: duckdb.DuckDBPyConnection, start: int, end: int) -> None:
+    con.execute(
+        "INSERT INTO derive.recording_gap (start_ns, covered_until_ns) VALUES (?, ?)", [start, end]
+    )
+
+
+@pytest.mark.parametrize(("delay", "is_told"), [(5_000, True), (4_999, False)])
+def test_what_is_stamped_much_sooner_than_usual_may_be_of_a_lost_publication(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_told: bool
+) -> None:
+    """1 of 100 delays is shorter than 10 µs. Where nothing is lost, there is no other."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [5_500] + [10_000] * 199, MILLISECOND)
+    publish(rules, 999, time, time + MILLISECOND)
+    take(rules, time + delay)
+    assert nearest(rules)[time + delay] == (999, 1)
+    lose(rules, time - 1, time)
+    assert nearest(rules)[time + delay] == (999 if is_told else None, 1)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "next_event", "is_told"),
+    [
+        pytest.param(-9, -1, MILLISECOND, True, id="before"),
+        pytest.param(-9, 0, MILLISECOND, False, id="as_it_begins"),
+        pytest.param(MILLISECOND, 9 * MILLISECOND, MILLISECOND, False, id="as_the_thread_goes_on"),
+        pytest.param(MILLISECOND + 1, 9 * MILLISECOND, MILLISECOND, True, id="behind"),
+        pytest.param(5 * MILLISECOND, 9 * MILLISECOND, None, False, id="while_it_may_write"),
+        pytest.param(5 * MILLISECOND + 1, 9 * MILLISECOND, None, True, id="once_it_is_written"),
+    ],
+)
+def test_if_there_is_a_gap_beside_it(
+    rules: duckdb.DuckDBPyConnection,
+    start: int,
+    end: int,
+    next_event: int | None,
+    *,
+    is_told: bool,
+) -> None:
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [10_000] * 200, MILLISECOND)
+    publish(rules, 999, time, None if next_event is None else time + next_event)
+    take(rules, time + 1_000)
+    lose(rules, time + start, time + end)
+    assert nearest(rules)[time + 1_000] == (999 if is_told else None, 1)
+
+
 @pytest.mark.parametrize(("matched", "is_known"), [(5, True), (4, False)])
 def test_a_difference_of_the_clocks_explains_half_of_a_topic(
     rules: duckdb.DuckDBPyConnection, matched: int, *, is_known: bool

@@ -291,6 +291,24 @@ def test_a_sender_whose_publications_have_no_stamps(
 
 
 @pytest.mark.parametrize(
+    ("end", "stamp", "expected"),
+    [
+        (STAMP + MS - 1, "NULL", "publisher_trace_ends"),
+        (STAMP + MS, "NULL", "unknown"),
+        (STAMP, "7", "publisher_not_traced"),
+    ],
+)
+def test_who_publishes_without_stamps_may_have_ended_within_a_millisecond(
+    con: duckdb.DuckDBPyConnection, end: int, stamp: str, expected: str
+) -> None:
+    published = (
+        f"INSERT INTO store.publication (publication_id, source_timestamp_ns) VALUES (1, {stamp})"
+    )
+    assert reason(con, TAKE, SENDER, RECORDED, seen_until(end), published) == expected
+    assert reason(con, "INSERT INTO rival VALUES (1)") == "ambiguous"
+
+
+@pytest.mark.parametrize(
     ("since", "expected"),
     [(STAMP, "publisher_gap"), (STAMP + 1, "publisher_not_traced"), (0, "publisher_gap")],
 )
