@@ -113,10 +113,7 @@ sent AS (
         s.is_stampless,
         o.stamp_ns + coalesce(h.shift_ns, 0) AS at_ns,
         o.stamp_ns + coalesce(h.shift_ns, 0) + derive.delivery_limit().stamp_slack_ns AS until_ns,
-        -- Of who publishes without stamps it is known to the slack only when this one was.
-        o.stamp_ns + coalesce(h.shift_ns, 0)
-        + CASE WHEN s.is_stampless THEN derive.delivery_limit().stamp_slack_ns ELSE 0 END
-            AS ended_by_ns
+        o.stamp_ns + coalesce(h.greatest_shift_ns, 0) AS latest_ns
     FROM orphan AS o
     JOIN sender AS s ON o.topic_name IS NOT DISTINCT FROM s.topic_name
     ASOF LEFT JOIN (SELECT * FROM derive.stamp_shift WHERE run_id = of_run) AS h
@@ -141,14 +138,10 @@ judged AS (
             )
         ) AS has_gap,
         coalesce(
-            bool_and(s.last_seen_ns < s.at_ns) FILTER (WHERE s.is_known),
-            bool_and(s.last_seen_ns < s.at_ns)
+            bool_and(s.last_seen_ns < s.latest_ns) FILTER (WHERE s.is_known),
+            bool_and(s.last_seen_ns < s.latest_ns)
         ) AS has_none_left,
-        coalesce(
-            bool_and(s.last_seen_ns < s.ended_by_ns) FILTER (WHERE s.is_known),
-            bool_and(s.last_seen_ns < s.ended_by_ns)
-        ) AS may_have_none_left,
-        bool_or(s.last_seen_ns < s.at_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
+        bool_or(s.last_seen_ns < s.latest_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
         bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless
     FROM sent AS s
     ASOF LEFT JOIN gap AS g ON s.process_id = g.process_id AND s.until_ns >= g.start_ns
@@ -216,7 +209,6 @@ SELECT
             FROM store.nearest_message
             WHERE run_id = of_run AND publication_id IS NULL
         ) THEN 'ambiguous'
-        WHEN j.may_have_none_left THEN 'publisher_trace_ends'
         WHEN o.take_id IN (SELECT take_id FROM replaced) THEN 'receiver_gap'
         WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)
             THEN 'publisher_not_traced'

@@ -1,7 +1,8 @@
 -- name: derive.stamp_shift
 -- description: What to add to a stamp made on a host to get the time of its trace: stamps are of
---     the clock that can be set, which traces do not follow. The least difference between the
---     publication's layers and its stamp in ten seconds; holds from the stamp `from_ns` on.
+--     the clock that can be set, which traces do not follow. The least and the greatest difference
+--     between the publication's layers and its stamp in ten seconds: when its events were at the
+--     earliest and at the latest. Hold from the stamp `from_ns` on.
 -- grain: one row per host and ten seconds
 -- needs: store.link_transport, store.publication, store.take, store.process
 WITH difference AS (
@@ -9,7 +10,8 @@ WITH difference AS (
         l.run_id,
         p.host_id,
         t.source_timestamp_ns // 10_000_000_000 AS bucket,
-        min(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS shift_ns
+        min(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS shift_ns,
+        max(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS greatest_shift_ns
     FROM store.link_transport AS l
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     JOIN store.take AS t ON l.take_id = t.take_id
@@ -25,5 +27,6 @@ SELECT
             THEN bucket * 10_000_000_000
         ELSE 0
     END AS from_ns,
-    shift_ns
+    shift_ns,
+    greatest_shift_ns
 FROM difference

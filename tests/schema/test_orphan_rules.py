@@ -37,7 +37,7 @@ CREATE TABLE store.trace (run_id BIGINT DEFAULT 1, domain VARCHAR, start_ns BIGI
 CREATE TABLE store.nearest_message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT DEFAULT {STAMP}, publication_id BIGINT);
 CREATE TABLE derive.stamp_shift (run_id BIGINT DEFAULT 1, host_id BIGINT DEFAULT 1, from_ns BIGINT,
-    shift_ns BIGINT);
+    shift_ns BIGINT, greatest_shift_ns BIGINT);
 CREATE TABLE derive.process_presence (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
     begin_ns BIGINT DEFAULT {100 * MS}, recorded_from_ns BIGINT DEFAULT {100 * MS});
 CREATE TABLE missed (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
@@ -291,21 +291,35 @@ def test_a_sender_whose_publications_have_no_stamps(
 
 
 @pytest.mark.parametrize(
-    ("end", "stamp", "expected"),
-    [
-        (STAMP + MS - 1, "NULL", "publisher_trace_ends"),
-        (STAMP + MS, "NULL", "unknown"),
-        (STAMP, "7", "publisher_not_traced"),
-    ],
+    ("end", "expected"),
+    [(STAMP + 9_999, "publisher_trace_ends"), (STAMP + 10_000, "publisher_not_traced")],
 )
-def test_who_publishes_without_stamps_may_have_ended_within_a_millisecond(
-    con: duckdb.DuckDBPyConnection, end: int, stamp: str, expected: str
+def test_a_message_is_stamped_a_while_before_or_behind_its_publication(
+    con: duckdb.DuckDBPyConnection, end: int, expected: str
 ) -> None:
-    published = (
-        f"INSERT INTO store.publication (publication_id, source_timestamp_ns) VALUES (1, {stamp})"
+    """At the latest 10 µs before it: then nothing of its sender was left."""
+    shift = (
+        "INSERT INTO derive.stamp_shift (from_ns, shift_ns, greatest_shift_ns) "
+        "VALUES (0, -90000, 10000)"
     )
-    assert reason(con, TAKE, SENDER, RECORDED, seen_until(end), published) == expected
-    assert reason(con, "INSERT INTO rival VALUES (1)") == "ambiguous"
+    assert reason(con, TAKE, SENDER, RECORDED, shift, seen_until(end)) == expected
+
+
+@pytest.mark.parametrize(
+    ("end", "expected"), [(STAMP + 9_999, "unknown"), (STAMP + 10_000, "publisher_not_traced")]
+)
+def test_which_of_two_senders_was_left_then(
+    con: duckdb.DuckDBPyConnection, end: int, expected: str
+) -> None:
+    shift = (
+        "INSERT INTO derive.stamp_shift (from_ns, shift_ns, greatest_shift_ns) "
+        "VALUES (0, -90000, 10000)"
+    )
+    found = reason(
+        con, TAKE, SENDER, RECORDED, OTHER.format("'/a'"), shift, seen_until(end, 2),
+        recorded(2, 100 * MS, 100 * MS),
+    )  # fmt: skip
+    assert found == expected
 
 
 @pytest.mark.parametrize(
