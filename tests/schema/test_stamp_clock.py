@@ -57,6 +57,69 @@ def test_difference_and_drift_of_each_stretch(rules: duckdb.DuckDBPyConnection, 
         assert segment == 0
 
 
+@pytest.mark.parametrize(
+    ("seconds", "count", "stretches"),
+    [
+        pytest.param(2, 400, 8, id="a_short_recording_has_eight"),
+        pytest.param(20, 1_200, 39, id="half_a_second_each"),
+        pytest.param(20, 120, 10, id="with_twelve_messages_or_more"),
+        pytest.param(1_000, 12_000, 600, id="and_never_more_than_600"),
+    ],
+)
+def test_how_many_stretches_a_recording_has(
+    rules: duckdb.DuckDBPyConnection, seconds: int, count: int, stretches: int
+) -> None:
+    period = seconds * SECOND // count
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) "
+        "SELECT n, n * $period, n * $period + 2000 FROM range($count) AS r(n)",
+        {"period": period, "count": count},
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns) "
+        "SELECT written_ns + 500, written_ns + 200000 FROM published"
+    )
+    rows = rules.execute("SELECT DISTINCT stretch_ns FROM derive.stamp_pair(1)").fetchall()
+    assert rows == [(1 + (count - 1) * period // stretches,)]
+
+
+@pytest.mark.parametrize(("clock", "count"), [(1, 49 + 25), (2, 49)])
+def test_which_publications_a_message_may_be_of(
+    rules: duckdb.DuckDBPyConnection, clock: int, count: int
+) -> None:
+    """24 on either side of its stamp; and 24 before it was taken, if by the same clock."""
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) "
+        "SELECT n, n * 1000000, n * 1000000 + 2000 FROM range(200) AS r(n)"
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns, clock_id) "
+        "VALUES (100000500, 180200000, ?)",
+        [clock],
+    )
+    rows = rules.execute("SELECT count(DISTINCT written_ns) FROM derive.stamp_pair(1)").fetchall()
+    assert rows == [(count,)]
+
+
+@pytest.mark.parametrize(
+    ("least", "greatest", "difference"), [(0, 6_000, 3_000), (0, 8_002, 4_002), (0, 90_000, 86_000)]
+)
+def test_where_few_differences_are_left_the_middle_one_else_one_near_the_greatest(
+    rules: duckdb.DuckDBPyConnection, least: int, greatest: int, difference: int
+) -> None:
+    """The shortest delay is known to 4 µs."""
+    rules.execute(
+        "CREATE TABLE allowed AS SELECT 1 AS clock_id, 0 AS stretch, ?::BIGINT AS least_ns, "
+        "?::BIGINT AS greatest_ns FROM range(10)",
+        [least, greatest],
+    )
+    rows = rules.execute(
+        "SELECT difference_ns, least_ns, greatest_ns, vote_count "
+        "FROM derive.agreed_difference('allowed')"
+    ).fetchall()
+    assert rows == [(difference, least, greatest, 10)]
+
+
 def test_no_drift_of_one_stretch(rules: duckdb.DuckDBPyConnection) -> None:
     """Twelve messages are one stretch, in which no drift shows; twice as many are two."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=12)
