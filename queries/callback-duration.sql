@@ -21,7 +21,7 @@
 -- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, count, median_ns, p95_ns, max_ns, period_median_ns, p99_ns, mean_ns
+-- brief: node, callback, median_ns, max_ns, p95_ns, count, period_median_ns, p99_ns, mean_ns
 -- needs: main.callback_instance, main.callback, main.callback_label
 WITH instance AS (
     SELECT

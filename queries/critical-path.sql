@@ -41,7 +41,7 @@
 --     that message's own flow; 'rest': pieces too short for a line of their own
 -- column: node VARCHAR [node]      Node that did it, or that waited
 -- column: what VARCHAR             The callback, or the topic of the message
--- column: share DOUBLE             Part of the latency, rounded to 4 places
+-- column: share DOUBLE [share]     Part of the latency, rounded to 4 places
 -- column: pieces BIGINT            Number of pieces in the row
 -- column: is_certain BOOLEAN       For 'executor_busy' and 'blocked': what waited was ready by
 --     then; no: it may have arrived during this piece

@@ -17,7 +17,7 @@
 -- column: execute_ns BIGINT [ns]    Executing, including taking messages
 -- column: callback_ns BIGINT [ns]   In callbacks with an end; nested time counts once
 -- column: callbacks BIGINT          Callbacks that began
--- column: callback_share DOUBLE     Callback time divided by time seen, 0 to 1
+-- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
 -- column: executor_id BIGINT        Identity of the executor
 -- column: thread_id BIGINT          Identity of the thread
 -- brief: process, tid, callback_share, callback_ns, callbacks, host, execute_ns, wait_ns, seen_ns,

@@ -15,7 +15,7 @@
 -- column: overlap_min_ns BIGINT [ns]  How long it ran during waits, at least
 -- column: overlap_max_ns BIGINT [ns]  How long it ran during waits, at most
 -- column: worst_ns BIGINT [ns]      Longest time that it ran during one wait
--- column: share DOUBLE              Share of all that ran while the callback waited, 0 to 1
+-- column: share DOUBLE [share]      Share of all that ran while the callback waited, 0 to 1
 -- column: callback_id BIGINT        Identity of the callback that waited
 -- column: meanwhile_callback_id BIGINT  Identity of the callback that ran
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS

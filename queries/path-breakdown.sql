@@ -36,11 +36,11 @@
 -- column: mean_ns BIGINT [ns]      Mean duration
 -- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
 -- column: max_ns BIGINT [ns]       Longest duration
--- column: share DOUBLE             Part of the latency of all flows of the path, rounded to 4
+-- column: share DOUBLE [share]     Part of the latency of all flows of the path, rounded to 4
 --     places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to the sum of latencies
 -- column: path VARCHAR [path]  Nodes and topics
--- brief: path, hop, part, node, what, median_ns, share, p95_ns, max_ns, mean_ns, flows, total_ns,
+-- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
 -- note: clocks
 -- needs: main.end_to_end_part, main.executor_wait, main.flow_path, main.callback_instance,

@@ -27,7 +27,7 @@
 -- column: lateness_p95_ns BIGINT [ns]  95 % of the calls were at most this late
 -- column: lateness_p99_ns BIGINT [ns]  99 % of the calls were at most this late
 -- column: lateness_max_ns BIGINT [ns]  Greatest lateness
--- column: busy_share DOUBLE         Share of all lateness for which the executor was busy with
+-- column: busy_share DOUBLE [share] Share of all lateness for which the executor was busy with
 --     callbacks, 0 to 1
 -- column: meanwhile VARCHAR         What ran in that time: the three with the largest share, with
 --     their node if it is another one

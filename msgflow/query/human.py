@@ -12,6 +12,7 @@ _BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")
 
 NULL = "-"
 DURATION = "ns"
+SHARE = "share"
 MOMENT = "epoch ns"
 
 
@@ -35,7 +36,8 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
 
     Args:
         value: as Arrow gives it to Python.
-        unit: of the column, 'ns' for durations and 'epoch ns' for points in time.
+        unit: of the column, 'ns' for durations, 'epoch ns' for points in time, 'share' for parts
+            of 1.
         is_handle: an address, shown in hexadecimal.
     """
     value = plain(value)
@@ -81,7 +83,9 @@ def _number(value: float, unit: str | None, is_handle: bool) -> str:
         if unit == MOMENT:
             return format_epoch(value)
         return f"0x{value:x}" if is_handle else str(value)
-    if value == 0 or abs(value) >= 0.001:
+    if unit == SHARE and 0 < value < 0.0005:
+        return "<0.001"
+    if value == 0 or abs(value) >= 0.001 or unit == SHARE:
         return f"{value:.3f}"
     return f"{value:.3g}"
 

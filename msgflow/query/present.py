@@ -18,6 +18,8 @@ from msgflow.query.human import MOMENT, NULL, format_cell, short_symbol, shown_n
 from msgflow.query.wrapping import ARROW, longest_piece, longest_word
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pyarrow as pa
 
     from msgflow.query.result import QueryResult
@@ -116,7 +118,10 @@ def present(
     notes = []
     if first.num_rows < len(result):
         notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
-    shown = columns if keeps_all else _that_fit(result, columns, width)
+    if not keeps_all:
+        shown = _that_fit(result, columns, width)
+    else:
+        shown = columns if _least(columns) <= width else _broken(columns)
     names = {column.name for column in shown}
     left_out = [column for column in columns if column.name not in names]
     is_table = _least(shown) <= width and not (left_out and first.num_rows == 1)
@@ -286,11 +291,15 @@ def _with_headings(
 
 
 def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[ShownColumn]:
-    brief = () if result.header is None else result.header.brief
+    """Return the columns, the most important first; what a note can say of all rows comes last."""
+    header = result.header
+    brief = () if header is None else header.brief
+    kept = {PATH, RUN, *brief[:_WANTED], *(() if header is None else header.answer)}
     places = {name: place for place, name in enumerate(dict.fromkeys((PATH, RUN, *brief)))}
     return sorted(
         columns,
         key=lambda column: (
+            column.name not in kept and _is_alike(column),
             places.get(column.name, len(places)),
             column.name.endswith(("_id", "_handle")),
         ),
@@ -304,14 +313,23 @@ def _that_fit(result: QueryResult, columns: list[ShownColumn], width: int) -> li
     ranked = _by_importance(result, columns)
     chosen = _greedy(ranked, width)
     if any(column not in chosen for column in ranked[:_WANTED]):
-        ranked = [replace(column, least=column.broken) for column in ranked]
-        chosen = _greedy(ranked, width)
+        # Names are broken for the columns that are wanted, and for no other.
+        wanted = {column.name for column in _greedy(_broken(ranked[:_WANTED]), width)}
+        first = [column for column in ranked if column.name in wanted]
+        rest = [column for column in ranked if column.name not in wanted]
+        chosen = _greedy(rest, width, first) if _least(first) <= width else _broken(first)
     by_name = {column.name: column for column in chosen}
     return [by_name[column.name] for column in columns if column.name in by_name]
 
 
-def _greedy(ranked: list[ShownColumn], width: int) -> list[ShownColumn]:
-    chosen: list[ShownColumn] = []
+def _broken(columns: list[ShownColumn]) -> list[ShownColumn]:
+    return [replace(column, least=column.broken) for column in columns]
+
+
+def _greedy(
+    ranked: list[ShownColumn], width: int, first: Sequence[ShownColumn] = ()
+) -> list[ShownColumn]:
+    chosen = list(first)
     for column in ranked:
         if _least([*chosen, column]) <= width:
             chosen.append(column)
@@ -335,13 +353,14 @@ def _widths(columns: list[ShownColumn], width: int) -> list[int]:
     return widths
 
 
+def _is_alike(column: ShownColumn) -> bool:
+    """Tell whether a note can say what stands in all rows."""
+    return len(column.cells) > 1 and len(set(column.cells)) == 1 and column.width <= _WORD
+
+
 def _of_columns_left_out(columns: list[ShownColumn], remedy: str) -> list[str]:
     """Say which columns have no place, and what stands in those that are alike in all rows."""
-    alike = [
-        column
-        for column in columns
-        if len(column.cells) > 1 and len(set(column.cells)) == 1 and column.width <= _WORD
-    ]
+    alike = [column for column in columns if _is_alike(column)]
     others = [column.title for column in columns if column not in alike]
     notes = []
     if alike:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from msgflow.query.present import Presentation, ShownColumn
 
-# A path that begins as the one before is cut, where that spares so many steps.
+# A path that begins or ends as one above is cut, where that spares more than so many steps.
 _SPARED = 4
 
 
@@ -68,18 +68,44 @@ def _records(columns: Sequence[ShownColumn], width: int) -> Iterator[str]:
 def _paths(paths: Sequence[str], width: int) -> Iterator[str]:
     labels = ["path"] if len(paths) == 1 else [f"path {n + 1}" for n in range(len(paths))]
     indent = max(map(len, labels)) + GAP
-    before: list[str] = []
-    for number, (label, path) in enumerate(zip(labels, paths, strict=True)):
+    before: list[list[str]] = []
+    for label, path in zip(labels, paths, strict=True):
         steps = path.split(ARROW)
-        shared = _shared(before, steps)
-        text = path
-        if shared > _SPARED:
-            text = f"(as {number} to {steps[shared - 1]})" + "".join(
-                ARROW + step for step in steps[shared:]
-            )
+        text = _shortened(steps, before)
         for place, line in enumerate(wrap_path(text, max(20, width - indent))):
             yield f"{'' if place else label:<{indent}}{line}"
-        before = steps
+        before.append(steps)
+
+
+def _shortened(steps: list[str], before: Sequence[list[str]]) -> str:
+    """Return a path without what it begins and ends with as one before it does."""
+    head, first = _most_shared(steps, before)
+    tail, last = _most_shared(steps[head:], before, is_end=True)
+    parts = steps[head : len(steps) - tail]
+    if head:
+        parts = [f"(as {first} to {steps[head - 1]})", *parts]
+    if tail:
+        parts = [*parts, f"(as {last} from {steps[-tail]})"]
+    return ARROW.join(parts)
+
+
+def _most_shared(
+    steps: list[str], before: Sequence[list[str]], *, is_end: bool = False
+) -> tuple[int, int]:
+    """Return how many steps another path begins or ends with too, at most, and its number.
+
+    0 where that spares too little.
+    """
+    most, of = 0, 0
+    for number, other in enumerate(before, start=1):
+        one, two = (steps[::-1], other[::-1]) if is_end else (steps, other)
+        count = _shared(one, two)
+        # A topic may be called as its node: where to cut is clear only behind both.
+        while 0 < count < len(two) and two[count] == two[count - 1]:
+            count -= 1
+        if count > max(most, _SPARED):
+            most, of = count, number
+    return most, of
 
 
 def _shared(left: Sequence[str], right: Sequence[str]) -> int:

@@ -7,17 +7,22 @@ import re
 from rich.cells import cell_len, set_cell_size
 
 ARROW = " → "
+# Where a text may be broken: at a space, but for that between a number and its unit.
+_SPACE = re.compile(r"(?<!\d) | (?!(?:ns|µs|ms|s|Hz|%|ppb)(?!\w))")
 # Where a name may be broken: behind a parenthesis, before a slash.
 _PIECE = re.compile(r"[/(]?[^/(]*\(?")
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Return `text` in lines of at most `width` cells, broken at spaces, else within names."""
+    """Return `text` in lines of at most `width` cells, broken at spaces, else within names.
+
+    A number stays with its unit.
+    """
     if cell_len(text) <= width:
         return [text]
     lines: list[str] = []
     line = ""
-    for word in text.split(" "):
+    for word in words(text):
         together = f"{line} {word}" if line else word
         if cell_len(together) <= width:
             line = together
@@ -45,18 +50,27 @@ def wrap_path(path: str, width: int) -> list[str]:
     return [part for one in (*lines, line) for part in wrap(one, width)]
 
 
+def words(text: str) -> list[str]:
+    """Return what of `text` stays together: its words, and a number with its unit."""
+    return _SPACE.split(text)
+
+
 def longest_word(text: str) -> int:
     """Return how many cells the longest word of `text` takes."""
-    return max(map(cell_len, text.split(" ")))
+    return max(map(cell_len, words(text)))
 
 
 def longest_piece(text: str) -> int:
     """Return how many cells the longest part of a name in `text` takes."""
-    return max(cell_len(piece) for word in text.split(" ") for piece in _PIECE.findall(word))
+    return max(cell_len(piece) for word in words(text) for piece in _PIECE.findall(word))
 
 
 def _head(word: str, width: int) -> str:
     """Return the longest beginning of a word that fits, if need be one character too wide."""
+    # The name in parentheses stays whole where it can: people copy it.
+    outer, bracket, inner = word.partition("(")
+    if bracket and cell_len(inner) <= width and cell_len(outer) < width:
+        return outer + bracket
     head = ""
     for piece in _PIECE.findall(word):
         if cell_len(head + piece) > width:

@@ -93,8 +93,20 @@ FINDING = [
         "detail": "x" * 130 + " y",
     }
 ]
+LIDAR = (
+    "/front → /front → /filter → /filter → /fusion → /fusion → /ground → /ground → /planner"
+    " → /planner → /control → /control → /vehicle → /vehicle → /wheels"
+)
+# Nodes that publish topics of their own names, as in the Autoware reference system.
+ALIKE = [
+    latency(LIDAR, 332_613_000),
+    latency(LIDAR.replace(" → /control → /control", ""), 332_613_000),
+    latency(LIDAR.replace("/ground", "/voxels"), 432_662_000),
+    latency(LIDAR.replace("/front", "/rear"), 307_238_000),
+]
 CASES = {
     "paths": result_of("e2e-latency", LATENCIES),
+    "alike_paths": result_of("e2e-latency", ALIKE),
     "one_path": result_of("e2e-latency", LATENCIES[1:2]),
     "waits": result_of("waits", WAITS),
     "runs": result_of(
@@ -212,6 +224,51 @@ def test_columns_that_somebody_chose_are_all_shown() -> None:
     narrow = present(CASES["paths"], 60, is_chosen=True)
     assert narrow.widths is None
     assert len(narrow.columns) == len(CASES["paths"].columns)
+
+
+def callbacks(*nodes: str) -> QueryResult:
+    return result_of(
+        "callback-duration",
+        [
+            {
+                "node": node, "callback": f"Subscription({node}/topic)", "count": 299,
+                "median_ns": 800_000, "p95_ns": 900_000 + place, "max_ns": 950_000,
+                "min_ns": 700_000, "p99_ns": 940_000, "mean_ns": 800_001,
+            }
+            for place, node in enumerate(nodes)
+        ],
+    )  # fmt: skip
+
+
+def titles_of(result: QueryResult, width: int) -> list[str]:
+    return [column.title for column in present(result, width).columns]
+
+
+def test_names_are_broken_for_the_six_most_important_columns_alone() -> None:
+    long = callbacks("/localization/state_estimator", "/perception/ground_filter")
+    # Whole names leave room for four of them, and broken ones for all.
+    assert titles_of(long, 84) == ["node", "callback", "count", "median", "p95", "max"]
+    # A seventh would have room as well, if names were broken for it.
+    assert titles_of(long, 100) == ["node", "callback", "count", "median", "p95", "max"]
+    assert "p99" in titles_of(callbacks("/a", "/b"), 100)
+
+
+def test_what_a_note_says_of_all_rows_takes_no_room_from_the_rest() -> None:
+    rows = [latency(SHORT, 13_035_000), latency(CAMERA, 21_070_000)]
+    shown = present(result_of("e2e-latency", rows), 100)
+    titles = [column.title for column in shown.columns]
+    assert {"min", "mean", "p99"} <= set(titles)
+    assert "cut_by_recording" not in titles
+    assert any("cut_by_recording 2" in note for note in shown.notes)
+    # Of the most important columns it is an answer that they are alike.
+    assert {"roots", "reached"} <= set(titles)
+
+
+def test_plain_sql_is_a_table_where_broken_names_make_it_one() -> None:
+    label = "Service(/camera/driver/get_parameter_types_atomically)"
+    table = pa.table({"id": [1, 2], "node": ["/camera/driver"] * 2, "label": [label] * 2})
+    assert present(QueryResult(table), 60).widths is not None
+    assert present(QueryResult(table), 40).widths is None
 
 
 def test_plain_sql_keeps_every_column() -> None:
