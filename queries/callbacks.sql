@@ -23,7 +23,7 @@
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- slowest: duration_ns
--- brief: duration_ns, node, callback, start_ns, published, take_id, tid, callback_instance_id,
+-- brief: duration_ns, node, callback, start_ns, take_id, published, tid, callback_instance_id,
 --     process, host
 -- needs: main.callback_instance, main.callback_label, main.link_causal, main.publication,
 --     main.publisher, main.process, main.thread, main.host

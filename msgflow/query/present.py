@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import dataclass, replace
+from functools import cache
+from itertools import permutations
 from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
 from msgflow.query.human import MOMENT, NULL, format_cell, short_symbol, shown_name
-from msgflow.query.wrapping import ARROW, longest_piece, longest_word
+from msgflow.query.wrapping import ARROW, longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     import pyarrow as pa
 
@@ -37,7 +39,7 @@ _ESSENTIAL = 3
 _WANTED = 6
 # Text is not made narrower than so many cells, nor into more lines than that; of plain SQL, which
 # does not say what is important, into more.
-_NARROW = 18
+_NARROW = 16
 _WORD = 40
 _LINES = 4
 _LINES_OF_SQL = 10
@@ -341,16 +343,47 @@ def _least(columns: list[ShownColumn]) -> int:
 
 
 def _widths(columns: list[ShownColumn], width: int) -> list[int]:
-    """Return the widths of columns that fit: the widest are made narrower first."""
+    """Return the widths of columns that fit, so that the rows take few lines."""
     widths = [column.width for column in columns]
     free = width - GAP * (len(columns) - 1)
+    if sum(widths) <= free:
+        return widths
+    # The widest are made narrower first; then what one does not need goes to another.
     while sum(widths) > free:
         widest = max(
             (place for place, column in enumerate(columns) if widths[place] > column.least),
             key=lambda place: widths[place],
         )
         widths[widest] -= 1
+    return _balanced(columns, widths)
+
+
+def _balanced(columns: list[ShownColumn], widths: list[int]) -> list[int]:
+    """Return widths of the same sum with which the rows take fewer lines, if there are any."""
+    texts = [place for place, column in enumerate(columns) if not column.is_number]
+    heights = [_heights(columns[place]) for place in range(len(columns))]
+
+    def lines(tried: list[int]) -> int:
+        return sum(map(max, zip(*(heights[place](tried[place]) for place in texts), strict=True)))
+
+    best = lines(widths)
+    improves = len(texts) > 1
+    while improves:
+        improves = False
+        for giver, taker in permutations(texts, 2):
+            for cells in range(1, widths[giver] - columns[giver].least + 1):
+                tried = list(widths)
+                tried[giver] -= cells
+                tried[taker] += cells
+                if tried[taker] <= columns[taker].width and (count := lines(tried)) < best:
+                    best, widths, improves = count, tried, True
+                    break
     return widths
+
+
+def _heights(column: ShownColumn) -> Callable[[int], list[int]]:
+    """Return a function: in how many lines each of the first cells is at a width."""
+    return cache(lambda width: [len(wrap(cell, width)) for cell in column.cells[:MOST_ROWS]])
 
 
 def _is_alike(column: ShownColumn) -> bool:
