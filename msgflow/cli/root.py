@@ -18,7 +18,7 @@ from msgflow.cli.completion import is_completing, take_as_typed
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.stop import STOP
 from msgflow.cli.tilde import with_home
-from msgflow.errors import ExitCode, MsgflowError
+from msgflow.errors import ExitCode, MsgflowError, UsageError
 from msgflow.query.interrupt import Terminated
 from msgflow.version import __version__
 
@@ -114,6 +114,14 @@ class RootGroup(TyperGroup):
             if is_completing():
                 return ExitCode.OK
             return _code_with_words(error)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that is named; a query is none, but what was meant is clear."""
+        from msgflow.query.catalogue import query_names
+
+        if args[0] not in COMMANDS and args[0] in query_names():
+            raise UsageError(f"there is no such command — {args[0]}", f"msgflow query {args[0]}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; a reader that went away (`… | head`) ends it quietly."""

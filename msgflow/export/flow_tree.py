@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -13,6 +14,7 @@ from rich.tree import Tree
 from msgflow.export.flow_layout import lay_out_flow, walk
 from msgflow.query.human import format_cell, format_duration, short_symbol
 from msgflow.query.window import format_epoch
+from msgflow.query.wrapping import words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 60
 _INDENT = 4
+_GAP = 2
+# Stands for a space at which no line is broken: no name has it, since it is not printable.
+_BOUND = "\ue000"
 # Links that say something of the effect, whichever way the flow is drawn, or nothing at all.
 _OF_EFFECT = ("transport", "service", "callback", "direct")
 # Reasons with which a message may have been taken all the same: of the status 'unknown'.
@@ -58,12 +63,13 @@ def tree_text(
         color: with escape sequences for colours.
     """
     branches = lay_out_flow(flow)
-    painter = _Painter(flow, branches, is_absolute)
     stream = io.StringIO()
-    deepest = max(branch.depth for branch in walk(branches))
+    deepest = _INDENT * max(branch.depth for branch in walk(branches))
+    cells = _UNBOUNDED if width is None else max(width, deepest + _LEAST_WIDTH)
+    painter = _Painter(flow, branches, is_absolute, cells - deepest)
     console = Console(
         file=stream,
-        width=_UNBOUNDED if width is None else max(width, _INDENT * deepest + _LEAST_WIDTH),
+        width=cells,
         force_terminal=color,
         # In a notebook it would draw there, and not into the text.
         force_jupyter=False,
@@ -76,7 +82,8 @@ def tree_text(
     console.print(painter.title())
     for branch in branches:
         console.print(_tree(branch, painter))
-    return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
+    text = stream.getvalue().replace(_BOUND, " ")
+    return "\n".join(line.rstrip() for line in text.splitlines())
 
 
 def _tree(top: Branch, painter: _Painter) -> Tree:
@@ -92,7 +99,9 @@ def _tree(top: Branch, painter: _Painter) -> Tree:
 class _Painter:
     """Turns items into styled text."""
 
-    def __init__(self, flow: Flow, branches: Sequence[Branch], is_absolute: bool) -> None:
+    def __init__(
+        self, flow: Flow, branches: Sequence[Branch], is_absolute: bool, room: int
+    ) -> None:
         self.flow = flow
         self.is_absolute = is_absolute
         self.zero_ns: int = branches[0].lines[0].item.node["start_ns"]
@@ -100,6 +109,8 @@ class _Painter:
         self.time_width = max(
             len(self._time(line.item.node)) for branch in walk(branches) for line in branch.lines
         )
+        # Right of the times.
+        self.room = room - self.time_width - _GAP
 
     def title(self) -> Text:
         start = self.flow.nodes[self.flow.start_key]
@@ -110,7 +121,7 @@ class _Painter:
 
     def label(self, branch: Branch) -> Table:
         # Two columns, so that what is wrapped stays right of the times.
-        grid = Table.grid(padding=(0, 2))
+        grid = Table.grid(padding=(0, _GAP))
         grid.add_column(justify="right", min_width=self.time_width, no_wrap=True, style="cyan")
         grid.add_column(overflow="fold")
         for line in branch.lines:
@@ -127,7 +138,7 @@ class _Painter:
         is_absent = item.node["kind"] == "subscription"
         text.append(self._name(item, line.link), style="yellow" if is_absent else "bold")
         for detail in self._details(item, line.link):
-            text.append("  ").append(detail)
+            text.append("  ").append(_bound(detail, self.room))
         if self.flow.direction == "both" and self._is_start(item):
             text.append("  ◀", style="bold green")
         return text
@@ -199,6 +210,13 @@ class _Painter:
         if number:
             details.append(f"… {number} more")
         return details
+
+
+def _bound(detail: str, room: int) -> str:
+    """Return a detail that stays in one line, or else each number in it with its unit."""
+    if cell_len(detail) <= room:
+        return detail.replace(" ", _BOUND)
+    return " ".join(word.replace(" ", _BOUND) for word in words(detail))
 
 
 def _waits(edge: Row) -> str:

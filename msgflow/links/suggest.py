@@ -18,7 +18,8 @@ _HEAD = (
 )
 _PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
 _WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
-_WIDTH = 96
+# With the indent of an entry, no comment is wider than a terminal of 80 columns.
+_WIDTH = 76
 
 
 def suggest_links(rows: Sequence[Mapping[str, Any]], command: str) -> str:

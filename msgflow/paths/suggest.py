@@ -8,15 +8,18 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any
 
 from msgflow.query.human import format_duration, printable
+from msgflow.query.wrapping import ARROW, wrap_path
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 _HEAD = """\
-# Paths of a run by name, for --path: keep those that matter, and call them as you like.
+# Paths of a run by name, for --path: keep those that matter, and call them as
+# you like.
 #   msgflow query e2e-latency --path NAME"""
 _PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
-_ARROW = " → "
+# With what stands before it, no comment is wider than a terminal of 80 columns.
+_WIDTH = 76
 
 
 def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -31,7 +34,7 @@ def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
     if not texts:
         return f"{_HEAD}\n# There are none.\npaths: []"
     evidence = {row["path"]: row for row in rows}
-    steps = {text: text.split(_ARROW) for text in texts}
+    steps = {text: text.split(ARROW) for text in texts}
     alike: dict[tuple[str, str], list[str]] = defaultdict(list)
     for text in texts:
         # From the first topic: a node may publish several.
@@ -66,7 +69,7 @@ def _entry(
     if row["p99_ns"] is not None:
         seen += f", p99 {format_duration(row['p99_ns'])}"
     lines = [
-        f"  # {printable(row['path'])}",
+        *(f"  # {line}" for line in wrap_path(printable(row["path"]), _WIDTH)),
         f"  # {seen}",
         f"  - name: {_quoted(name)}",
         f"    from: {_quoted(first)}",

@@ -100,7 +100,7 @@ def load_queries() -> tuple[Header, ...]:
 
 def nearest(name: str, known: Sequence[str]) -> list[str]:
     """Return at most three of `known` that `name` may be a slip of, the most similar first."""
-    similar = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    similar = difflib.get_close_matches(name, known, n=3, cutoff=0.55)
     longer = [other for other in known if name and name in other and other not in similar]
     return (similar + longer)[:3]
 

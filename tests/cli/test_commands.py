@@ -58,6 +58,7 @@ def test_version(msgflow: Msgflow) -> None:
     ("arguments", "error", "hint"),
     [
         (("qury",), "no such command 'qury'", "did you mean 'query'"),
+        (("e2e-latency",), "no such command — e2e-latency", "msgflow query e2e-latency"),
         (("ingest",), "missing argument 'TRACE...'", "msgflow ingest --help"),
         (("ingest", ""), "the path of a trace is empty", "msgflow ingest TRACE"),
         (("ingest", ".", "--name", "all"), "takes for something else — 'all'", "nor a number"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -200,6 +201,12 @@ def test_points_in_time_and_widths(robot: Database) -> None:
     for width in (20, 80, 120):
         lines = tree_text(flow, width=width).splitlines()[1:]
         assert max(map(len, lines)) <= max(width, 72)
+    whole = re.findall(r"  (publish to take [\d.]+ .?s|ran [\d.]+ .?s)", tree_text(flow))
+    assert len(whole) > 3
+    for width in range(72, 120):
+        narrow = tree_text(flow, width=width)
+        assert all(detail in narrow for detail in whole), width
+    assert "\ue000" not in narrow
     assert "\x1b[" not in tree_text(flow)
     assert "\x1b[" in tree_text(flow, color=True)
 

@@ -112,5 +112,5 @@ def test_suggestions_can_be_read_back(tmp_path: Path) -> None:
     assert [item.value for item in link.inputs] == row["inputs"]
     assert [item.value for item in link.outputs] == row["outputs"]
     assert (link.process and link.process.value, link.host and link.host.value) == ("42", "true")
-    assert max(map(len, text.splitlines())) <= 100
+    assert max(map(len, text.splitlines())) <= 80
     assert read_links(write(tmp_path, suggest_links([], "x"))).links == ()

@@ -145,3 +145,11 @@ def test_suggestions_tell_paths_apart_that_begin_and_end_alike(tmp_path: Path) -
     assert read_paths(file).paths[2].words() == {"from": "/nul", "to": "/d"}
     file.write_text(suggest_paths([]), encoding="utf-8")
     assert read_paths(file).paths == ()
+
+
+def test_comments_of_suggestions_are_no_wider_than_a_narrow_terminal() -> None:
+    path = " → ".join(f"/perception/node_{n} → /perception/topic_{n}" for n in range(9))
+    text = suggest_paths([{"path": f"{path} → /end", "roots": 2, "reached": 1, "p99_ns": 5}])
+    lines = [line for line in text.splitlines() if line.lstrip().startswith("#")]
+    assert max(map(len, lines)) <= 80
+    assert "".join(line.strip(" #") for line in lines).count("→") == 18

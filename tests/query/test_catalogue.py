@@ -30,6 +30,7 @@ def test_nearest_finds_slips_and_parts() -> None:
     assert nearest("e2e-latncy", known) == ["e2e-latency"]
     assert nearest("duration", known)[0] == "callback-duration"
     assert nearest("", known) == []
+    assert nearest("foo", ("roots", "reached")) == []
 
 
 @pytest.mark.parametrize(
