@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from msgflow.export.flow_layout import Branch, Item, Line
 
 _UNBOUNDED = 100_000
-_LEAST_WIDTH = 60
+_LEAST_WIDTH = 44
 _INDENT = 4
 _GAP = 2
 # Stands for a space at which no line is broken: no name has it, since it is not printable.
@@ -66,7 +66,7 @@ def tree_text(
     stream = io.StringIO()
     deepest = _INDENT * max(branch.depth for branch in walk(branches))
     cells = _UNBOUNDED if width is None else max(width, deepest + _LEAST_WIDTH)
-    painter = _Painter(flow, branches, is_absolute, cells - deepest)
+    painter = _Painter(flow, branches, is_absolute, cells)
     console = Console(
         file=stream,
         width=cells,
@@ -79,7 +79,7 @@ def tree_text(
         emoji=False,
         legacy_windows=False,
     )
-    console.print(painter.title())
+    console.print(painter.title(), width=width)
     for branch in branches:
         console.print(_tree(branch, painter))
     text = stream.getvalue().replace(_BOUND, " ")
@@ -100,7 +100,7 @@ class _Painter:
     """Turns items into styled text."""
 
     def __init__(
-        self, flow: Flow, branches: Sequence[Branch], is_absolute: bool, room: int
+        self, flow: Flow, branches: Sequence[Branch], is_absolute: bool, width: int
     ) -> None:
         self.flow = flow
         self.is_absolute = is_absolute
@@ -109,8 +109,7 @@ class _Painter:
         self.time_width = max(
             len(self._time(line.item.node)) for branch in walk(branches) for line in branch.lines
         )
-        # Right of the times.
-        self.room = room - self.time_width - _GAP
+        self.width = width
 
     def title(self) -> Text:
         start = self.flow.nodes[self.flow.start_key]
@@ -124,11 +123,12 @@ class _Painter:
         grid = Table.grid(padding=(0, _GAP))
         grid.add_column(justify="right", min_width=self.time_width, no_wrap=True, style="cyan")
         grid.add_column(overflow="fold")
+        room = self.width - _INDENT * branch.depth - self.time_width - _GAP
         for line in branch.lines:
-            grid.add_row(self._time(line.item.node), self._text(line))
+            grid.add_row(self._time(line.item.node), self._text(line, room))
         return grid
 
-    def _text(self, line: Line) -> Text:
+    def _text(self, line: Line, room: int) -> Text:
         item = line.item
         text = Text()
         if line.is_reference:
@@ -138,7 +138,7 @@ class _Painter:
         is_absent = item.node["kind"] == "subscription"
         text.append(self._name(item, line.link), style="yellow" if is_absent else "bold")
         for detail in self._details(item, line.link):
-            text.append("  ").append(_bound(detail, self.room))
+            text.append("  ").append(_bound(detail, room))
         if self.flow.direction == "both" and self._is_start(item):
             text.append("  ◀", style="bold green")
         return text

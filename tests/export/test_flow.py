@@ -199,8 +199,8 @@ def test_points_in_time_and_widths(robot: Database) -> None:
     assert absolute[0] == "publication 1, /image"
     assert absolute[1].startswith("1970-01-01T00:00:00.000000100Z  /camera  Timer")
     for width in (20, 80, 120):
-        lines = tree_text(flow, width=width).splitlines()[1:]
-        assert max(map(len, lines)) <= max(width, 72)
+        lines = tree_text(flow, width=width).splitlines()
+        assert max(map(len, lines)) <= max(width, 56)
     whole = re.findall(r"  (publish to take [\d.]+ .?s|ran [\d.]+ .?s)", tree_text(flow))
     assert len(whole) > 3
     for width in range(72, 120):
