@@ -72,6 +72,7 @@ said AS (
         v.reason,
         v.reason,
         CASE
+            WHEN t.is_missing THEN 'its link is missing'
             -- The take is there; what would tell its message is not.
             WHEN v.reason = 'unknown' AND NOT t.is_decided
                 AND (t.unclear IS NOT NULL OR t.cause = 'recorded')

@@ -45,7 +45,7 @@ matched AS (
         bool_or(m.has_absent) AS has_absent, bool_or(m.is_unnamed) AS is_unnamed,
         bool_or(m.is_torn) AS is_torn, bool_or(m.is_unseen) AS is_unseen,
         bool_or(m.is_twin) AS is_twin, bool_or(m.has_silent) AS has_silent,
-        bool_or(m.is_taken_beside_hole) AS is_taken_beside_hole
+        bool_or(m.is_taken_beside_hole) AS is_taken_beside_hole, bool_or(m.is_missing) AS is_missing
     FROM orphan AS o
     JOIN truth_time AS t
         ON t.kind = 'take' AND o.host = t.host AND o.pid = t.pid AND o.tid = t.tid
@@ -57,6 +57,7 @@ SELECT
     m.truth,
     m.reason,
     CASE
+        WHEN m.is_missing THEN 'its link is missing'
         -- Taken from a ring buffer, with a hole in between.
         WHEN m.truth = 'recorded' AND m.reason = 'publisher_gap' AND m.is_in_hole
             THEN 'events are missing'

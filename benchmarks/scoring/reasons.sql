@@ -124,6 +124,14 @@ LEFT JOIN truth_hole AS h
     AND h.begin_ns < p.until_ns AND h.end_ns > p.since_ns
 GROUP BY p.publication_id, p.subscription_id;
 
+-- Links by time that the trace decides and that were not found: counted as missing, so their reasons
+-- are not judged as well.
+CREATE OR REPLACE TEMP TABLE truth_missing AS
+SELECT from_id AS publication_id, to_id AS take_id
+FROM truth_link AS l
+ANTI JOIN verdict AS v ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
+WHERE l.kind = 'transport' AND l.is_decided AND l.needs = 'derive.link_transport_nearest';
+
 -- Messages that a subscription did not take, where the publication is in the trace. `undecided`
 -- says why the trace does not decide the reason even if nothing of it is missing, NULL where it
 -- does. A trace shows what was taken, and of everything else only what follows from that: when the
@@ -250,6 +258,7 @@ SELECT
     bool_or(x.is_in_hole) AS is_in_hole,
     any_value(x.unclear) AS unclear,
     bool_or(coalesce(l.is_decided, false)) AS is_decided,
+    bool_or(t.take_id::VARCHAR IN (SELECT take_id FROM truth_missing)) AS is_missing,
     bool_or((u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu)) AS is_unseen,
     bool_or(t.publication_id IN (FROM truth_equal_stamp)) AS is_twin,
     bool_or(coalesce(t.dequeue_ns, t.rmw_ns) > e.ts_ns) AS is_behind_all
@@ -413,7 +422,8 @@ SELECT
     t.publication_id IN (FROM absent) AS has_absent,
     k.cause IS NOT NULL AS is_torn,
     (u.host, u.cpu) IN (SELECT (host, cpu) FROM truth_unseen_cpu) AS is_unseen,
-    t.publication_id IN (FROM truth_equal_stamp) AS is_twin
+    t.publication_id IN (FROM truth_equal_stamp) AS is_twin,
+    t.take_id::VARCHAR IN (SELECT take_id FROM truth_missing) AS is_missing
 FROM simulated_take AS t
 CROSS JOIN truth_layout AS y
 JOIN simulated_transport AS x ON t.take_id = x.take_id
