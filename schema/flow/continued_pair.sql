@@ -1,6 +1,6 @@
 -- name: derive.continued_pair
--- description: Subscriptions and publishers that flows go on through, whatever the message: as
---     derive.flow_continuation, but much cheaper than its rows are to be made.
+-- description: Subscriptions and publishers that flows go on through, whatever the message: the
+--     pairs of derive.flow_continuation, which are much cheaper to find than its rows.
 -- grain: one row per subscription and publisher that a message of it led to
 -- needs: store.link_causal, store.publisher, store.callback_instance, store.take,
 --     derive.flow_caller

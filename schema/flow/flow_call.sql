@@ -1,12 +1,13 @@
 -- name: derive.flow_call
--- description: Publications that the callbacks of services led to, with the callback instance on
---     whose request they ran and the message that it was for, if any.
+-- description: Publications that the callbacks of services led to. Each has the callback instance
+--     on whose request they ran, and the message that this instance was for, if any.
 -- grain: one row per publication, callback instance that called for it, and way it did so
 -- needs: derive.flow_caller, store.link_request, store.callback_instance, store.take,
 --     store.link_causal
 
 -- What a join looks up stays in memory until the query ends, and how often services were called is
--- hard to guess: only callback instances that called, and publications of services, are looked up.
+-- hard to guess. So only callback instances that called, and publications of services, are looked
+-- up.
 WITH caller AS (
     SELECT i.callback_instance_id, i.take_id
     FROM store.callback_instance AS i

@@ -1,8 +1,8 @@
 -- name: derive.flow_caller
 -- description: Callback instances on whose request service callbacks ran: directly, or through
---     other services in between. The route tells by what way: first the node of the client that the
---     caller used (the negative process where the node is not known, 0 where nothing is), then the
---     services in order (0: not known), each of them once.
+--     other services in between. The route is a list that tells the way: first the node of the
+--     client that the caller used (the negative process where the node is not known, 0 where
+--     nothing is), then the services in order (0: not known), each of them once.
 -- grain: one row per instance of a service callback, callback instance that called it, and route
 -- needs: store.callback_instance, store.link_request, store.request, store.client
 WITH RECURSIVE called AS (

@@ -1,10 +1,10 @@
 -- name: derive.flow_chain
 -- kind: macro
 -- description: The chains of main.flow_path, each as its last step and a pointer to the chain
---     without it: lists of what lies on them would cost the square of their length. No
---     subscription comes twice in a chain: a bit for each one tells which were there. A name or
---     glob that fits a topic stands for topics, one that fits none for nodes: a node is often
---     called like the topic that it publishes.
+--     without it: the cost of lists of what lies on them would grow with the square of their
+--     length. No subscription comes twice in a chain: each has a bit that tells whether it was
+--     there. A name or glob that fits a topic stands for topics. One that fits none stands for
+--     nodes: a node is often called like the topic that it publishes.
 -- grain: one row per run and chain
 -- needs: derive.flow_hop, store.publisher, store.subscription, store.node
 CREATE OR REPLACE MACRO derive.flow_chain(
@@ -47,7 +47,7 @@ hop AS MATERIALIZED (
     JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
     WHERE list_contains(runs, h.run_id)
 ),
--- Only what leads to the end asked for is followed, so that nothing else is enumerated.
+-- Only what leads to the end asked for is followed: nothing else needs to be enumerated.
 toward_end (subscription_id) AS (
     SELECT subscription_id
     FROM hop
@@ -77,7 +77,7 @@ useful AS MATERIALIZED (
     JOIN place AS l ON h.subscription_id = l.subscription_id
 ),
 -- Chains of one length are in the order of their publishers, then of their subscriptions, then of
--- their routes: ranks among those lists stand for the lists. Windows without PARTITION BY take a
+-- their routes. Ranks among those lists stand for the lists. Windows without PARTITION BY take a
 -- third of the time, at every step.
 chain AS (
     SELECT
@@ -143,10 +143,10 @@ chain AS (
     )
     QUALIFY number <= max_paths
 ),
--- Chains of different lengths: one comes behind all of those with the beginnings of its list of
--- publishers, and before the next list. Lists of publishers are the nodes of a tree, and that is
--- the order in which a walk around the tree enters them. How many it has still to enter is added
--- up over ever longer parts of the walk.
+-- Chains of different lengths: a chain comes behind all chains whose lists of publishers are
+-- beginnings of its own, and before the next list. Lists of publishers are the nodes of a tree, and
+-- this is the order in which a walk around the tree enters them. How many nodes the walk has still
+-- to enter is added up over ever longer parts of the walk.
 list AS MATERIALIZED (
     SELECT
         row_number() OVER (ORDER BY run_id, depth, publishers_rank) AS list_id,
@@ -247,6 +247,7 @@ FROM ranked AS r
 JOIN useful AS u ON r.hop_id = u.hop_id
 JOIN useful AS f ON r.first_hop_id = f.hop_id
 WINDOW run AS (PARTITION BY r.run_id)
--- Nothing is cut here: chains of one length are at most max_paths. But else DuckDB takes chains for
--- countless, and keeps tables of all takes to look up a few in whatever is joined to chains.
+-- Nothing is cut here: chains of one length are at most max_paths. But without it DuckDB expects
+-- far too many chains, and wherever something is joined to chains it keeps tables of all takes, to
+-- look up a few.
 LIMIT least(max_depth::DOUBLE * max_paths * len(runs), 1e15)::BIGINT

@@ -1,8 +1,8 @@
 -- name: derive.flow_link
 -- description: All links in one shape: publication to take, take or request to the callback
 --     instance that it was for, callback instance (or a take outside of any) to publication,
---     callback instance to request or response. Where no service callback was traced, a response
---     comes from its request. Self loops are left out: flows do not pass through them.
+--     callback instance to request or response. Where no service callback was traced, a request
+--     leads to its response. Self loops are left out: flows do not pass through them.
 -- grain: one row per cause, effect and kind of link
 -- needs: store.link_transport, derive.flow_cause, store.callback_instance, store.link_request,
 --     store.link_response, store.response

@@ -1,8 +1,9 @@
 -- name: derive.flow_root
--- description: Where the flow of each publication can be said to begin: with the callback instance
---     of the timer (or other callback without a message) that published it or called the service
---     that did, else with the publication itself. It is a source where no taken message led to it.
---     The route (derive.flow_caller) is that from an instance that called; else it is empty.
+-- description: Where the flow of each publication can be said to begin: with the callback
+--     instance of the timer (or other callback without a message) that published it, or that
+--     called the service that did; else with the publication itself. It is a source if no taken
+--     message led to it. The route (derive.flow_caller) starts at the instance that called; if
+--     none did, it is empty.
 -- grain: one row per publication on a topic of the application
 -- needs: store.publication, store.publisher, store.link_causal, derive.flow_call,
 --     derive.flow_caller
@@ -19,8 +20,8 @@ message AS (
     UNION ALL
     SELECT publication_id FROM called WHERE take_id IS NOT NULL
 ),
--- Each publication, and once more for all that published it or called for it. They are grouped, not
--- joined: what a join looks up stays in memory until the query ends.
+-- Each publication, and once more for each instance that published it or called for it. They are
+-- grouped, not joined: what a join looks up stays in memory until the query ends.
 run AS (
     SELECT
         run_id, publication_id, publisher_id, NULL::BIGINT AS callback_instance_id,

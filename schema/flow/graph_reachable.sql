@@ -1,15 +1,15 @@
 -- name: derive.graph_reachable
 -- kind: macro
--- description: The vertices that can be reached from one vertex along the edges of a table or view
---     with columns from_kind, from_id, to_kind, to_id. Each vertex comes once; the walk ends on
---     any graph. Without max_depth its cost grows with the edges alone, with it also with depth:
---     only then every step has to look at all that was reached before.
+-- description: The vertices that can be reached from one vertex along the edges of a table or
+--     view with columns from_kind, from_id, to_kind, to_id. Each vertex comes once; the walk ends
+--     on any graph. Without max_depth, the cost grows with the edges alone. With it, the cost
+--     also grows with the depth, since every step has to look at all that was reached before.
 -- grain: one row per vertex
 CREATE OR REPLACE MACRO derive.graph_reachable(
     edges, start_kind, start_id, max_depth := NULL
 ) AS TABLE
--- The edges must not be looked for again at every step. What is used twice is computed once; the
--- word MATERIALIZED alone gets lost where a file of this storage version is opened again.
+-- The edges must not be looked for again at every step. DuckDB computes what is used twice only
+-- once; the word MATERIALIZED alone gets lost when a file of this storage version is opened again.
 WITH RECURSIVE edge AS MATERIALIZED (
     SELECT from_kind, from_id, to_kind, to_id FROM query_table(edges)
 ),

@@ -1,7 +1,7 @@
 -- name: derive.known_word
 -- kind: macro
--- description: True where a word is one of those that a macro knows, else an error that names them:
---     another word must not be answered with no rows.
+-- description: True if a word is one of those that a macro knows. Else an error that names them:
+--     an unknown word must not be answered with no rows.
 CREATE OR REPLACE MACRO derive.known_word(parameter, word, known) AS
 CASE WHEN list_contains(known, word) THEN true
     ELSE error(

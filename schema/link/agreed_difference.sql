@@ -1,9 +1,10 @@
 -- name: derive.agreed_difference
 -- kind: macro
--- description: Differences of two clocks that nearly as many messages allow as the one that most
---     allow: stretches without a gap of such differences. In each the one in the middle of those
---     that most allow is furthest from making a message that of another publication. Where they
---     are far apart the right one is near the greatest: the shortest delays are short.
+-- description: The differences of two clocks that may be the right one: those that nearly as many
+--     messages allow as the best one. They form ranges without a gap, a row each. In a range, the
+--     middle of what most messages allow is furthest from giving a message to another
+--     publication. If that part is wide, the right difference is near its upper end, because the
+--     shortest delays are short.
 -- grain: one row per clock, stretch of time and stretch of differences
 -- param: intervals VARCHAR  Name of rows of clock_id, stretch, least_ns, greatest_ns
 -- needs: derive.clock_limit

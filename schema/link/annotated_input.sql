@@ -1,13 +1,14 @@
 -- name: derive.annotated_input
 -- kind: macro
--- description: The message that each cache held when an output of an annotation was published: the
---     latest instance of the input's callback (by effective end) that ended at or before the
+-- description: The message that each cache held when an output of an annotation was published:
+--     the latest instance of the input's callback (by effective end) that ended at or before the
 --     cut, or nested inside the publishing instance and before the publication. The input whose
---     own instance publishes is none of these. When a node reads its caches is not in the trace,
---     so every other instance that began before the publication, and ended after the one there
---     at the cut began, could have been it as well. A firing needs a message of every input:
---     where none was there at the cut, the last of those counts, and nothing is one more
---     candidate. Nothing is linked across a gap in the record of either thread.
+--     own instance publishes is none of these. The trace does not show when a node reads its
+--     caches. So other instances are candidates, too: those that began before the publication,
+--     and ended after the instance in the cache at the cut began. A firing needs a message of
+--     every input: if there was none at the cut, the last of the candidates counts, and "no
+--     message" is one more candidate. Nothing is linked across a gap in the record of either
+--     thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 -- param: wanted_kind VARCHAR  Kind of the annotations
@@ -20,14 +21,14 @@ WITH nesting AS (
     FROM store.callback_instance
     WHERE run_id = only_run AND parent_id IS NOT NULL
 ),
--- None where caches are never emptied.
+-- No rows for periodic_async: its caches are never emptied.
 firing AS MATERIALIZED (
     SELECT annotation_id, callback_instance_id, first_event_id, emptied_event_id, kept_event_id
     FROM derive.partial_sync_firing(only_run)
     WHERE wanted_kind = 'partial_sync'
 ),
--- All that a firing publishes is made of the same messages, but for those that come meanwhile in
--- callback instances nested in it.
+-- All publications of a firing use the same messages, except for those that come meanwhile, in
+-- callback instances nested in the firing.
 demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.publication_id, b.callback_instance_id AS publishing_id,
@@ -47,7 +48,7 @@ demand AS MATERIALIZED (
     WHERE b.kind = wanted_kind AND b.subscription_id IS DISTINCT FROM i.subscription_id
         AND (wanted_kind = 'periodic_async' OR f.annotation_id IS NOT NULL)
 ),
--- The message of a callback instance that fires is used by that firing.
+-- A callback instance that fires is no candidate: its own firing used its message.
 run AS MATERIALIZED (
     SELECT
         i.annotation_id, r.subscription_id, r.callback_instance_id, r.thread_id, r.start_event_id,
@@ -59,7 +60,7 @@ run AS MATERIALIZED (
         ON a.annotation_id = f.annotation_id AND r.callback_instance_id = f.callback_instance_id
     WHERE a.run_id = only_run AND a.kind = wanted_kind
 ),
--- Instances that end together (in a gap) are one moment: the last to begin stands for it.
+-- Instances that end at the same moment (at a gap) count once: the last to begin stands for all.
 ended AS (
     SELECT
         annotation_id, subscription_id, effective_end_event_id,
@@ -112,8 +113,8 @@ at_cut AS MATERIALIZED (
         AND c.cut_event_id >= e.effective_end_event_id
     WHERE e.effective_end_event_id > c.emptied_event_id
 ),
--- Where all instances of an input are on the publishing thread, one after the other, no other
--- could have been the one that was there at the cut.
+-- If all instances of an input ran on the publishing thread, one after the other, only one of them
+-- can have been in the cache at the cut.
 alone AS (
     SELECT run.annotation_id, run.subscription_id, min(run.thread_id) AS thread_id
     FROM run
@@ -143,7 +144,8 @@ there AS MATERIALIZED (
         AND d.subscription_id = a.subscription_id
         AND d.thread_id = a.thread_id
 ),
--- Instances in the order in which they began, with the one that ends last of all so far.
+-- Instances in the order in which they began. Each has the instance that ends last among itself and
+-- those before it.
 begun AS (
     SELECT
         annotation_id, subscription_id, start_event_id,
@@ -262,7 +264,7 @@ crossing AS (
         ON e.thread_id = k.thread_id AND e.input_start_event_id < k.resumed_event_id
     WHERE k.resumed_event_id <= e.start_event_id
     UNION
-    -- The input's thread may be heard of again only after the publication.
+    -- The next event of the input's thread may come only after the publication.
     SELECT e.annotation_id, e.publication_id, e.callback_instance_id
     FROM exposed AS e
     ASOF JOIN break AS k

@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: How fast the difference of two clocks changes: the median of the slopes between
 --     stretches of time nearby (Theil-Sen), so that neither jumps nor single wrong differences
---     count. Differences may be known up to a constant of each place only. Slopes that no clock
---     has are those of a jump.
+--     count. Only differences of the same place are compared: those of two places may differ by a
+--     constant. Slopes too steep for any clock come from jumps, and are left out.
 -- grain: one row per clock and stretch
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
 -- needs: derive.clock_limit

@@ -1,7 +1,8 @@
 -- name: derive.close_pair
 -- kind: macro
--- description: Messages beside publications that may be theirs, less those that the course of the
---     clock rules out: no drift brings them near the difference of their stretch of time.
+-- description: Pairs of a message and a publication that may be its own, without those that the
+--     course of the clock rules out: no drift brings them near the difference of their stretch of
+--     time.
 -- grain: one row per pair
 -- param: pairs VARCHAR  Name of rows as of derive.stamp_pair
 -- param: course VARCHAR  Name of rows of clock_id, stretch, stretch_ns, offset_ns

@@ -1,14 +1,15 @@
 -- name: derive.followed_difference
 -- kind: macro
--- description: Which of the differences that messages agree with the clocks have, from stretch
---     to stretch. Clocks of one machine begin together (even few messages may say so), and go on
---     as they went: of the differences that a drift can lead to, the one of most messages. Where
---     none is left the clock has jumped, if two more stretches agree (in the last two nothing is
---     known then), to the least difference that many agree with, of equal ones to the greatest: a
---     message is taken, and stamped, soon after it was published. Of messages taken on other
---     clocks nothing says which of several differences is right. Where messages taken on this
---     clock would as well be those of later publications, the clock may have jumped by a period:
---     nothing is known then.
+-- description: Which of the differences that messages agree with is the right one, from stretch
+--     to stretch. The clocks of one machine begin together (a few messages are enough to say so),
+--     and then drift: of the differences that a drift can lead to, the one that most messages
+--     agree with is taken. If there is none, the clock has jumped, provided that the next two
+--     stretches agree (in the last two stretches, nothing is known then). It jumped to the least
+--     difference that many messages agree with, since a message is taken, and stamped, soon after
+--     it was published; of those within a burst, to the one with most messages, of equal ones to
+--     the greatest. If messages were taken on other clocks, nothing says which of several
+--     differences is right. If messages taken on this clock could as well be those of later
+--     publications, the clock may have jumped by a period, and nothing is known.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
 -- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns
 -- needs: derive.clock_limit
@@ -66,8 +67,8 @@ ballot AS MATERIALIZED (
                     THEN t.difference_ns
             END
         ) AS jump_ns,
-        -- The last two stretches have no two more that could agree. In a recording that has no
-        -- others a clock may begin there.
+        -- Behind the last two stretches there are no two that could agree. In a recording of only
+        -- two stretches a clock may begin there all the same.
         coalesce(bool_or(t.later_ns IS NOT NULL), false) AS has_later,
         count(*) OVER (PARTITION BY r.clock_id) <= 2 AS is_short
     FROM query_table(regions) AS r

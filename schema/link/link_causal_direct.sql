@@ -1,9 +1,10 @@
 -- name: derive.link_causal_direct
 -- kind: macro
 -- description: Publications inside a callback instance on its thread, from its start to its
---     effective end; of nested ones the innermost. Order decides, not time. The last begin or end
---     of a callback before the publication tells which one that is: the one that began, unless it
---     was over, else the nearest one around it that was not.
+--     effective end; of nested instances the innermost counts. The order of events decides, not
+--     time. The last begin or end of a callback before the publication tells which instance that
+--     is: the one that began there, unless it was over; else the nearest one around it that was
+--     not over.
 -- grain: one row per publication made inside a callback instance
 -- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.callback_instance

@@ -1,9 +1,9 @@
 -- name: derive.link_causal_take_adjacent
 -- kind: macro
--- description: Publications that a thread makes after taking a message by hand (rclpy, rclc, wait
---     sets), until its next take, also of a request or a response, as far as no callback is seen to
---     begin, no executor to go on and no gap in between. What is published inside a callback
---     instance has that for its cause.
+-- description: Publications that a thread makes after it took a message by hand (rclpy, rclc,
+--     wait sets), until its next take, also of a request or a response. The link ends where a
+--     callback is seen to begin or an executor to go on, and at a gap. What is published inside a
+--     callback instance is caused by that instance instead.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, store.publication, store.take, store.request, store.response,
@@ -66,7 +66,7 @@ behind_gap AS (
         ON a.recording_id = g.recording_id AND a.start_ns > g.start_ns
     WHERE g.start_ns >= a.taken_ns OR g.covered_until_ns > a.taken_ns
 ),
--- Requests and responses that the thread took; of them the times are stored, not the events.
+-- Requests and responses that the thread took. Only their times are stored, not their events.
 called AS (
     SELECT q.run_id, q.receiver_thread_id AS thread_id, q.taken_ns
     FROM store.request AS q

@@ -1,13 +1,14 @@
 -- name: derive.link_transport
 -- kind: macro
--- description: Messages from publication to take, by every method. A node that takes its own
---     transform, or whose process's transform listener does, is a self loop: no flow passes
---     through it. A link by equal stamps and topics with one candidate cannot be spoilt by lost
---     events. Any other can: where a gap of the sender's trace lies between the publication and the
---     take (on hosts with different clocks: within the publication), or a gap of the receiver's
---     trace likewise, the better candidate may be in it. What comes to a reader of ring buffers
---     through the middleware as well, without a callback, is a copy that nobody gets; so it is with
---     a placeholder, which nothing joins with the reader of the buffer.
+-- description: Messages from publication to take, by every method. A self loop is a transform
+--     that is taken by the node that sent it, or by the transform listener of its process: no
+--     flow passes through it. Lost events cannot spoil a link by equal stamps and topics with one
+--     candidate. They can spoil any other: where a gap of the sender's trace lies between the
+--     publication and the take (on hosts with different clocks: within the publication), or a gap
+--     of the receiver's trace likewise, the better candidate may be in the gap. A reader of ring
+--     buffers may get a message through the middleware as well, without a callback: that take is
+--     a copy that nobody gets. So are the takes of a placeholder that nothing joins with the
+--     reader of the buffer.
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_transport_exact, derive.link_transport_nearest,
@@ -79,7 +80,7 @@ intra_process AS (
     FROM store.publication
     WHERE run_id = only_run AND intra_ns IS NOT NULL AND publisher_id IS NOT NULL
 ),
--- rclcpp makes a second callback for what comes out of a buffer; it may never get its turn.
+-- rclcpp makes a second callback for what comes out of a buffer. It may never get its turn.
 buffered AS (
     SELECT subscription_id
     FROM store.take
@@ -101,8 +102,9 @@ repeated AS (
     LEFT JOIN buffered AS b ON l.subscription_id = b.subscription_id
     WHERE l.method <> 'ring_buffer' AND (b.subscription_id IS NOT NULL OR s.is_inferred)
 ),
--- Before Iron no event shows that a publisher passes messages on within its process. Callbacks get
--- messages in this way, and none gets what comes from that publisher through the middleware.
+-- Before Iron, no event shows that a publisher passes messages on within its process. It does so
+-- where callbacks get messages in this way, and none gets what comes from that publisher through
+-- the middleware.
 silent AS (
     SELECT l.publisher_id, l.subscription_id
     FROM link AS l

@@ -2,10 +2,11 @@
 -- kind: macro
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
 --     known, whether from their own initialisation or from other messages of the two (then
---     `exact_stamp`). A topic unknown on a side counts only where the stamp alone has a single
---     candidate in the run, and does not put one publication on two topics. Of several publications
---     with equal topic and stamp the k-th belongs to the k-th such take of a subscription, so that
---     none is received twice. Equal values need no clocks: a take may seem to precede.
+--     `exact_stamp`). If the topic of a side is not known, the pair counts only if the stamp has
+--     a single candidate in the run, and if the pair does not put one publication on two topics.
+--     If several publications have the same topic and stamp, the k-th belongs to the k-th such
+--     take of a subscription, so that none is received twice. Equal values need no clocks: a take
+--     may seem to come before its publication.
 -- grain: one row per take whose publication is known by its stamp
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.topic_group, store.publication, store.publisher, store.take, store.subscription

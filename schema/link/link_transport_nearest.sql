@@ -1,7 +1,8 @@
 -- name: derive.link_transport_nearest
 -- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
---     message once. What may be lost around the moment of publishing makes the link doubtful.
+--     message once. The link is doubtful where events may be lost around the moment of
+--     publishing.
 -- grain: one row per take whose publication is known by time
 -- param: only_run BIGINT  Run to look at
 -- needs: store.nearest_message, store.take, store.subscription, store.publication,

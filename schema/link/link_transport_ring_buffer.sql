@@ -1,10 +1,10 @@
 -- name: derive.link_transport_ring_buffer
 -- kind: macro
--- description: Messages between nodes of one process, by the slot of the ring buffer: what is taken
---     out was put in last, unless the buffer was cleared or made anew meanwhile, or a gap of the
---     trace may hide that the slot was used again. The slots are used in turn: that takes as many
---     messages as the buffer has slots, and it is taken that they came no faster than where nothing
---     is missing.
+-- description: Messages between nodes of one process, by the slot of the ring buffer: what is
+--     taken out of a slot was put in last. Exceptions: the buffer was cleared or made anew
+--     meanwhile, or a gap of the trace may hide that the slot was used again. The slots are used
+--     in turn, so a slot is used again after as many messages as the buffer has slots. Within a
+--     gap, messages are assumed to come no faster than where nothing is missing.
 -- grain: one row per dequeue whose publication is known
 -- param: only_run BIGINT  Run to look at
 -- needs: store.ring_buffer_event, derive.exposed_trace, derive.recording_gap, store.publication,
@@ -55,7 +55,7 @@ behind_gap AS (
         ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 ),
--- How soon the next message was put into a buffer, where no gap lies between the two.
+-- The time from one message put into a buffer to the next, where no gap lies in between.
 filled AS (
     SELECT
         e.process_id, e.buffer_handle, e.slot, e.at_ns, x.recording_id,
@@ -84,7 +84,7 @@ pace AS (
         ON f.recording_id = g.recording_id AND f.at_ns > g.start_ns
     GROUP BY f.process_id, f.buffer_handle
 ),
--- Where the pace is not known, nothing is.
+-- Where the pace is not known, every take behind a gap is doubtful.
 doubtful AS (
     SELECT g.take_id
     FROM behind_gap AS g

@@ -4,17 +4,18 @@
 --     after its publication was written, and before the publishing thread went on. Per publisher
 --     a message has one publication and a publication one message, the first. Where a publisher
 --     writes for much of the time, or what the thread did next is not known, the delays that are
---     usual for it bound the search. A message with a publication of several publishers, or one
---     of two messages that may both be of one publication, or one of a burst where the clock is
---     not known sharply, or one that was stamped sooner after a publication than is usual, where
---     another may be lost, has none: that would be a guess. Nor has one where the difference of the
---     clocks is not known, or explains less than half of the messages.
+--     usual for it bound the search. A message has no publication where that would be a guess:
+--     where several publishers have one for it; where two messages may both be of one
+--     publication; in a burst, if the clock is not known sharply; if it was stamped sooner after
+--     a publication than is usual, and another publication may be lost. Nor has it one where the
+--     difference of the clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, store.stamp_clock,
 --     derive.publication_beside_gap, derive.clock_limit
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
--- No clock jumps there and back within a stretch: where only one tells nothing it went on.
+-- A clock does not jump there and back within a stretch. If a single stretch tells nothing, the
+-- clock went on between those beside it.
 WITH observed AS (
     SELECT
         clock_id, at_ns, start_ns, difference_ns, drift_ppb, message_count, segment, is_sharp,
@@ -55,7 +56,8 @@ located AS (
         b.next_event_ns, b.has_break, c.state, c.before, c.after,
         c.state.difference_ns
         + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns,
-        -- Where the drift is not known there may be any, also among the messages that vote.
+        -- Where the drift is not known, it may be any that clocks have, also among the messages
+        -- that vote.
         CASE
             WHEN NOT c.state.is_sharp
                 THEN round(
@@ -72,8 +74,8 @@ located AS (
         FROM course
     ) AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
 ),
--- Around a jump of the clock a publication may be on either side of it. A message that one of
--- either side could be of is ambiguous.
+-- Around a jump of the clock, a publication may be before or after it. A message that fits
+-- publications on both sides is ambiguous.
 sided AS (
     SELECT 'now' AS side, *, difference_ns AS then_ns FROM located WHERE state.is_known
     UNION ALL
@@ -99,7 +101,7 @@ published AS MATERIALIZED (
     FROM sided
     WINDOW on_topic AS (PARTITION BY side, topic_name ORDER BY written_ns, publication_id)
 ),
--- Where the clocks stood in what relation: from one jump to the next.
+-- The times in which the clocks stood in one relation: from one jump to the next.
 segment AS (
     SELECT
         clock_id,
@@ -146,7 +148,8 @@ within AS MATERIALIZED (
     WHERE coalesce(m.source_timestamp_ns < p.closes_ns, true)
         AND coalesce(p.written_ns < m.taken_ns, true)
 ),
--- How much of the time the publisher was writing: what lies within by chance.
+-- How much of the time the publisher was writing: the more, the more messages fall into it by
+-- chance.
 share AS (
     SELECT
         publisher_id,
@@ -171,8 +174,8 @@ usual AS (
     WHERE w.place = 1 AND w.goes_on
     GROUP BY w.publisher_id
 ),
--- Of a publisher that was never seen to go on, what is usual on its host is expected. What comes
--- much sooner than nearly all others may be of another publication, if one may be lost.
+-- If a publisher was never seen to go on, what is usual on its host is expected of it. A message
+-- that comes much sooner than nearly all others may be of another publication, if one may be lost.
 usual_of_clock AS (
     SELECT
         clock_id,
@@ -227,8 +230,8 @@ placed AS (
     ASOF LEFT JOIN segment AS g
         ON p.clock_id = g.clock_id AND m.source_timestamp_ns >= g.start_stamp_ns
 ),
--- A difference of the clocks explains the messages; one that fits few of them is none. Topics may
--- have publishers that were not traced, but not all of them will.
+-- The right difference of the clocks explains the messages; one that fits few of them is wrong.
+-- Some topics may have publishers that were not traced, but hardly all.
 explained AS (
     SELECT
         clock_id, segment, topic_name, is_known,

@@ -1,10 +1,11 @@
 -- name: derive.partial_sync_firing
 -- kind: macro
 -- description: Firings of partially synchronous annotations: callback instances of an input that
---     publish on an output. All publications of one are one firing; it empties the caches, at some
---     moment from the start of the instance to its first publication. What was published last by
---     another firing, before it published first, is when they were emptied before; from the start
---     of the last firing that had published when this one began, something may have been kept.
+--     publish on an output. All publications of one instance are one firing. It empties the
+--     caches, at some moment between the start of the instance and its first publication.
+--     `emptied_event_id`: the last publication of another firing before the first one of this; by
+--     then the caches had been emptied. `kept_event_id`: the start of the last firing that had
+--     published when this one began; what came after it may have been kept.
 -- grain: one row per annotation and callback instance of one of its inputs that fires it
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.annotated_publication, store.annotation_input

@@ -1,8 +1,8 @@
 -- name: derive.publication_beside_gap
 -- kind: macro
--- description: Publications with a gap of their recording between their begin and the next event of
---     their thread; where there is none, until a message is surely written. What says who sent the
---     message may be lost.
+-- description: Publications with a gap of their recording between their begin and the next event
+--     of their thread, or, where there is no next event, until a message is surely written. The
+--     event that says who sent the message may be lost.
 -- grain: one row per such publication
 -- param: publications VARCHAR  Name of rows of publication_id
 -- needs: store.publication, derive.exposed_trace, derive.recording_gap, derive.clock_limit

@@ -1,7 +1,7 @@
 -- name: derive.recording_gap
--- description: Gaps of the recordings for ASOF joins: the last gap that starts before the end of a
---     window touches it, or one before that does, where `start_ns` or `covered_until_ns` is at or
---     after its begin.
+-- description: Gaps of the recordings, for ASOF joins. To see whether a gap touches a window:
+--     take the last gap that starts before the end of the window. One touches it if `start_ns` or
+--     `covered_until_ns` of that gap is at or after the begin of the window.
 -- grain: one row per gap in a recording
 -- needs: store.loss_interval, derive.exposed_trace
 SELECT

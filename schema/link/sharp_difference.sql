@@ -1,9 +1,9 @@
 -- name: derive.sharp_difference
 -- kind: macro
--- description: The difference of two clocks that most messages of some stretches of time allow,
---     each brought to the middle of one stretch by the drift. It is sharp, and tells messages
---     apart that were published within microseconds, unless some do not allow it while nine
---     tenths as many allow another one.
+-- description: The difference of two clocks that most messages of some stretches of time allow;
+--     the drift brings each message to the middle of one stretch. The difference is sharp, and
+--     tells messages apart that were published within microseconds, if nearly all messages allow
+--     it or no other difference is a rival.
 -- grain: one row per row of the course
 -- param: pairs VARCHAR  Name of rows of clock_id, stretch, written_ns, least_ns, greatest_ns
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
@@ -27,7 +27,7 @@ allowed AS (
         AND n.stretch BETWEEN c.stretch - reach AND c.stretch + reach
     JOIN query_table(pairs) AS p ON n.clock_id = p.clock_id AND n.stretch = p.stretch
 ),
--- A stamp is a message; of two publishers it has pairs of both.
+-- A stamp counts as one message, also if it has pairs with publications of two publishers.
 message AS (
     SELECT clock_id, stretch, count(DISTINCT written_ns + greatest_ns) AS message_count
     FROM query_table(pairs)

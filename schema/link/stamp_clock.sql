@@ -1,10 +1,10 @@
 -- name: derive.stamp_clock
 -- kind: macro
 -- description: How far the clock that stamps messages is from that of the traces, over time:
---     constant but for jumps and a slow drift. In each stretch of time the difference that most
---     messages allow is followed from the one before. The drift of what was followed makes the
---     vote sharper, and the vote the drift: then messages are told apart that were published within
---     microseconds.
+--     constant but for jumps and a slow drift. In each stretch of time, the difference that most
+--     messages allow is followed from the stretch before. The drift that this shows makes the
+--     vote of the messages sharper, and the vote the drift. In the end, messages are told apart
+--     that were published within microseconds.
 -- grain: one row per clock and stretch of time with messages; message_count is 0 where the
 --     difference is not known
 -- param: only_run BIGINT  Run to look at
@@ -15,8 +15,8 @@ CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (
     FROM derive.stamp_pair(only_run)
 ),
--- Stamp less time of the publication nearest to the stamp changes as the difference of the clocks
--- does, as long as the one is in the same place of its period as before.
+-- The stamp minus the time of the publication nearest to it changes as the difference of the clocks
+-- does, as long as the publication is at the same place of its period.
 latest AS (
     SELECT
         clock_id, publisher_id AS place, stretch,
@@ -74,7 +74,7 @@ course AS MATERIALIZED (
 close AS MATERIALIZED (
     FROM derive.close_pair('pair', 'course')
 ),
--- Each vote makes the drift better known, so that the next one can be of more stretches.
+-- Each vote makes the drift better known, so that the next vote can be of more stretches.
 beside AS MATERIALIZED (
     FROM derive.sharp_difference('close', 'course', derive.clock_limit().sharp_stretches // 2)
 ),
@@ -91,7 +91,7 @@ SELECT
     coalesce(s.drift_ppb, 0)::BIGINT AS drift_ppb,
     f.message_count,
     f.segment,
-    -- A drift shows in two stretches. One that is not right spoils what is nearby.
+    -- A drift needs two stretches to show. A stretch that is not sharp spoils those nearby.
     coalesce(
         min(s.is_sharp) OVER nearby AND count_if(f.message_count > 0) OVER nearby > 1, false
     ) AS is_sharp

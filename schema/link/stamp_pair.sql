@@ -1,11 +1,12 @@
 -- name: derive.stamp_pair
 -- kind: macro
--- description: Messages beside publications that may be theirs. A stamp is made after the
---     message was written and before the publishing thread went on, so each pair allows an
---     interval of differences between the clock of stamps and that of the trace; of publications
---     that follow each other before the thread goes on, each has the time until the next. Some
---     messages per stretch of time are enough, of every publisher in turn; first those of topics
---     with one publisher, as others may be of none of a publisher's publications.
+-- description: Messages beside publications that may be theirs. A stamp is made after the message
+--     was written and before the publishing thread went on, so each pair allows an interval of
+--     differences between the clock of stamps and that of the trace. If several publications
+--     follow each other before the thread goes on, each has the time until the next. Some
+--     messages per stretch of time are enough, of every publisher in turn. Those of topics with
+--     one publisher come first: a message of another topic may be of none of a publisher's
+--     publications.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.unstamped_publication, derive.unstamped_message, derive.clock_limit
@@ -87,8 +88,8 @@ sampled AS (
         ORDER BY publisher_count, turn, source_timestamp_ns, publisher_id
     ) <= derive.clock_limit().sampled_messages
 ),
--- A message may have been in a queue for longer than `reach` others took to be published. Clocks of
--- one machine are close, so its publication is then among those around its stamp.
+-- A message may have waited in a queue while more than `reach` others were published. Clocks of one
+-- machine are close, so its publication is then among those around its stamp.
 wanted AS (
     SELECT
         l.run_id, l.clock_id, l.publisher_id, l.source_timestamp_ns, l.is_taken_here, l.start_ns,

@@ -1,7 +1,7 @@
 -- name: derive.take_candidate
 -- kind: macro
--- description: Publications that a take without a link could come from: those that its stamp fits,
---     of which none could be chosen.
+-- description: Publications that a take without a link could come from: its stamp fits them, but
+--     none of them could be chosen.
 -- grain: one row per take without a link and publication
 -- param: only_run BIGINT  Run to look at
 -- needs: store.take, store.link_transport, store.subscription, store.publication, store.publisher

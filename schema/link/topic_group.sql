@@ -1,11 +1,11 @@
 -- name: derive.topic_group
 -- kind: macro
--- description: Which publishers and subscriptions whose topic is not known are on one topic, as far
---     as messages tell. A stamp that one publication of the run has belongs to one message: its
---     publisher and those who took it are on one topic, and so are those of a message that went
---     through a ring buffer, and whatever else such messages join to any of them. The name is that
---     of the members that have one; members of several names teach nothing. Pairs that next to none
---     of the messages of both sides speak for are chance.
+-- description: Which publishers and subscriptions whose topic is not known are on one topic, as
+--     far as messages tell. A stamp that only one publication of the run has belongs to one
+--     message: its publisher and those who took it are on one topic. So are those of a message
+--     that went through a ring buffer, and whatever else such messages join to any of them. The
+--     group has the name of those members that have one; if they have several names, nothing is
+--     learned. A pair that hardly any message of both sides speaks for is chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
 -- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.publisher, store.take, store.subscription,
@@ -37,7 +37,7 @@ published AS (
     GROUP BY b.run_id, b.source_timestamp_ns
     HAVING count(*) = 1
 ),
--- Ring buffers that objects without a topic used, with all that went through them.
+-- Ring buffers that were used by objects without a topic, with all that went through these buffers.
 unknown_buffer AS (
     SELECT r.run_id, r.process_id, r.buffer_handle
     FROM store.ring_buffer_event AS r

@@ -1,7 +1,8 @@
 -- name: derive.unstamped_publication
 -- kind: macro
--- description: Publications whose message can only be told by time: those of processes that never
---     say what stamp a message got. A publication without one in another process lost an event.
+-- description: Publications whose message can only be found by time: those of processes that
+--     never show the stamp of a message. In other processes, a publication without a stamp has
+--     lost an event.
 -- grain: one row per publication on a known topic, written by a process without stamps
 -- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.publisher, store.process, store.host,
@@ -22,7 +23,7 @@ SELECT
     b.publication_id,
     coalesce(b.rmw_ns, b.rcl_ns) AS written_ns,
     b.next_event_ns,
-    -- The thread may have gone on earlier, and published more, while it was not seen.
+    -- While it was not seen, the thread may have gone on earlier, and published more.
     coalesce(k.resumed_ns <= b.next_event_ns, false) AS has_break
 FROM store.publication AS b
 JOIN unstamped AS u ON b.process_id = u.process_id

@@ -1,6 +1,7 @@
 -- name: derive.annotation_conflict
 -- description: Inputs and outputs that one annotation declares periodic_async, and another
---     partial_sync: the caches would be emptied, and would not.
+--     partial_sync. Both cannot be right: the caches would be emptied by one, and kept by the
+--     other.
 -- grain: one row per run with such annotations
 -- needs: store.annotation, store.annotation_input, store.annotation_output, store.subscription,
 --     store.publisher

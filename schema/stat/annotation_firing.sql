@@ -1,8 +1,8 @@
 -- name: derive.annotation_firing
--- description: Publications by the outputs of annotations, with how many inputs they have a message
---     of: through an indirect link, or the message that the publishing callback instance was called
---     with. Where all inputs have to come together (partial_sync), only what the callback of an
---     input publishes.
+-- description: Publications by the outputs of annotations, with the number of inputs that they
+--     have a message of: through an indirect link, or as the message that the publishing callback
+--     instance was called with. Where all inputs have to come together (partial_sync), only
+--     publications from the callback of an input are listed.
 -- grain: one row per annotation and publication that it applies to
 -- needs: store.annotation, store.annotation_input, store.annotation_output, store.publication,
 --     store.link_causal, store.callback_instance, store.callback

@@ -1,7 +1,7 @@
 -- name: derive.callback_exclusion
--- description: Which callbacks of executors of several threads never run at the same time: those of
---     a mutually exclusive callback group, where the trace tells of groups. Else a callback is
---     taken to exclude itself alone, unless it was seen to run beside itself.
+-- description: Which callbacks of executors of several threads never run at the same time: those
+--     of a mutually exclusive callback group, where the trace tells of groups. Elsewhere a
+--     callback is assumed to exclude only itself, unless it was seen to run beside itself.
 -- grain: one row per callback that something excludes
 -- needs: derive.executor_run, derive.executor_size, store.callback_group,
 --     store.callback_group_member

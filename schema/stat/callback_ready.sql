@@ -3,8 +3,8 @@
 --     before its release, nor before the subscription was made. In an executor of one thread also
 --     not before it last went to sleep, nor before the last polling point but one, which would
 --     have found it (unless that callback ran in between: then more of its input may have
---     waited). Ready at the latest when the executor last learned what is ready before it picked
---     this callback.
+--     waited). At the latest when the executor last learned what is ready, before it picked this
+--     callback.
 -- grain: one row per callback instance that is not nested in another
 -- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
 --     store.executor_thread, store.executor_state, store.thread_break
@@ -15,8 +15,8 @@ WITH release AS (
     FROM derive.callback_release AS r
     JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
 ),
--- A thread among several picks what it runs when it begins to look, not when it runs it: another
--- one may have gone to wait in the meantime.
+-- A thread among several picks what it will run when it begins to look, not when it runs it:
+-- another thread may have gone to wait in the meantime.
 picked AS (
     SELECT callback_instance_id, executor_id, start_ns AS picked_ns
     FROM release
@@ -83,8 +83,8 @@ SELECT
     since,
     origin_ns,
     earliest_ns,
-    -- Published after the polling point: the queue was full, and it took the place of an older
-    -- message.
+    -- Published after the polling point: the queue was full, and this message took the place of an
+    -- older one.
     greatest(CASE WHEN polled_ns < earliest_ns THEN latest_ns ELSE polled_ns END, earliest_ns)
         AS latest_ns,
     start_ns,

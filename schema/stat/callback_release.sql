@@ -1,10 +1,10 @@
 -- name: derive.callback_release
--- description: Since when a callback instance can have been due (its release): a message since the
---     end of its publication, where the two clocks can be compared, else since its stamp; a request
---     since it was sent; a timer since the first instant after its previous call that is a whole
---     number of periods after its creation (unless it ran before that: it was reset). And by when
---     it was due for certain. Times are those of the executor's clock, those of others brought
---     to it.
+-- description: Since when a callback instance can have been due (its release), and by when it was
+--     due for certain. A message can have been due since the end of its publication, or since its
+--     stamp where the two clocks cannot be compared; a request since it was sent. A timer is due
+--     since the first instant after its previous call that is a whole number of periods after its
+--     creation; if it ran before that instant, it was reset. All times are those of the
+--     executor's clock; times of other clocks are brought to it.
 -- grain: one row per callback instance that is not nested in another
 -- needs: store.callback_instance, store.executor_thread, store.callback, store.timer,
 --     store.subscription, store.take, store.link_transport, store.publication, store.request,
@@ -42,8 +42,8 @@ message AS (
     LEFT JOIN derive.clock_comparable AS p
         ON b.process_id = p.process_id AND t.process_id = p.other_process_id
 ),
--- A timer is due at creation + k periods. Its creation is recorded a little after the first
--- of these instants begins to count: a hundredth of the period is left for that.
+-- A timer is due at creation + k periods. Its creation is recorded a little later than the instant
+-- from which the periods count: a hundredth of the period is allowed for that.
 timer_slot AS (
     SELECT
         i.callback_instance_id,
@@ -59,8 +59,8 @@ timer_slot AS (
     JOIN store.timer AS t ON c.timer_id = t.timer_id
     WHERE i.previous_start_ns IS NOT NULL AND t.period_ns > 0
 ),
--- A call shortly before such an instant was for it, or for one before it, almost a period late:
--- then that instant is still to come.
+-- A call shortly before such an instant was for that instant, or for the one before it, almost a
+-- period late. In the second case the instant is still to come.
 timer_next AS (
     SELECT
         callback_instance_id,

@@ -1,10 +1,10 @@
 -- name: derive.clock_bound
 -- kind: macro
--- description: What messages and packets say of how far two clocks are apart. They cannot be
---     received before they were sent: one to the clock `clock_id` says what has to be added to its
---     times at least to get those of `other_clock_id`, one from it says what at most. The
---     difference is `-sense * bound_ns`, so that of both directions the largest `bound_ns` tells
---     most.
+-- description: What messages and packets say of how far two clocks are apart. Nothing can be
+--     received before it was sent. So what was sent to the clock `clock_id` says what has to be
+--     added at least to its times to get those of `other_clock_id`; what was sent from it says
+--     what at most. The difference is `-sense * bound_ns`: in both directions the largest
+--     `bound_ns` tells most.
 -- grain: one row per pair of clocks and message or packet between them
 -- needs: derive.clock_way
 CREATE OR REPLACE MACRO derive.clock_bound(of_run) AS TABLE

@@ -1,12 +1,11 @@
 -- name: derive.clock_hull
 -- kind: macro
--- description: The corners of the convex hulls of what messages and packets say of two clocks, one
---     hull for each direction: the lower envelope of the delays. A line between both hulls that is
---     no steeper than clocks can drift apart is possible, any other is not.
---     First goes what another point makes superfluous at every possible drift, then, again and
---     again, what does not lie above the line through its neighbours.
---     Times count from `base_ns`, and differences from `base_bound_ns`, which keeps them exact as
---     DOUBLE.
+-- description: The corners of the convex hulls of what messages and packets say of two clocks,
+--     one hull for each direction: the lower envelope of the delays. A line between both hulls is
+--     possible if it is no steeper than clocks can drift apart; no other line is. First, what
+--     another point makes superfluous at every possible drift is dropped; then, again and again,
+--     what does not lie above the line through its neighbours. Times count from `base_ns`, and
+--     differences from `base_bound_ns`, which keeps them exact as DOUBLE.
 -- grain: one row per pair of clocks, direction and corner
 -- needs: derive.clock_bound, derive.clock_drift_limit
 CREATE OR REPLACE MACRO derive.clock_hull(of_run) AS TABLE

@@ -1,18 +1,18 @@
 -- name: derive.clock_pair
 -- kind: macro
 -- description: How the times of one clock become those of another, from the messages and packets
---     between them in both directions. Every line between the two hulls that is no steeper than
---     clocks can drift apart is possible. Where the hulls are nearest to each other, which is the
---     shortest round trip that was observed once the drift is taken out, the middle between them is
---     the offset and half the distance bounds its error; the possible line there that is parallel
---     to the longest edge of the hulls is the drift, and the steepest and the flattest line bound
---     its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar and Dagenais 2014).
---     `bounds` holds how far a possible line is from that one at most, at moments between which
---     that is a straight line. It grows where nothing passes one way.
---     Where no line is possible, the clocks do not run evenly, or drift apart faster than clocks
---     do: the line that misses least is given, and its error at any time is bounded by the fastest
---     of each stretch.
---     Without any in one of the directions, all is NULL.
+--     between them in both directions. Every line between the two hulls is possible that is no
+--     steeper than clocks can drift apart. The hulls are nearest to each other at the shortest
+--     round trip that was observed, once the drift is taken out. There, the middle between them
+--     is the offset, and half the distance bounds its error. The drift is that of the possible
+--     line through this middle that is parallel to the longest edge of the hulls; the steepest
+--     and the flattest possible line bound its error (Duda 1987; Poirier, Roy and Dagenais 2010;
+--     Jabbarifar and Dagenais 2014). `bounds` holds how far a possible line is at most from the
+--     chosen one: at some moments, with straight lines in between. It grows where nothing passes
+--     one way. Where no line is possible, the clocks do not run evenly, or drift apart faster
+--     than clocks do. Then the line that misses least is given, and its error at any time is
+--     bounded by the fastest message or packet of each stretch. Without any in one of the
+--     directions, all is NULL.
 -- grain: one row per pair of clocks with messages or packets between them
 -- needs: derive.clock_bound, derive.clock_hull, derive.clock_drift_limit, store.trace, store.host
 CREATE OR REPLACE MACRO derive.clock_pair(of_run) AS TABLE
@@ -179,7 +179,7 @@ recorded AS (
     WHERE h.run_id = of_run
     GROUP BY h.clock_id
 ),
--- As long as either of the two was recorded.
+-- From the first to the last moment at which either of the two was recorded.
 extent AS MATERIALIZED (
     SELECT
         l.clock_id, l.other_clock_id,
@@ -195,7 +195,8 @@ extent AS MATERIALIZED (
     LEFT JOIN recorded AS r ON l.clock_id = r.clock_id
     LEFT JOIN recorded AS o ON l.other_clock_id = o.clock_id
 ),
--- The hulls as possible lines leave them: where they are steeper, the steepest line counts.
+-- The hulls as far as possible lines can follow them: where a hull is steeper, the steepest line
+-- counts.
 limited AS MATERIALIZED (
     SELECT
         c.clock_id, c.other_clock_id, c.sense, c.moment, c.bound,

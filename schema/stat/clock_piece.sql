@@ -1,8 +1,8 @@
 -- name: derive.clock_piece
--- description: Bound of the error of the correction of a clock, as straight lines: it is
+-- description: The bound of the error of the correction of a clock, as straight lines. It is
 --     `uncertainty_ns` at `at_ns`, as the clock showed it, and changes by `growth` per time from
---     `from_ns` until the next row. Outside the moments for which a bound is known it grows as fast
---     as a clock can drift apart from what was chosen for it.
+--     `from_ns` until the next row. Outside the moments for which a bound is known, it grows as
+--     fast as a clock can drift away from its correction.
 -- grain: one row per clock and line
 -- needs: store.clock_uncertainty, store.clock, derive.clock_drift_limit
 WITH bound AS (

@@ -1,7 +1,7 @@
 -- name: derive.clock_shift
--- description: What to add to a time of one clock to get the time of another at which a message
---     sent then is received at the earliest: the shortest way of any message in ten seconds. Holds
---     from `from_ns` of the sender's clock until the next row.
+-- description: What to add to a time of one clock to get the earliest time of another clock at
+--     which a message sent then is received: the shortest way of any message in ten seconds.
+--     Holds from `from_ns` of the sender's clock until the next row.
 -- grain: one row per pair of clocks that exchange messages, and ten seconds
 -- needs: store.link_transport, store.publication, store.take, store.process, store.host
 WITH way AS (

@@ -1,10 +1,10 @@
 -- name: derive.clock_sync
 -- kind: macro
--- description: How the times of each clock become those of a reference: the first clock of those
---     that messages or packets in both directions connect. A clock that exchanges none with the
---     reference is joined through others, along the chain with the smallest sum of greatest
---     uncertainties; the errors of its steps add up. `bounds` holds the error at moments between
---     which it is at most a straight line.
+-- description: How the times of each clock become those of a reference. The reference is the
+--     first of the clocks that messages or packets in both directions connect. A clock that
+--     exchanges none with the reference is joined through others, along the chain with the
+--     smallest sum of greatest uncertainties; the errors of its steps add up. `bounds` holds the
+--     error at some moments; between them it is at most a straight line.
 -- grain: one row per clock
 -- needs: store.clock, derive.clock_pair, derive.corrected_ns, derive.recorded_ns,
 --     derive.clock_drift_limit
@@ -150,7 +150,7 @@ asked AS (
     JOIN sync AS v ON w.via_id = v.clock_id
     JOIN sync AS c ON m.clock_id = c.clock_id
 ),
--- Beyond what was recorded of a step, it grows as fast as clocks can drift apart.
+-- Outside the time that was recorded of a step, its bound grows as fast as clocks can drift apart.
 summed AS (
     SELECT
         a.clock_id, a.at_ns,

@@ -1,12 +1,12 @@
 -- name: derive.clock_way
--- description: What was sent on one clock and received on another, as far as it is known without
+-- description: What was sent on one clock and received on another, where this is known without
 --     comparing the two: messages matched by their stamps where there is no other candidate,
---     service requests and responses, and network packets.
---     A request or response may be reported long after it was sent, when its thread lost the CPU in
---     between. So the time of sending is that of what certainly came before: the begin of the
---     callback that sent the request, or the end of the service callback on the thread that sent
---     the response (else its begin, or the take of the request). Requests that no callback sent do
---     not count.
+--     service requests and responses, and network packets. A request or response may be reported
+--     long after it was sent, if its thread lost the CPU in between. So its time of sending is
+--     the time of something that certainly came before. For a request this is the begin of the
+--     callback that sent it; requests that no callback sent do not count. For a response it is
+--     the end of the service callback on the thread that sent it, else the begin of that
+--     callback, or the take of the request.
 -- grain: one row per message or packet between two clocks
 -- needs: store.link_transport, store.publication, store.take, store.request, store.response,
 --     store.link_request, store.callback_instance, store.thread, store.host,

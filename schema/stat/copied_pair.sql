@@ -1,7 +1,7 @@
 -- name: derive.copied_pair
 -- description: Placeholders that get copies of what a publisher passes on through ring buffers.
---     They are one subscription with the reader of the buffer, which nothing joins them with: what
---     they should have taken is not known.
+--     Each is one subscription with the reader of the buffer, but nothing in the trace joins the
+--     two. So it is not known what the placeholder should have taken.
 -- grain: one row per publisher and placeholder of a subscription
 -- needs: store.link_transport, store.subscription
 SELECT DISTINCT l.run_id, l.publisher_id, l.subscription_id

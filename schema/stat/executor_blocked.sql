@@ -1,6 +1,7 @@
 -- name: derive.executor_blocked
 -- description: Callback instances that kept others from starting although a thread of their
---     executor was free, since they exclude each other. With the sum of all such time before.
+--     executor was free, because a callback of one excludes that of the other. With the sum of
+--     all such time before.
 -- grain: one row per callback instance in an executor of several threads that excludes some
 -- needs: derive.executor_run, derive.callback_exclusion, derive.executor_busy
 WITH run AS (

@@ -1,8 +1,8 @@
 -- name: derive.executor_meanwhile
 -- kind: macro
--- description: What the threads of its executor ran while a callback instance waited, of some
---     instances, otherwise as main.executor_interference. The messages of a burst wait for each
---     other, so that all pairs are many, those of one instance few.
+-- description: What the threads of its executor ran while a callback instance waited, for some
+--     instances; otherwise as main.executor_interference. The messages of a burst wait for each
+--     other: the pairs of all instances would be many, those of one instance are few.
 -- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
 -- needs: derive.callback_ready, derive.executor_run, store.executor_thread
 CREATE OR REPLACE MACRO derive.executor_meanwhile(waiting) AS TABLE
@@ -25,8 +25,8 @@ run AS (
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
--- What a thread runs is in order, so those that overlap a wait are neighbours: from the one that
--- was under way when it began to the last one that began before it ended.
+-- What a thread runs is in order, so the instances that overlap a wait are neighbours: from the one
+-- that was under way when the wait began to the last one that began before the wait ended.
 bounded AS (
     SELECT
         w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,

@@ -1,8 +1,8 @@
 -- name: derive.expected_arrival
 -- description: When each message could be received at the earliest, on the clock of those who
---     subscribe to its topic: the end of its publication, which is shifted to another clock where
---     messages tell how far the two are apart, or else the correction of both does (NULL: nothing
---     tells).
+--     subscribe to its topic: at the end of its publication. That is shifted to another clock
+--     where messages tell how far the two are apart, else by the correction of both clocks (NULL:
+--     nothing tells).
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
 -- needs: store.publication, store.publisher, store.subscription, store.clock,
 --     derive.process_clock, derive.clock_shift, derive.corrected_ns, derive.recorded_ns

@@ -44,7 +44,7 @@ stampless AS (
     GROUP BY process_id
     HAVING count(source_timestamp_ns) = 0
 ),
--- Takes have no event of their own before Humble: no loss is why they have no stamp.
+-- Before Humble takes have no event of their own: that they have no stamp is not due to loss.
 stamping AS (
     SELECT process_id
     FROM store.process
@@ -62,7 +62,7 @@ sending AS (
     WHERE run_id = of_run
     GROUP BY topic_name, process_id
 ),
--- Processes that may have publishers of which the trace does not say the topic.
+-- Processes that may have publishers whose topic the trace does not show.
 incomplete AS (
     SELECT process_id FROM sending WHERE topic_name IS NULL
     UNION
@@ -105,8 +105,8 @@ sender AS (
     JOIN store.process AS p ON c.process_id = p.process_id
     LEFT JOIN presence AS r ON c.process_id = r.process_id
 ),
--- Each stamp on the host of each process that could have sent it. A publisher that was created
--- later, as the trace shows, could not.
+-- Each stamp, on the host of each process that could have sent it. If the trace shows that a
+-- publisher was created later, it could not.
 sent AS (
     SELECT
         o.take_id, s.process_id, s.created_ns, s.last_seen_ns, s.recorded_from_ns, s.is_known,
@@ -147,7 +147,8 @@ judged AS (
     ASOF LEFT JOIN gap AS g ON s.process_id = g.process_id AND s.until_ns >= g.start_ns
     GROUP BY s.take_id
 ),
--- Messages leave a buffer in the order in which they came: the time in which each was put in.
+-- Messages leave a buffer in the order in which they came. This gives the time in which each was
+-- put in.
 passed AS (
     SELECT l.subscription_id, t.taken_ns, b.end_ns
     FROM store.link_transport AS l

@@ -1,10 +1,10 @@
 -- name: derive.process_gap
 -- kind: macro
--- description: When each process may have done something that is not in its traces, for ASOF joins
---     as with derive.recording_gap: gaps of its recordings; the time before its first event, if it
---     existed before; and between two recordings. The tracer tells one process after the other to
---     stop and to go on, so that a pause lasts from the last event of the process before it to the
---     first one after it.
+-- description: When each process may have done something that is not in its traces, for ASOF
+--     joins as with derive.recording_gap: in gaps of its recordings; before its first event, if
+--     it existed then; and between two recordings. The tracer tells one process after the other
+--     to stop and to go on. So for a process, a pause lasts from its last event before the pause
+--     to its first one after it.
 -- grain: one row per process and gap
 -- needs: derive.process_presence, derive.recording, store.loss_interval, store.publication,
 --     store.take, store.callback_instance, store.executor_state, store.thread

@@ -1,8 +1,9 @@
 -- name: derive.process_presence
--- description: Where and from when on each process was recorded. A session that has nothing but
---     its initialisation does not count: what it did then is not in it. A process that existed
---     before is recorded from its first event on, as the tracer tells one process after the other
---     that it begins; one whose first events may have been lost, from the begin of the recording.
+-- description: Where each process was recorded, and from when on. A session that has nothing but
+--     the initialisation of the process does not count: what the process did then is not in it. A
+--     process that existed before is recorded from its first event on, because the tracer tells
+--     one process after the other that it begins. A process whose first events may have been lost
+--     counts from the begin of the recording.
 -- grain: one row per process and recording (the chunks of one trace) that it did something in
 -- needs: derive.recording, store.trace, store.process, store.publication, store.take,
 --     store.callback_instance, store.node, store.publisher, store.subscription, store.loss_interval

@@ -1,8 +1,9 @@
 -- name: derive.stamp_shift
 -- description: What to add to a stamp made on a host to get the time of its trace: stamps are of
---     the clock that can be set, which traces do not follow. The least and the greatest difference
---     between the publication's layers and its stamp in ten seconds: when its events were at the
---     earliest and at the latest. Hold from the stamp `from_ns` on.
+--     the clock that can be set, which traces do not follow. It is given as the least and the
+--     greatest difference between the publication's layers and its stamp in ten seconds, so that
+--     the shifted stamp says when the events of the publication were at the earliest and at the
+--     latest. Holds from the stamp `from_ns` on.
 -- grain: one row per host and ten seconds
 -- needs: store.link_transport, store.publication, store.take, store.process
 WITH difference AS (

@@ -1,6 +1,6 @@
 -- name: derive.subscription_reader
 -- description: Threads that take for a subscription: those that did, and those of the same
---     executor. Of a subscription that never took anything, every executor thread of its process.
+--     executor. If a subscription never took anything: every executor thread of its process.
 -- grain: one row per subscription and thread
 -- needs: store.take, store.subscription, store.executor_thread, store.thread
 WITH taking AS (

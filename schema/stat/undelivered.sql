@@ -1,13 +1,14 @@
 -- name: derive.undelivered
 -- kind: macro
--- description: Why a subscription did not take a message of its topic; the first reason that holds.
---     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
---     message in the queue would have ended it. A wait tells only where a single thread reads, and
---     only if it lasted ten times as long as messages usually need, at least a millisecond. A
---     reader that gets no CPU seems to wait, too: then it takes the message when it wakes up.
---     `overwritten` and `lost_in_transport` are told apart by the depth of the queue alone. Where
---     the subscription took a message in that time that could not be identified, nothing is said;
---     nor that messages were overwritten where it took none of the publisher, and no later one.
+-- description: Why a subscription did not take a message of its topic; the first reason that
+--     holds. Everything is compared on the clock of the receiver. `not_delivered` rests on a
+--     wait: a message in the queue would have ended it. A wait tells this only where a single
+--     thread reads, and only if it lasted ten times as long as messages usually need, at least a
+--     millisecond. A reader that gets no CPU seems to wait, too, but takes the message when it
+--     wakes up. `overwritten` and `lost_in_transport` are told apart by the depth of the queue
+--     alone. Nothing is said where the subscription took a message in that time that could not be
+--     identified. Nor are messages said to be overwritten where the subscription took none of the
+--     publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 -- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap, store.publisher,
 --     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state,
@@ -131,7 +132,7 @@ known AS (
         n.taken_ns AS any_taken_ns,
         n.arrival_ns AS next_arrival_ns,
         e.arrival_ns > m.arrival_ns AS is_before_first,
-        -- From when on the two could know each other: neither would have had to before.
+        -- From when on publisher and subscription could know each other: they need not have before.
         greatest(
             coalesce(s.created_ns, 0),
             CASE WHEN m.has_one_clock THEN coalesce(b.created_ns, 0) ELSE 0 END
@@ -151,9 +152,9 @@ known AS (
         ON m.subscription_id = n.subscription_id AND m.arrival_ns < n.arrival_ns
 ),
 -- When it was certain that the message is not in the queue: the reader waited for long, after the
--- message had arrived and before the next one that was taken did. That tells nothing where the
--- reader may have been kept from the CPU: it took that one late, or as many are missing in a row
--- as its queue holds.
+-- message had arrived, and before the next message that was taken arrived. That tells nothing if
+-- the reader may have been kept from the CPU: if it took that next message late, or if as many
+-- messages are missing in a row as its queue holds.
 waiting AS (
     SELECT
         k.*,
@@ -192,7 +193,7 @@ bounded AS (
             least(publisher_taken_ns, waited_ns),
             least(greatest(arrival_ns, last_seen_ns) + longest_ns, replaced_ns)
         ) AS until_ns,
-        -- Who waits for the CPU takes what came when it gets it.
+        -- A reader that waits for the CPU takes what came by the time it gets it.
         CASE WHEN waited_ns IS NOT NULL THEN least(publisher_taken_ns, wakes_ns + patience_ns) END
             AS awake_until_ns,
         coalesce(any_taken_ns, least(last_seen_ns, replaced_ns)) AS gone_ns,

@@ -1,7 +1,7 @@
 -- name: derive.vain_take
--- description: Attempts of readers that were told of a message and found none: it had expired. A
---     callback that takes by hand looks whether there is one; finding none says nothing. Nor does
---     an attempt behind a callback that was never seen to end: it may be inside.
+-- description: Attempts of readers that were told of a message and found none: it had expired. An
+--     attempt says nothing if a callback takes by hand, only to look whether there is a message;
+--     nor behind a callback that was never seen to end, as the attempt may be inside of it.
 -- grain: one row per attempt outside of callbacks
 -- needs: store.failed_take, store.callback_instance
 SELECT f.run_id, f.subscription_id, f.thread_id, f.failed_ns
