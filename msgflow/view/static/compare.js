@@ -74,7 +74,7 @@ export class ComparePage {
       isQuick ? waiting(`${count(subjects.size, ONE_OF[this.what])} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
         : h("p", {}, `${count(changed.size, ONE_OF[this.what])} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. Separation says how rarely values of one run are found among those of the other, not how far apart they are.`),
       dataTable(table, { label: isQuick ? "measured" : "comparison", only: (row) => isQuick || this.all || differs(row), nothing: "No difference is shown.",
-        columns: isQuick ? MEASURED : COMPARED,
+        columns: isQuick ? MEASURED : COMPARED, once: "subject",
         onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),
       notes(table.meta.notes), command(table.meta.command));
     if (this.what === "paths" && table.rows && this.subject === null) {

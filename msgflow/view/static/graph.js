@@ -73,6 +73,9 @@ export class GraphPage {
     if (!chosen.size) { clear(this.picture, h("p", { className: "nothing" }, vertices.size ? "Nothing has this in its name." : "There are no nodes that publish, receive, or call.")); return; }
     try {
       clear(this.picture, this.layout(chosen, edges.filter((edge) => chosen.has(edge.from) && chosen.has(edge.to))));
+      // Where the picture is larger than its place, what comes first is in the middle.
+      this.picture.scrollLeft = this.first.x - this.picture.clientWidth / 2;
+      this.picture.scrollTop = this.first.y - this.picture.clientHeight / 2;
     } catch (error) {
       clear(this.picture, failed(error));
     }
@@ -114,6 +117,9 @@ export class GraphPage {
     const root = svg("svg", { width: Math.ceil(width * scale), height: Math.ceil(height * scale), viewBox: `0 0 ${Math.ceil(width)} ${Math.ceil(height)}`, role: "img", "aria-label": "graph of nodes and topics" });
     root.append(svg("defs", {}, ["transport", "indirect", "service"].map((name) => svg("marker", { id: `tip-${name}`, viewBox: "0 0 8 8", refX: 7, refY: 4, markerWidth: 7, markerHeight: 7, orient: "auto" },
       svg("path", { d: "M0,0 L8,4 L0,8 z", class: `fill-${name}` })))));
+    const along = graph.graph().rankdir === "TB" ? "y" : "x";
+    const first = [...chosen].map((key) => graph.node(key)).reduce((a, b) => (b[along] < a[along] ? b : a));
+    this.first = { x: first.x * scale, y: first.y * scale };
     const names = [];
     for (const key of used) {
       const box = graph.node(key);

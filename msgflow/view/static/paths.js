@@ -67,6 +67,7 @@ export class PathsPage {
     const parts = h("div", {}, waiting("taking the latency apart …"));
     app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path)))
       .catch((error) => clear(parts, failed(error)));
+    const bins = evenBins(histogram);
     const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null, source: begin,
       flow: Number.isNaN(source.take_id[at]) || source.take_id[at] === null ? `${source.root_kind[at]}:${source.root_id[at]}` : `take:${source.take_id[at]}` });
     return [
@@ -78,7 +79,7 @@ export class PathsPage {
             xFormat: (value) => `${+(value / 1e9).toFixed(6)} s`, title: "latency over time", onClick: (at) => { location.hash = toFlow(points, at); } }),
           besides("as a table", dataTable(points, { columns: ["root_at", "latency", "median", "count", "missing"], label: "latency over time", onPick: (at) => { location.hash = toFlow(points, at); } }))),
         h("section", {}, h("h3", {}, "Histogram"),
-          chart(Array.from(histogram.low), [{ label: "flows", color: "timer", values: Array.from(histogram.count), bars: true, fill: true }],
+          chart(bins.low, [{ label: "flows", color: "timer", values: bins.count, bars: true, fill: true }],
             { xFormat: duration, yFormat: (value) => value.toLocaleString("en-US"), title: "histogram of the latency" }),
           besides("as a table", dataTable(histogram, { columns: ["low", "width", "count"], label: "histogram" }))),
         h("section", {}, h("h3", {}, "Share of the flows that took no longer"),
@@ -152,4 +153,22 @@ function pointSeries(points) {
   const series = [{ label: several ? "slowest" : "latency", color: several ? "process" : "timer", values: latency, points: true }];
   if (several) series.push({ label: "median", color: "timer", values: Array.from(points.median, (value) => (Number.isNaN(value) ? null : value)), width: 1.5 });
   return series;
+}
+
+// The answer has only bins with flows; bars are as wide as the least distance between two, and the
+// last one ends where another would begin.
+function evenBins(histogram) {
+  const [low, values] = [[], []];
+  for (let row = 0; row < histogram.rows; row++) {
+    while (low.length <= histogram.bin[row]) {
+      low.push(histogram.low[0] + low.length * histogram.width[0]);
+      values.push(0);
+    }
+    values[histogram.bin[row]] = histogram.count[row];
+  }
+  if (low.length) {
+    low.push(low.at(-1) + histogram.width[0]);
+    values.push(0);
+  }
+  return { low, count: values };
 }

@@ -6,7 +6,8 @@ import { cell, title, count } from "./words.js";
 const SHOWN = 100;
 const HIDDEN = new Set(["run_id"]);
 
-// Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, link(row, name).
+// Options: columns (names, in order), onPick(row), picked (row), sort, label, shown,
+// once (a column whose value is written out only where it differs from the row above).
 export function dataTable(table, options = {}) {
   const described = table.meta?.columns ?? {};
   const names = options.columns ?? table.columns.map((column) => column.name)
@@ -43,10 +44,11 @@ export function dataTable(table, options = {}) {
       const is = sort?.name === columns[position].name;
       head.setAttribute("aria-sort", is ? (sort.down ? "descending" : "ascending") : "none");
     });
-    clear(body, order.slice(0, shown).map((row) => {
+    clear(body, order.slice(0, shown).map((row, place) => {
       const cells = columns.map((column, position) => {
         const isNumber = column.type === "integer" || column.type === "double";
-        const text = cell(table[column.name][row], column);
+        const isAgain = column.name === options.once && place && table[column.name][row] === table[column.name][order[place - 1]];
+        const text = isAgain ? "〃" : cell(table[column.name][row], column);
         const inside = position === 0 && options.onPick
           ? h("button", { type: "button", className: "pick" }, text ? (isNumber ? text : breakable(text)) : "–") : isNumber ? text : breakable(text);
         return h("td", { className: isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}` }, inside);
