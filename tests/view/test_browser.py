@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import itertools
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -288,6 +289,28 @@ def test_numbers_of_the_overview_are_those_of_the_queries(
                 for row in topics
             ][:12]
         )
+
+
+def test_a_histogram_has_bins_without_flows_too(
+    demo: Path, read: Read, report: Report, page: Page
+) -> None:
+    """Between the shortest and the longest latency, and one where the last one ends."""
+    page.open(f"{report(demo)}#/paths")
+    page.page.get_by_text("What the latency consists of").wait_for()
+    bins = page.page.evaluate("msgflow.page.bins")
+    path = page.page.locator("h2.path-title").text_content()
+    with open_db(demo) as opened:
+        rows = opened.query("e2e-latency").to_arrow().to_pylist()
+    (expected,) = [row for row in rows if row["path"] == path]
+    assert sum(bins["count"]) == expected["reached"]
+    assert bins["count"][-1] == 0
+    low = bins["low"]
+    width = low[1] - low[0]
+    assert [later - earlier for earlier, later in itertools.pairwise(low)] == [width] * (
+        len(low) - 1
+    )
+    assert low[0] == expected["min_ns"]
+    assert low[-2] <= expected["max_ns"] < low[-1]
 
 
 def test_a_screenshot_is_no_blank_page(demo: Path, read: Read, report: Report, page: Page) -> None:

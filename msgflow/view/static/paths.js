@@ -67,7 +67,7 @@ export class PathsPage {
     const parts = h("div", {}, waiting("taking the latency apart …"));
     app.query("path-breakdown").then((breakdown) => clear(parts, this.breakdown(breakdown, path)))
       .catch((error) => clear(parts, failed(error)));
-    const bins = evenBins(histogram);
+    const bins = this.bins = evenBins(histogram);
     const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null, source: begin,
       flow: Number.isNaN(source.take_id[at]) || source.take_id[at] === null ? `${source.root_kind[at]}:${source.root_id[at]}` : `take:${source.take_id[at]}` });
     return [
