@@ -14,7 +14,7 @@ import re
 import secrets
 import socket
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -130,6 +130,32 @@ class Turns:
                 self._changed.notify_all()
 
 
+class Ahead:
+    """Asks for the timeline of the latest run before the page does.
+
+    The bars of a large run are counted once, which takes longer than a browser needs to open.
+    """
+
+    def __init__(self, turns: Turns, pages: Pages, cursor: duckdb.DuckDBPyConnection) -> None:
+        self._turns = turns
+        self._pages = pages
+        self._cursor = cursor
+        self._thread = threading.Thread(target=self._ask, daemon=True)
+        self._thread.start()
+
+    def _ask(self) -> None:
+        # Whoever asks for it meets the same error, and is told.
+        with suppress(MsgflowError, duckdb.Error):
+            self._turns.ask(lambda: self._pages.answer(self._cursor, "segments", {}))
+
+    def stop(self) -> None:
+        """End it, if it still asks."""
+        while self._thread.is_alive():
+            self._cursor.interrupt()
+            self._thread.join(_SECONDS_BETWEEN_LOOKS)
+        self._cursor.close()
+
+
 def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
     try:
         return question()
@@ -163,6 +189,7 @@ class Shared:
         )  # fmt: skip
         self.turns = Turns(Memory(self._base.cursor(), self._memory_limit, default=USUAL_MEMORY))
         self.pages = Pages()
+        self._ahead = Ahead(self.turns, self.pages, self._base.cursor())
 
     def require_same(self, generation: str | None) -> None:
         """Raise where the page was made of another file than is there now.
@@ -195,6 +222,7 @@ class Shared:
             return self._base.cursor()
 
     def _close(self) -> None:
+        self._ahead.stop()
         self._base.close()
         self.pages.close()
 

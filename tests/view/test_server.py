@@ -24,7 +24,8 @@ from tables import decoded
 from msgflow.db.memory import Memory
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
-from msgflow.view.server import Turns, is_local, listen, serve
+from msgflow.view.pages import Pages
+from msgflow.view.server import Ahead, Turns, is_local, listen, serve
 
 Serve = Callable[[Path], Served]
 
@@ -301,3 +302,34 @@ def test_other_failures_are_not_tried_again() -> None:
     with pytest.raises(QueryError):
         Turns(Memory(duckdb.connect(), None)).ask(ask)
     assert len(tries) == 1
+
+
+class Asked(Pages):
+    """Notes what it is asked, and runs a statement for it."""
+
+    def __init__(self, statement: str) -> None:
+        super().__init__()
+        self.statement = statement
+        self.asked: list[tuple[str, dict[str, Any]]] = []
+        self.is_asked = threading.Event()
+
+    def answer(
+        self, connection: duckdb.DuckDBPyConnection, name: str, params: dict[str, Any]
+    ) -> bytes:
+        self.asked.append((name, params))
+        self.is_asked.set()
+        connection.execute(self.statement).fetchall()
+        return b""
+
+
+@pytest.mark.parametrize("statement", ["SELECT 1", "FROM nowhere", "FROM range(1000000000000)"])
+def test_the_timeline_is_counted_before_the_page_asks(statement: str) -> None:
+    """It is ended with the server, however long it takes; of what fails the page will be told."""
+    with duckdb.connect() as connection:
+        pages = Asked(f"SELECT count(*) FROM ({statement})")
+        turns = Turns(Memory(connection, None))
+        ahead = Ahead(turns, pages, connection.cursor())
+        assert pages.is_asked.wait(10)
+        ahead.stop()
+        assert pages.asked == [("segments", {})]
+        assert turns.ask(lambda: b"next") == b"next"
