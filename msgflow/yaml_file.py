@@ -9,8 +9,10 @@ from msgflow.errors import UsageError
 from msgflow.text_file import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
+
+_WIDTH = 80
 
 
 @dataclass(frozen=True)
@@ -125,3 +127,20 @@ def line_of(node: Any) -> int:
 def is_null(node: Any) -> bool:
     """Tell whether a node says nothing."""
     return str(node.tag) == "tag:yaml.org,2002:null"
+
+
+def list_lines(key: str, items: Sequence[str]) -> list[str]:
+    """Return the lines of a list in brackets, for files that people read in a terminal.
+
+    Args:
+        key: with the spaces before it.
+        items: as YAML writes them.
+    """
+    lines = [f"{key}: ["]
+    indent = " " * (len(key) - len(key.lstrip()) + 2)
+    for place, item in enumerate(items, start=1):
+        text = f"{item}, " if place < len(items) else f"{item}]"
+        if len(lines[-1]) + len(text.rstrip()) > _WIDTH:
+            lines.append(indent)
+        lines[-1] += text
+    return [line.rstrip() for line in lines]

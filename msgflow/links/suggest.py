@@ -7,6 +7,8 @@ import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
+from msgflow.yaml_file import list_lines
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -48,7 +50,7 @@ def _entry(row: Mapping[str, Any]) -> list[str]:
     if row["is_name_repeated"]:
         lines += [f"    process: {row['pid']}", f"    host: {_quoted(row['host'])}"]
     for side in ("inputs", "outputs"):
-        lines.append(f"    {side}: [{', '.join(map(_quoted, row[side]))}]")
+        lines += list_lines(f"    {side}", [_quoted(name) for name in row[side]])
     return lines
 
 

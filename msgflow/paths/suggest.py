@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.query.human import format_duration, printable
 from msgflow.query.wrapping import ARROW, wrap_path
+from msgflow.yaml_file import list_lines
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -77,7 +78,7 @@ def _entry(
     ]
     for word, places in (("via", via), ("without", without)):
         if places:
-            lines.append(f"    {word}: [{', '.join(map(_quoted, places))}]")
+            lines += list_lines(f"    {word}", [_quoted(place) for place in places])
     return lines
 
 

@@ -147,9 +147,17 @@ def test_suggestions_tell_paths_apart_that_begin_and_end_alike(tmp_path: Path) -
     assert read_paths(file).paths == ()
 
 
-def test_comments_of_suggestions_are_no_wider_than_a_narrow_terminal() -> None:
-    path = " → ".join(f"/perception/node_{n} → /perception/topic_{n}" for n in range(9))
-    text = suggest_paths([{"path": f"{path} → /end", "roots": 2, "reached": 1, "p99_ns": 5}])
-    lines = [line for line in text.splitlines() if line.lstrip().startswith("#")]
-    assert max(map(len, lines)) <= 80
-    assert "".join(line.strip(" #") for line in lines).count("→") == 18
+def test_suggestions_are_no_wider_than_a_narrow_terminal(tmp_path: Path) -> None:
+    counts = {"roots": 2, "reached": 1, "p99_ns": 5}
+    begin, end = "/start → /image → ", " → /end"
+    ways = [
+        " → ".join(f"/perception/{way}_{n} → /perception/{way}_topic_{n}" for n in range(9))
+        for way in ("node", "other")
+    ]
+    text = suggest_paths([{"path": begin + way + end, **counts} for way in ways])
+    assert max(map(len, text.splitlines())) <= 80
+    assert text.count("→") == 2 * 20
+    file = tmp_path / "paths.yaml"
+    file.write_text(text, encoding="utf-8")
+    words = read_paths(file).paths[0].words()
+    assert words["via"].count(",") == words["without"].count(",") == 17
