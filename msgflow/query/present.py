@@ -41,6 +41,8 @@ _WANTED = 6
 # does not say what is important, into more.
 _NARROW = 16
 _WORD = 40
+# Text of so few cells is broken for the most important columns alone, as names are.
+_SHORT = 20
 _LINES = 4
 _LINES_OF_SQL = 10
 
@@ -217,7 +219,7 @@ def _measured(
             width,
             max(cell_len(title), min(piece, _WORD), _NARROW, -(-most * 5 // (4 * lines))),
         )
-        least = min(width, max(broken, min(word, _WORD)))
+        least = width if width <= _SHORT else min(width, max(broken, min(word, _WORD)))
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
 
 

@@ -262,6 +262,20 @@ def test_widths_are_those_with_which_rows_take_few_lines() -> None:
     assert not lines[7].startswith((" ", "/"))
 
 
+def test_short_text_is_not_broken_for_a_less_important_column() -> None:
+    rows = [
+        {
+            "node": "/a", "callback": "Timer(10 ms)", "wait_ns": n + 10**6, "start_ns": BEGIN + n,
+            "busy_min_ns": n, "busy_max_ns": n, "since": f"of the last timer {n}",
+        }
+        for n in range(2)
+    ]  # fmt: skip
+    waits = result_of("waits", rows)
+    least = next(width for width in range(60, 99) if "since" in titles_of(waits, width))
+    assert "of the last timer 0" in lines_of(waits, least)[2]
+    assert least > 60
+
+
 def test_what_a_note_says_of_all_rows_takes_no_room_from_the_rest() -> None:
     rows = [latency(SHORT, 13_035_000), latency(CAMERA, 21_070_000)]
     shown = present(result_of("e2e-latency", rows), 100)
