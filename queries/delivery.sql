@@ -25,9 +25,9 @@
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
 -- column: subscription_id BIGINT    Identity of the subscription
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, delivered, lost, unknown, delivered_percent, skipped,
+-- brief: topic_name, subscriber, delivered, skipped, lost, delivered_percent, unknown,
 --     lost_percent, published, reasons, unconnected, orphans, orphan_reasons
--- answer: delivered, lost, unknown
+-- answer: delivered, skipped, lost, unknown
 -- needs: main.stat_delivery, main.stat_orphan, main.publication, main.take, main.subscription,
 --     main.node, main.process
 WITH outcome AS (

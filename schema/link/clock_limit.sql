@@ -45,7 +45,7 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- writes by chance.
     'writing_share': 0.2,
     -- The limit of the delays of a publisher: twice what nearly all take, or four times what half
-    -- of them take.
+    -- of them take. Less than half of what nearly all take at least is unusual, too.
     'usual_quantile': 0.99,
     'usual_factor': 2,
     'median_factor': 4,
