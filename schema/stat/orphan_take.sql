@@ -6,7 +6,9 @@
 --     is missing (possible senders), and all with any publisher where the topic is not known. What
 --     comes out of a ring buffer has no stamp: it was put in after the message before it, which
 --     came from there. A stamp that a message of another topic has, behind a gap since the
---     subscription was created: another subscription may have its handle by then.
+--     subscription was created: another subscription may have its handle by then. That all known
+--     senders had ended says nothing where a publisher whose topic is not known published at that
+--     moment.
 -- grain: one row per take whose publication is not known
 -- needs: store.take, store.link_transport, store.subscription, store.publisher, store.node,
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
@@ -55,6 +57,14 @@ stamping AS (
         WHERE t.run_id = of_run AND t.source_timestamp_ns IS NOT NULL
             AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
     )
+),
+-- Publications of which neither topic nor message is known.
+nameless AS (
+    SELECT b.process_id, b.end_ns
+    FROM store.publication AS b
+    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE b.run_id = of_run AND p.topic_name IS NULL AND b.source_timestamp_ns IS NULL
+        AND EXISTS (SELECT 1 FROM orphan)
 ),
 sending AS (
     SELECT topic_name, process_id, min(coalesce(created_ns, 0)) AS created_ns
@@ -141,10 +151,14 @@ judged AS (
             bool_and(s.last_seen_ns < s.latest_ns) FILTER (WHERE s.is_known),
             bool_and(s.last_seen_ns < s.latest_ns)
         ) AS has_none_left,
+        coalesce(
+            bool_or(n.end_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns), false
+        ) AS has_nameless,
         bool_or(s.last_seen_ns < s.latest_ns OR s.at_ns < s.recorded_from_ns) AS has_absent,
         bool_or(s.is_stampless AND s.created_ns <= s.at_ns) AS has_stampless
     FROM sent AS s
     ASOF LEFT JOIN gap AS g ON s.process_id = g.process_id AND s.until_ns >= g.start_ns
+    ASOF LEFT JOIN nameless AS n ON s.process_id = n.process_id AND s.until_ns >= n.end_ns
     GROUP BY s.take_id
 ),
 -- Messages leave a buffer in the order in which they came. This gives the time in which each was
@@ -202,7 +216,7 @@ SELECT
         WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))
             THEN 'before_tracing'
         WHEN j.has_gap THEN 'publisher_gap'
-        WHEN j.has_none_left THEN 'publisher_trace_ends'
+        WHEN j.has_none_left AND NOT j.has_nameless THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
             SELECT take_id FROM derive.take_candidate(of_run)
         ) OR (o.topic_name, o.stamp_ns) IN (

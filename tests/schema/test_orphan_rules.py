@@ -273,6 +273,34 @@ def test_all_that_are_known_to_send_ended(con: duckdb.DuckDBPyConnection) -> Non
 
 
 @pytest.mark.parametrize(
+    ("end", "stamp", "topic", "expected"),
+    [
+        (STAMP - MS, "NULL", "NULL", "unknown"),
+        (STAMP + MS, "NULL", "NULL", "unknown"),
+        (STAMP - MS - 1, "NULL", "NULL", "publisher_trace_ends"),
+        (STAMP + MS + 1, "NULL", "NULL", "publisher_trace_ends"),
+        (STAMP, "7", "NULL", "publisher_trace_ends"),
+        (STAMP, "NULL", "'/b'", "publisher_trace_ends"),
+    ],
+)
+def test_who_published_then_on_a_topic_that_is_not_known_may_have_sent_it(
+    con: duckdb.DuckDBPyConnection, end: int, stamp: str, topic: str, expected: str
+) -> None:
+    """Unless its message is known; though all that are known to send had ended."""
+    published = (
+        "UPDATE store.publisher SET publisher_id = process_id;"
+        "INSERT INTO store.publisher (process_id, publisher_id, topic_name, created_ns) "
+        f"VALUES (2, 3, {topic}, 0);"
+        "INSERT INTO store.publication (process_id, publisher_id, source_timestamp_ns, end_ns) "
+        f"VALUES (2, 3, {stamp}, {end})"
+    )
+    found = reason(
+        con, TAKE, SENDER, RECORDED, OTHER.format("NULL"), seen_until(STAMP - 1), published
+    )
+    assert found == expected
+
+
+@pytest.mark.parametrize(
     ("created", "stamp", "expected"),
     [
         (STAMP, "NULL", "unknown"),
