@@ -76,7 +76,11 @@ class App {
     const { page, run } = current();
     for (const { page: name, link } of this.tabs) {
       link.href = name === page ? address({}) : `#/${name}${run ? `?run=${encodeURIComponent(run)}` : ""}`;
-      if (name === page) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current");
+      if (name === page) {
+        link.setAttribute("aria-current", "page");
+        // Not all tabs fit on a phone.
+        link.scrollIntoView({ block: "nearest", inline: "nearest" });
+      } else link.removeAttribute("aria-current");
     }
   }
 

@@ -69,12 +69,19 @@ export class ComparePage {
     const changed = new Set();
     for (let row = 0; row < table.rows; row++) if (differs(row)) changed.add(table.subject[row]);
     const subjects = new Set(table.subject);
+    // What changed most comes first, behind it what is in one run only.
+    const most = new Map();
+    for (let row = 0; row < table.rows; row++) {
+      const size = differs(row) ? Math.abs(table.difference_ns[row]) || 0.5 : 0;
+      most.set(table.subject[row], Math.max(most.get(table.subject[row]) ?? 0, size));
+    }
     const isQuick = table.meta.is_quick;
     clear(this.body,
       isQuick ? waiting(`${count(subjects.size, ONE_OF[this.what])} measured; which of them differ takes confidence intervals, from resampling: these are being computed …`)
         : h("p", {}, `${count(changed.size, ONE_OF[this.what])} of ${subjects.size} differ between ${table.meta.a} (A) and ${table.meta.b} (B): the 95 % confidence interval of B − A does not contain 0. Separation says how rarely values of one run are found among those of the other, not how far apart they are.`),
       dataTable(table, { label: isQuick ? "measured" : "comparison", only: (row) => isQuick || this.all || differs(row), nothing: "No difference is shown.",
         columns: isQuick ? MEASURED : COMPARED, once: "subject",
+        order: (a, b) => most.get(table.subject[b]) - most.get(table.subject[a]) || a - b,
         onPick: this.what === "paths" ? (row) => this.overlay(table.subject[row]) : undefined }),
       notes(table.meta.notes), command(table.meta.command));
     if (this.what === "paths" && table.rows && this.subject === null) {

@@ -59,7 +59,9 @@ export class OverviewPage {
       if (!order.length) return [h("p", {}, table.rows ? "No flow reached the end of a path." : "There are no paths: no message is known to have been taken."), notes(table.meta.notes)];
       const ids = pathNumbers(table, await app.fetch("path"));
       return [
-        h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. Dark: half of its flows arrived within this time (median); light: 99 % of them (p99). A click shows more."),
+        h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. A click shows more."),
+        h("div", { className: "legend" }, [["bar-median", "median: half of its flows took no longer"], ["bar-p99", "p99: 99 % of them took no longer"]].map(([shade, text]) =>
+          h("span", { className: "legend-item" }, h("span", { className: `swatch ${shade}` }), text))),
         h("ol", { className: "slow" }, order.slice(0, 10).map((row) => h("li", {},
           h("a", { href: address({ page: "paths", path: ids[row] }) },
             h("span", { className: "bar-track" }, bar(table.median_ns[row] / most, "bar-median"), bar(table.p99_ns[row] / most, "bar-p99")),

@@ -124,10 +124,12 @@ export class PathsPage {
     const stack = h("div", { className: "stack", role: "img", "aria-label": "stacked breakdown" });
     const kinds = [...new Set(rows.map((row) => breakdown.part[row]))];
     const shade = (kind) => PART_COLORS[kind] ?? "faint";
+    // A piece with a duration in it is as wide as that.
+    const least = Math.max(0.06, 70 / (this.root.clientWidth || 900));
     for (const row of rows) {
       const share = Math.max(breakdown.total_ns[row], 0) / whole;
-      const piece = h("span", { className: `piece${share > 0.06 ? "" : " thin"}${PALE.has(shade(breakdown.part[row])) ? " pale" : ""}`, title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
-        share > 0.06 ? duration(breakdown.mean_ns[row]) : "");
+      const piece = h("span", { className: `piece${share > least ? "" : " thin"}${PALE.has(shade(breakdown.part[row])) ? " pale" : ""}`, title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${breakdown.node[row] ?? "?"}: ${duration(breakdown.mean_ns[row])} mean` },
+        share > least ? duration(breakdown.mean_ns[row]) : "");
       piece.style.width = `${100 * share}%`;
       piece.style.background = color(shade(breakdown.part[row]));
       stack.append(piece);

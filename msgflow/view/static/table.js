@@ -6,8 +6,8 @@ import { cell, title, count } from "./words.js";
 const SHOWN = 100;
 const HIDDEN = new Set(["run_id"]);
 
-// Options: columns (names, in order), onPick(row), picked (row), sort, label, shown,
-// once (a column whose value is written out only where it differs from the row above).
+// Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, order (compares
+// two rows before any column is chosen), once (a column that is left empty below an equal value).
 export function dataTable(table, options = {}) {
   const described = table.meta?.columns ?? {};
   const names = options.columns ?? table.columns.map((column) => column.name)
@@ -16,6 +16,7 @@ export function dataTable(table, options = {}) {
     .filter(Boolean);
   const order = Array.from({ length: table.rows }, (_, row) => row)
     .filter((row) => !options.only || options.only(row));
+  if (options.order) order.sort(options.order);
   let sort = options.sort ?? null;
   let shown = options.shown ?? SHOWN;
   const body = h("tbody");
@@ -48,8 +49,8 @@ export function dataTable(table, options = {}) {
       const cells = columns.map((column, position) => {
         const isNumber = column.type === "integer" || column.type === "double";
         const isAgain = column.name === options.once && place && table[column.name][row] === table[column.name][order[place - 1]];
-        const text = isAgain ? "〃" : cell(table[column.name][row], column);
-        const inside = position === 0 && options.onPick
+        const text = isAgain ? "" : cell(table[column.name][row], column);
+        const inside = position === 0 && options.onPick && !isAgain
           ? h("button", { type: "button", className: "pick" }, text ? (isNumber ? text : breakable(text)) : "–") : isNumber ? text : breakable(text);
         return h("td", { className: isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}` }, inside);
       });
