@@ -27,7 +27,7 @@
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, subscriber, delivered, skipped, lost, delivered_percent, unknown,
 --     lost_percent, published, reasons, unconnected, orphans, orphan_reasons
--- answer: delivered, skipped, lost, unknown
+-- answer: delivered, lost, unknown
 -- needs: main.stat_delivery, main.stat_orphan, main.publication, main.take, main.subscription,
 --     main.node, main.process
 WITH outcome AS (
