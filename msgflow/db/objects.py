@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import duckdb
 
 # Folders whose objects live in the database; each may need only those to its left, and itself.
-VIEW_LAYERS = ("link", "flow", "stat", "public")
+VIEW_LAYERS = ("link", "flow", "clock", "stat", "public")
 
 # Of a database: tables, what is derived from them, and what users read.
 SCHEMAS = ("store", "derive", "main")
@@ -26,14 +26,14 @@ SCHEMAS = ("store", "derive", "main")
 
 @cache
 def load(layer: str) -> tuple[Header, ...]:
-    """Return the objects of one folder of `schema/`, each after those that it needs.
+    """Return the objects of one folder of `schema/` and its rooms, each after those it needs.
 
     Raises:
         ValueError: two objects need each other.
     """
     directory = resource_directory("schema") / layer
     return sort(
-        parse(path.read_text(encoding="utf-8"), path) for path in sorted(directory.glob("*.sql"))
+        parse(path.read_text(encoding="utf-8"), path) for path in sorted(directory.rglob("*.sql"))
     )
 
 
@@ -81,13 +81,13 @@ def definition_hash() -> str:
 @cache
 def derivation_hash() -> str:
     """Return the SHA-256 of the SQL that derives what is stored of links and of what is missing."""
-    return _hash(_texts(("link", "stat")))
+    return _hash(_texts(("link", "clock", "stat")))
 
 
 def _texts(layers: Sequence[str]) -> Iterable[str]:
     root = resource_directory("schema")
     for layer in layers:
-        for path in sorted((root / layer).glob("*.sql")):
+        for path in sorted((root / layer).rglob("*.sql")):
             yield path.name
             yield path.read_text(encoding="utf-8")
 

@@ -276,6 +276,6 @@ def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[
 
 
 def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
-    """Number the hosts of traces: (clock, hostname), see `schema/model/host.sql`."""
+    """Number the hosts of traces: (clock, hostname), see `schema/model/identity/host.sql`."""
     numbers: dict[tuple[object, object], int] = {}
     return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]

@@ -19,7 +19,7 @@ QUERIES = [file for file in FILES if file.layer == "queries"]
 VIEWS = [
     file
     for file in FILES
-    if file.layer in {"link", "flow", "stat", "public"} and file.header.kind == "view"
+    if file.layer in {"link", "flow", "clock", "stat", "public"} and file.header.kind == "view"
 ]
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}

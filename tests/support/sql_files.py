@@ -10,12 +10,24 @@ from msgflow.query.header import Header, read
 from msgflow.resources import resource_directory
 
 # From left to right: an object reads only its own layer and those to its left.
-LAYERS = ("model", "store", "link", "flow", "stat", "public", "check", "finding", "queries")
+LAYERS = (
+    "model",
+    "store",
+    "link",
+    "flow",
+    "clock",
+    "stat",
+    "public",
+    "check",
+    "finding",
+    "queries",
+)
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
     "model": "staging",
     "link": "derive",
     "flow": "derive",
+    "clock": "derive",
     "stat": "derive",
     "public": "main",
     "check": "check",
