@@ -14,7 +14,7 @@ from msgflow.db.tables import metadata
 from msgflow.query.catalogue import load_queries
 
 if TYPE_CHECKING:
-    from msgflow.query.header import Header
+    from msgflow.sql.header import Header
 
 HERE = Path(__file__).parent
 

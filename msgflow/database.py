@@ -12,12 +12,12 @@ from msgflow.db.connection import connect
 from msgflow.db.reading import reading_statements, require_condition
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
-from msgflow.query.failure import database_errors, in_words
-from msgflow.query.interrupt import interruptible
 from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs, run_query
 from msgflow.query.selection import make_selection
-from msgflow.query.window import choose_runs
+from msgflow.run.choice import choose_runs
+from msgflow.sql.failure import database_errors, in_words
+from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links import AppliedLinks
     from msgflow.query.compare import Comparison
-    from msgflow.query.header import Header
-    from msgflow.query.value import Value
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
+    from msgflow.sql.header import Header
+    from msgflow.sql.value import Value
     from msgflow.verify import TargetsFile, Verification
     from msgflow.view.report import Report
 
@@ -498,7 +498,7 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.graph import Graph
-        from msgflow.query.window import choose_one
+        from msgflow.run.choice import choose_one
 
         connection = self.connection
         one = self._ask(lambda: choose_one(read_runs(connection), run, "a graph"))
@@ -655,7 +655,7 @@ class Database:
             QueryError: the database could not run a query.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.query.window import choose_one
+        from msgflow.run.choice import choose_one
         from msgflow.verify.suggest import suggest_targets
 
         if not margin >= 0:
@@ -762,7 +762,7 @@ class Database:
             run: 'all', a name or an id; the latest run when None.
         """
         from msgflow.db.finding import find
-        from msgflow.query.window import choose_runs
+        from msgflow.run.choice import choose_runs
 
         connection = self.connection
         run_ids = [chosen.run_id for chosen in choose_runs(self.runs(), run)]
@@ -835,7 +835,8 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.series import What, read_series
-        from msgflow.query.window import choose_one, time_window
+        from msgflow.run.choice import choose_one
+        from msgflow.run.window import time_window
 
         if what not in set(What):
             raise UsageError(f"there are no series of that — {what}", f"one of {', '.join(What)}")
@@ -873,7 +874,8 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.perfetto import write_perfetto
-        from msgflow.query.window import choose_one, time_window
+        from msgflow.run.choice import choose_one
+        from msgflow.run.window import time_window
 
         connection = self.connection
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from mcp.server.mcpserver import MCPServer
 
-    from msgflow.query.header import Header
     from msgflow.query.result import QueryResult
+    from msgflow.sql.header import Header
 
 MOST_ROWS = 1_000
 DEFAULT_ROWS = 50

@@ -20,7 +20,7 @@ from msgflow.cli.options import (
 )
 from msgflow.errors import UsageError
 from msgflow.export.series import What
-from msgflow.query.times import Times
+from msgflow.query.show.times import Times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -49,7 +49,7 @@ def command(
     """
     from msgflow.cli.output import is_screen, print_lines, print_note
     from msgflow.database import Database
-    from msgflow.query.present import screen_width
+    from msgflow.query.show.present import screen_width
 
     with Database(database) as opened:
         results = {
@@ -80,9 +80,9 @@ def _json(results: dict[str, QueryResult]) -> Iterator[str]:
 
 
 def _for_screen(results: dict[str, QueryResult], width: int) -> Iterator[str]:
-    from msgflow.query.present import present
-    from msgflow.query.screen import screen_lines
-    from msgflow.query.wrapping import wrap
+    from msgflow.query.show.present import present
+    from msgflow.query.show.screen import screen_lines
+    from msgflow.query.show.wrapping import wrap
 
     for position, (section, result) in enumerate(results.items()):
         if position:
@@ -96,7 +96,7 @@ def _for_screen(results: dict[str, QueryResult], width: int) -> Iterator[str]:
 
 
 def _sections(results: dict[str, QueryResult], form: InfoFormat) -> Iterator[str]:
-    from msgflow.query.table import markdown_lines, table_lines
+    from msgflow.query.show.table import markdown_lines, table_lines
 
     for position, (section, result) in enumerate(results.items()):
         if position:

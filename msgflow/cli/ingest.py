@@ -10,7 +10,7 @@ import typer
 
 from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption
 from msgflow.errors import UsageError
-from msgflow.query.interrupt import noted_interrupts
+from msgflow.sql.interrupt import noted_interrupts
 
 if TYPE_CHECKING:
     from msgflow.ingest import IngestReport

@@ -9,7 +9,7 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.export.formats import Format
-from msgflow.query.times import Times
+from msgflow.query.show.times import Times
 
 DEFAULT_DATABASE = Path("msgflow.duckdb")
 DEFAULT_PATHS = "paths.yaml"

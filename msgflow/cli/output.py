@@ -14,13 +14,13 @@ from rich.cells import cell_len
 
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
-from msgflow.query.present import MOST_ROWS, screen_width
+from msgflow.query.show.present import MOST_ROWS, screen_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from msgflow.query.result import QueryResult
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 
 # Narrower than this, text is not wrapped beside a name.
@@ -111,8 +111,8 @@ def is_screen() -> bool:
 
 
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:
-    from msgflow.query.present import present
-    from msgflow.query.screen import screen_lines
+    from msgflow.query.show.present import present
+    from msgflow.query.show.screen import screen_lines
 
     width = screen_width()
     shown = present(result, width, most_rows=most_rows, is_chosen=is_chosen)
@@ -175,7 +175,7 @@ def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None =
     Raises:
         UsageError: stdout is closed.
     """
-    from msgflow.query.wrapping import wrap
+    from msgflow.query.show.wrapping import wrap
 
     every = [*([titles] if titles else []), *rows]
     width = max(cell_len(name) for name, _ in every)
@@ -247,7 +247,7 @@ def terminal(stream: IO[bytes]) -> IO[bytes]:
 def _shown(text: str) -> str:
     if text.isprintable():
         return text
-    from msgflow.query.human import printable
+    from msgflow.query.show.human import printable
 
     return printable(text, keep="\n\r\t")
 
@@ -266,7 +266,7 @@ def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
     """Return the lines of a text that goes to stderr: on a terminal none is wider than it."""
     if sys.stderr is None or not sys.stderr.isatty() or "\n" in text:
         return [text]
-    from msgflow.query.wrapping import wrap
+    from msgflow.query.show.wrapping import wrap
 
     width = _width_of_stderr()
     if used + cell_len(text) <= width:

@@ -27,13 +27,13 @@ from msgflow.cli.options import (
 from msgflow.cli.selecting import selecting_options
 from msgflow.errors import UsageError
 from msgflow.query.names import PLACE_PARAMETERS
-from msgflow.query.present import MOST_ROWS
 from msgflow.query.selection import KINDS
+from msgflow.query.show.present import MOST_ROWS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from msgflow.query.header import Header, Param
+    from msgflow.sql.header import Header, Param
 
 PARAMETERS = "Parameters"
 # Names that the command line gives to every query, so that no query may use them for itself. Via,

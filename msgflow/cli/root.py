@@ -19,7 +19,7 @@ from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.stop import STOP
 from msgflow.cli.tilde import with_home
 from msgflow.errors import ExitCode, MsgflowError, UsageError
-from msgflow.query.interrupt import Terminated
+from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

@@ -124,7 +124,7 @@ def remove(
     """
     from msgflow.cli.output import confirm, is_asked, print_status
     from msgflow.database import Database
-    from msgflow.query.window import choose_runs
+    from msgflow.run.choice import choose_runs
 
     with Database(database) as opened:
         if not yes and is_asked():

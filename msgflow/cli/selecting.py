@@ -12,7 +12,7 @@ from msgflow.cli.options import DEFAULT_PATHS
 from msgflow.query.selection import KINDS, PATH, columns_of
 
 if TYPE_CHECKING:
-    from msgflow.query.header import Header
+    from msgflow.sql.header import Header
 
 _CHOICE = "Which rows"
 

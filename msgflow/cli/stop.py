@@ -15,7 +15,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from msgflow.errors import ExitCode
-from msgflow.query.interrupt import Terminated
+from msgflow.sql.interrupt import Terminated
 
 if TYPE_CHECKING:
     from types import FrameType

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.clocks.file import ClockSync, GivenClock
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _FORGET = """
 UPDATE store.clock SET

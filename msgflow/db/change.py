@@ -9,16 +9,16 @@ import duckdb
 
 from msgflow.db.connection import connect
 from msgflow.errors import UsageError
-from msgflow.query.failure import database_errors
-from msgflow.query.interrupt import interruptible
 from msgflow.query.run import read_runs
-from msgflow.query.window import choose_runs
+from msgflow.run.choice import choose_runs
+from msgflow.sql.failure import database_errors
+from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _T = TypeVar("_T")
 

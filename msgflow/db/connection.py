@@ -13,7 +13,7 @@ from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
-from msgflow.query.failure import database_errors, in_words
+from msgflow.sql.failure import database_errors, in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.header import Header
+    from msgflow.sql.header import Header
 
 SEVERITIES = ("error", "warning")
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import duckdb
 
 from msgflow.errors import DatabaseError
-from msgflow.query.failure import is_of_the_file
+from msgflow.sql.failure import is_of_the_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -22,8 +22,8 @@ from msgflow.db.create import write_new
 from msgflow.db.definition import require_ours
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
-from msgflow.query.failure import database_errors
 from msgflow.resources import resource_directory
+from msgflow.sql.failure import database_errors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

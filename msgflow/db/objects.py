@@ -7,8 +7,8 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
-from msgflow.query.header import Header, parse
 from msgflow.resources import resource_directory
+from msgflow.sql.header import Header, parse
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

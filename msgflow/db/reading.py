@@ -17,7 +17,7 @@ import duckdb
 
 from msgflow.db.objects import SCHEMAS, views
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.catalogue import nearest
+from msgflow.nearest import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

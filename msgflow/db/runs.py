@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.change import change_runs
 from msgflow.db.store import delete
 from msgflow.errors import UsageError
-from msgflow.query.window import is_run_name
+from msgflow.run.choice import is_run_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _KEY = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 _LONGEST_VALUE = 1_000

@@ -12,7 +12,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from msgflow.errors import UsageError
-from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, Run, time_window
+from msgflow.run.choice import Run
+from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
 from msgflow.trace import COMMON_SCHEMA, PACKET, EventBatch
 
 if TYPE_CHECKING:

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.query.clocks import clock_notes
 from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
-from msgflow.query.plain import plain
+from msgflow.query.show.plain import plain
 
 if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
     from msgflow.query.flow import Start
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 Key = tuple[str, int]
 Row = dict[str, Any]

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
-from msgflow.query.plain import plain
+from msgflow.query.show.plain import plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -89,7 +89,7 @@ def json_rows(result: QueryResult) -> Iterator[str]:
 
 
 def _lines(result: QueryResult, form: Format) -> Iterable[str]:
-    from msgflow.query.table import markdown_lines, table_lines
+    from msgflow.query.show.table import markdown_lines, table_lines
 
     if form is Format.TABLE:
         return table_lines(result)

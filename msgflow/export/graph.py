@@ -9,14 +9,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from msgflow.export.formats import by_suffix
-from msgflow.query.human import printable
-from msgflow.query.plain import plain
+from msgflow.query.show.human import printable
+from msgflow.query.show.plain import plain
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.query.result import QueryResult
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 Row = dict[str, Any]
 

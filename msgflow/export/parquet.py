@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 FILE_NAME = "data.parquet"
 # The partition names it: readers take it from there, and would not like to find it twice.

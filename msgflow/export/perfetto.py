@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _AT_ONCE = 20_000
 _SEQUENCE = 1

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.query.clocks import clock_notes
-from msgflow.query.header import Column, Header
 from msgflow.query.result import QueryResult
+from msgflow.sql.header import Column, Header
 
 if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 # More columns than that no program shows.
 MOST_COLUMNS = 1_000

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import nearest
+from msgflow.nearest import nearest
 from msgflow.query.run import read_runs
-from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_runs, time_window
+from msgflow.run.choice import choose_runs
+from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _ROWS_AT_ONCE = 100_000
 _VIEWS = """

@@ -29,9 +29,9 @@ from msgflow.ingest import judge, model, staging
 from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
 from msgflow.links import declare_links, read_links
-from msgflow.query.failure import database_errors, in_words
-from msgflow.query.interrupt import interruptible, noted_interrupts
-from msgflow.query.window import is_run_name
+from msgflow.run.choice import is_run_name
+from msgflow.sql.failure import database_errors, in_words
+from msgflow.sql.interrupt import interruptible, noted_interrupts
 from msgflow.trace import archive
 from msgflow.version import __version__
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from msgflow.clocks import ClockSync
     from msgflow.links import LinksFile
-    from msgflow.query.interrupt import Interrupts
+    from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress, TraceInfo
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.

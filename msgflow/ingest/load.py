@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from msgflow.ingest.catalogue import Tracepoint
     from msgflow.ingest.reconciled import Corrections
-    from msgflow.query.interrupt import Interrupts
+    from msgflow.sql.interrupt import Interrupts
 
 # Rows that wait for a commit take memory that nothing limits.
 _ROWS_PER_TRANSACTION = 2_000_000

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.db.memory import Memory
-    from msgflow.query.header import Header
+    from msgflow.sql.header import Header
 
 
 # Views of all tables of `raw`.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from msgflow.links.file import LinksFile
     from msgflow.links.match import MatchedLink
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _LISTED = """
 SELECT a.kind, a.process_id,

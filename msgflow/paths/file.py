@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import nearest
+from msgflow.nearest import nearest
 from msgflow.query.names import require_names
 from msgflow.yaml_file import Text, YamlFile
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 WORDS = ("from", "to", "via", "without")
 _EXAMPLE = "paths: [{name: camera-to-motors, from: /camera/image, to: /base/motors}]"

@@ -7,8 +7,8 @@ import re
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any
 
-from msgflow.query.human import format_duration, printable
-from msgflow.query.wrapping import ARROW, wrap_path
+from msgflow.query.show.human import format_duration, printable
+from msgflow.query.show.wrapping import ARROW, wrap_path
 from msgflow.yaml_file import list_lines
 
 if TYPE_CHECKING:

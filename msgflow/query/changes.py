@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.query.header import Header, parse
+from msgflow.sql.header import Header, parse
 
 if TYPE_CHECKING:
     import pyarrow as pa

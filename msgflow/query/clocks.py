@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _CLOCKS = """
 SELECT

@@ -12,14 +12,15 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
-from msgflow.query.failure import is_of_the_file
-from msgflow.query.header import Header, read
 from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs
 from msgflow.query.selection import CUT_COLUMN
-from msgflow.query.window import MAXIMUM_NS, Run, choose_one
 from msgflow.resources import resource_directory
+from msgflow.run.choice import Run, choose_one
+from msgflow.run.window import MAXIMUM_NS
+from msgflow.sql.failure import is_of_the_file
+from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

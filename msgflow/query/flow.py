@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.failure import is_of_the_file
 from msgflow.query.names import require_names
 from msgflow.query.run import first_line, read_runs
-from msgflow.query.window import MINIMUM_NS, Run, choose_one, format_epoch, time_point
+from msgflow.run.choice import Run, choose_one
+from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
+from msgflow.sql.failure import is_of_the_file
 
 if TYPE_CHECKING:
     import pyarrow as pa

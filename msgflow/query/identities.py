@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.value import Value
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
+    from msgflow.sql.value import Value
 
 # Parameters that take an id, in every query that has them: what it is of, and what lists them.
 _IDENTITIES = {

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import nearest
+from msgflow.nearest import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import duckdb
 
-    from msgflow.query.value import Value
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
+    from msgflow.sql.value import Value
 
 # Parameters with these names take topics or nodes, in every query that has them.
 PLACE_PARAMETERS = ("from", "to", "via", "without")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import column_named
+from msgflow.nearest import column_named
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.query.header import Header
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
+    from msgflow.sql.header import Header
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,12 +61,12 @@ class QueryResult:
         return f"<QueryResult of {name}: {len(self)} rows>"
 
     def __str__(self) -> str:
-        from msgflow.query.shown import shown_text
+        from msgflow.query.show.shown import shown_text
 
         return shown_text(self)
 
     def _repr_html_(self) -> str:
-        from msgflow.query.shown import shown_html
+        from msgflow.query.show.shown import shown_html
 
         return shown_html(self)
 
@@ -80,7 +80,7 @@ class QueryResult:
         Raises:
             UsageError: no such form, or the rows do not say which columns are times.
         """
-        from msgflow.query.times import Times, converted
+        from msgflow.query.show.times import Times, converted
 
         try:
             form = Times(times)

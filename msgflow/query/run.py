@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.catalogue import nearest
+from msgflow.nearest import nearest
 from msgflow.query.clocks import clock_notes
-from msgflow.query.failure import is_of_the_file
-from msgflow.query.human import format_duration
 from msgflow.query.identities import require_identities
 from msgflow.query.names import PLACE_PARAMETERS, require_names, require_places
 from msgflow.query.result import QueryResult
@@ -25,16 +23,19 @@ from msgflow.query.selection import (
     Selection,
     selected,
 )
-from msgflow.query.value import described_type, parse_text
-from msgflow.query.window import Run, choose_runs, format_epoch, time_window
+from msgflow.query.show.human import format_duration
+from msgflow.run.choice import Run, choose_runs
+from msgflow.run.window import format_epoch, time_window
+from msgflow.sql.failure import is_of_the_file
+from msgflow.sql.value import described_type, parse_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import pyarrow as pa
 
-    from msgflow.query.header import Header, Param
-    from msgflow.query.value import Value
+    from msgflow.sql.header import Header, Param
+    from msgflow.sql.value import Value
 
 RESERVED = ("runs", "start_ns", "end_ns")
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import column_named
+from msgflow.nearest import column_named
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.query.header import Header
-    from msgflow.query.value import Value
+    from msgflow.sql.header import Header
+    from msgflow.sql.value import Value
 
 # What columns name, as the headers of queries have it in the place of a unit.
 KINDS = ("node", "topic", "callback", "host")

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from msgflow.query.catalogue import nearest
-from msgflow.query.human import format_duration
+from msgflow.nearest import nearest
+from msgflow.query.show.human import format_duration
 
 OPERATORS = ("<", "<=", ">", ">=")
 _SAME = {"≤": "<=", "≥": ">="}

@@ -11,7 +11,7 @@ from msgflow.verify.condition import UNITS, Dimension
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 Row = dict[str, Any]
 # With fewer values a percentile is only the largest of them.

@@ -9,12 +9,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.query.catalogue import load_query, nearest
-from msgflow.query.header import Column, Header, Param
+from msgflow.nearest import nearest
+from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.run import read_runs, run_query
 from msgflow.query.selection import Selection, conditions_of
-from msgflow.query.window import Run, choose_one, time_window
+from msgflow.run.choice import Run, choose_one
+from msgflow.run.window import time_window
+from msgflow.sql.header import Column, Header, Param
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
 from msgflow.verify.worst import FLOWS, KEYS, Worst, find_worst, worst_of
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.value import Value
+    from msgflow.sql.value import Value
     from msgflow.verify.file import Requirement, Target, TargetsFile
     from msgflow.yaml_file import Text
 

@@ -15,7 +15,7 @@ from msgflow.view.page_query import run_page_query
 if TYPE_CHECKING:
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 
 def critical_path(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 _BAR = ["row_key", "kind", "id", "start_at", "length", "flags"]
 # How much there is, whatever the limits.

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgflow.query.header import Header, read
+from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.query.value import Value
+    from msgflow.sql.value import Value
 
 DIRECTORY = Path(__file__).parent / "sql"
 _INLINE = "view."

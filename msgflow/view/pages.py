@@ -17,7 +17,8 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.clocks import clock_notes
 from msgflow.query.compare import compare
 from msgflow.query.run import read_runs, run_query
-from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_one
+from msgflow.run.choice import choose_one
+from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS
 from msgflow.view.columns import encode
 from msgflow.view.critical import critical_path
 from msgflow.view.page_query import page_query, run_page_query
@@ -25,7 +26,7 @@ from msgflow.view.page_query import page_query, run_page_query
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 Params = dict[str, Any]
 

@@ -16,7 +16,8 @@ from pyarrow import compute
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.query.run import read_runs
-from msgflow.query.window import MAXIMUM_NS, MINIMUM_NS, choose_one, time_window
+from msgflow.run.choice import choose_one
+from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
 # Of these the pages show every path's pictures; of more those with the slowest flows.
 MOST_PATHS = 200

@@ -11,8 +11,8 @@ import pytest
 from typer.testing import Result
 
 from msgflow.database import Database
-from msgflow.query.header import parse
 from msgflow.query.result import QueryResult
+from msgflow.sql.header import parse
 
 Msgflow = Callable[..., Result]
 HEADER = parse(

@@ -10,7 +10,8 @@ import pytest
 from msgflow.clocks import read_clock_sync
 from msgflow.errors import UsageError
 from msgflow.links import read_links
-from msgflow.query.window import choose_runs, time_point
+from msgflow.run.choice import choose_runs
+from msgflow.run.window import time_point
 from msgflow.text_file import MOST_BYTES
 
 MANY = 20_000
@@ -78,7 +79,7 @@ def test_only_regular_files_of_some_size_are_read(tmp_path: Path, read: object) 
 
 
 def test_numbers_beyond_any_id_or_time_are_refused() -> None:
-    from msgflow.query.window import Run
+    from msgflow.run.choice import Run
 
     runs = (Run(1, "robot", 0),)
     for text in ("9" * 5000, str(2**63), str(-(2**63) - 1)):

@@ -17,8 +17,8 @@ from msgflow.db import migrate
 from msgflow.db.connection import open_file
 from msgflow.errors import DatabaseError, ExitCode
 from msgflow.ingest import ingest
-from msgflow.query.failure import in_words
 from msgflow.sim import simulate
+from msgflow.sql.failure import in_words
 
 PATH = Path("some.duckdb")
 

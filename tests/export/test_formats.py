@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from msgflow.export.formats import Format, format_of, write_result
-from msgflow.query.header import parse
 from msgflow.query.result import QueryResult
+from msgflow.sql.header import parse
 
 BIG = 9_007_199_254_740_993
 HEADER = parse(

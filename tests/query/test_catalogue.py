@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.query.catalogue import _WORDS, load_queries, load_query, nearest, query_names
+from msgflow.nearest import nearest
+from msgflow.query.catalogue import _WORDS, load_queries, load_query, query_names
 
 
 def test_the_catalogue_is_the_folder() -> None:

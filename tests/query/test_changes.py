@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from msgflow.query.changes import changes
 from msgflow.query.result import QueryResult
-from msgflow.query.window import Run
+from msgflow.run.choice import Run
 
 A_TO_B = "/a → /t → /b"
 

@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.query.header import parse
 from msgflow.query.result import QueryResult
+from msgflow.sql.header import parse
 from msgflow.version import __version__
 
 BIG = 2**63 - 1

@@ -6,10 +6,10 @@ import duckdb
 import pytest
 
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.header import Header, parse
 from msgflow.query.run import bind, run_query
 from msgflow.query.selection import make_selection
-from msgflow.query.value import Value
+from msgflow.sql.header import Header, parse
+from msgflow.sql.value import Value
 
 PARAMS = """\
 -- name: example

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from msgflow.query.header import Header, read
 from msgflow.resources import resource_directory
+from msgflow.sql.header import Header, read
 
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (

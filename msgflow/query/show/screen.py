@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.query.present import GAP
-from msgflow.query.wrapping import ARROW, wrap, wrap_path
+from msgflow.query.show.present import GAP
+from msgflow.query.show.wrapping import ARROW, wrap, wrap_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from msgflow.query.present import Presentation, ShownColumn
+    from msgflow.query.show.present import Presentation, ShownColumn
 
 # A path that begins or ends as one above is cut, where that spares more than so many steps.
 _SPARED = 4

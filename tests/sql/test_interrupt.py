@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import duckdb
 import pytest
 
-from msgflow.query.interrupt import Interrupts, interruptible, noted_interrupts
+from msgflow.sql.interrupt import Interrupts, interruptible, noted_interrupts
 
 SLOW = "SELECT count(*) FROM range(1000000) a, range(10000000) b WHERE a.range * b.range % 7 = 3"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from msgflow.query.plain import plain
-from msgflow.query.window import format_epoch
+from msgflow.query.show.plain import plain
+from msgflow.run.window import format_epoch
 
 _BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")
 

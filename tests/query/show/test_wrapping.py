@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from msgflow.query.wrapping import wrap
+from msgflow.query.show.wrapping import wrap
 
 
 @pytest.mark.parametrize(

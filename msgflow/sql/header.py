@@ -30,7 +30,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.query.value import Value, is_integer, parse_literal
+from msgflow.sql.value import Value, is_integer, parse_literal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

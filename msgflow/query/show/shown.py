@@ -6,11 +6,11 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
-from msgflow.query.human import printable
-from msgflow.query.present import MOST_ROWS, present, screen_width
-from msgflow.query.screen import screen_lines
-from msgflow.query.table import cells
-from msgflow.query.wrapping import wrap
+from msgflow.query.show.human import printable
+from msgflow.query.show.present import MOST_ROWS, present, screen_width
+from msgflow.query.show.screen import screen_lines
+from msgflow.query.show.table import cells
+from msgflow.query.show.wrapping import wrap
 
 if TYPE_CHECKING:
     from msgflow.query.result import QueryResult

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from msgflow.query.human import format_cell, format_duration, short_symbol, shown_name
+from msgflow.query.show.human import format_cell, format_duration, short_symbol, shown_name
 
 
 @pytest.mark.parametrize(

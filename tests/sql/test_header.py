@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.query.header import Column, Header, HeaderError, Param, parse
+from msgflow.sql.header import Column, Header, HeaderError, Param, parse
 
 PATH = Path("queries/example.sql")
 

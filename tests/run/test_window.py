@@ -5,15 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from msgflow.errors import UsageError
-from msgflow.query.window import (
-    MAXIMUM_NS,
-    MINIMUM_NS,
-    Run,
-    choose_runs,
-    format_epoch,
-    is_run_name,
-    time_window,
-)
+from msgflow.run.choice import Run, choose_runs, is_run_name
+from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, format_epoch, time_window
 
 START = 1_700_000_000_000_000_000
 FIRST = Run(1, "morning", START)

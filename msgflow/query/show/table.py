@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.cells import cell_len
 
-from msgflow.query.human import format_cell, shown_name
+from msgflow.query.show.human import format_cell, shown_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -10,9 +10,9 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from msgflow.query.header import parse
 from msgflow.query.result import QueryResult
-from msgflow.query.window import Run
+from msgflow.run.choice import Run
+from msgflow.sql.header import parse
 
 HEADER = parse(
     "-- name: example\n-- title: An <b>example</b>\n-- description: x\n"

@@ -8,9 +8,9 @@ import pyarrow as pa
 import pytest
 
 from msgflow.errors import UsageError
-from msgflow.query.header import parse
 from msgflow.query.result import QueryResult
-from msgflow.query.window import Run
+from msgflow.run.choice import Run
+from msgflow.sql.header import parse
 
 START = 1_741_944_413_000_000_000
 HEADER = parse(

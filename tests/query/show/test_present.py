@@ -12,11 +12,11 @@ import pytest
 from rich.cells import cell_len
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.header import Header
-from msgflow.query.present import MOST_ROWS, present
 from msgflow.query.result import QueryResult
-from msgflow.query.screen import screen_lines
-from msgflow.query.window import Run
+from msgflow.query.show.present import MOST_ROWS, present
+from msgflow.query.show.screen import screen_lines
+from msgflow.run.choice import Run
+from msgflow.sql.header import Header
 
 SCREENS = Path(__file__).parent / "screens"
 BEGIN = 1_700_000_000_000_000_000

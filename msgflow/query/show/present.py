@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.query.human import MOMENT, NULL, format_cell, short_symbol, shown_name
-from msgflow.query.wrapping import ARROW, longest_piece, longest_word, wrap
+from msgflow.query.show.human import MOMENT, NULL, format_cell, short_symbol, shown_name
+from msgflow.query.show.wrapping import ARROW, longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from msgflow.query.value import Value, parse_literal, parse_text
+from msgflow.sql.value import Value, parse_literal, parse_text
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""Results for people: words for values, tables that fit a screen, text and HTML."""

@@ -1,0 +1,95 @@
+"""Which runs a command or query reads."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_INTEGER = re.compile(r"-?\d+")
+# More digits than any id or time has, which Python would refuse to read.
+_MOST_DIGITS = 40
+
+
+@dataclass(frozen=True)
+class Run:
+    """One ingest, as far as choosing it needs to know.
+
+    Attributes:
+        run_id: its key.
+        name: its name.
+        start_ns: time of its first event, epoch ns; None for a run without events.
+        labels: KEY=VALUE each.
+    """
+
+    run_id: int
+    name: str
+    start_ns: int | None
+    labels: tuple[str, ...] = ()
+
+
+def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
+    """Return the runs that `wanted` means: 'all', an id, a name, a label, or None for the latest.
+
+    Args:
+        runs: all runs of the database.
+        wanted: what the user said; a name wins over an id. A label, KEY=VALUE, means all runs that
+            have it.
+
+    Raises:
+        UsageError: no such run, or a name that several runs have.
+    """
+    if not runs:
+        return ()
+    ordered = sorted(runs, key=lambda run: run.run_id)
+    if wanted is None:
+        return (ordered[-1],)
+    text = str(wanted)
+    if text == "all":
+        return tuple(ordered)
+    found = [run for run in ordered if run.name == text]
+    if not found and (labelled := tuple(run for run in ordered if text in run.labels)):
+        return labelled
+    if not found and (run_id := integer(text)) is not None:
+        found = [run for run in ordered if run.run_id == run_id]
+    if len(found) > 1:
+        ids = " or ".join(f"--run {run.run_id}" for run in found)
+        raise UsageError(f"several runs have this name — {text}", f"choose by id: {ids}")
+    if not found:
+        known = ", ".join(f"{run.name} ({run.run_id})" for run in ordered[-10:])
+        raise UsageError(f"there is no such run — {text}", f"the runs are {known}")
+    return tuple(found)
+
+
+def choose_one(runs: Sequence[Run], wanted: str | int | None, what: str) -> Run:
+    """Return the run that `wanted` means, for what can be of one only.
+
+    Args:
+        runs: all runs of the database.
+        wanted: what the user said, as of `choose_runs`.
+        what: what it is for, as in 'a graph'.
+
+    Raises:
+        UsageError: no such run, none at all, or several.
+    """
+    chosen = choose_runs(runs, wanted)
+    if not chosen:
+        raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
+    if len(chosen) > 1:
+        raise UsageError(f"{what} is of one run — {wanted}", "give a name or an id")
+    return chosen[0]
+
+
+def integer(text: str) -> int | None:
+    """Return the number that a text writes out, None where it is none."""
+    return int(text) if len(text) <= _MOST_DIGITS and _INTEGER.fullmatch(text) else None
+
+
+def is_run_name(text: str) -> bool:
+    """Tell whether a run may have this name: whether `choose_runs` can mean nothing else by it."""
+    return text not in ("", "all") and not _INTEGER.fullmatch(text)

@@ -1,0 +1,1 @@
+"""SQL as files and as errors: headers, values of parameters, failures in words, interruption."""
