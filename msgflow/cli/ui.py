@@ -30,7 +30,7 @@ def command(
             "--memory-limit",
             metavar="SIZE",
             help="Maximum memory for queries",
-            show_default="200MB, more while a query needs it",
+            show_default="250MB, more while a query needs it",
         ),
     ] = None,
     database: DatabaseOption = DEFAULT_DATABASE,

@@ -67,12 +67,12 @@ class Memory:
                         "give more with --memory-limit, or read a shorter part of the recording",
                     ) from error
 
-    def grow(self, times: int) -> bool:
+    def grow(self, times: float) -> bool:
         """Allow so many times as much; tell whether the user and the machine let that happen."""
         if self._is_fixed:
             return False
         now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
-        wanted = times * _bytes(now)
+        wanted = round(times * _bytes(now))
         if wanted > _SHARE_OF_MACHINE * _machine_bytes():
             return False
         self._set(f"{wanted}B")

@@ -41,9 +41,7 @@ def encode(
     for name in table.column_names:
         column = table[name].combine_chunks()
         unit = units.get(name)
-        if unit == _EPOCH:
-            column = compute.subtract(column.cast(pa.int64()), origin_ns)
-        head, body = _column(column)
+        head, body = _column(column, origin_ns if unit == _EPOCH else 0)
         columns.append({"name": name, "unit": unit, **head, "bytes": len(body)})
         buffers.append(body)
     content = {"rows": table.num_rows, "meta": dict(meta or {}), "columns": columns}
@@ -51,43 +49,57 @@ def encode(
     return b"".join([len(head_bytes).to_bytes(4, "little"), head_bytes, *buffers])
 
 
-def _column(column: pa.Array) -> tuple[dict[str, Any], bytes]:
+def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
     kind = column.type
     if pa.types.is_integer(kind):
         if len(column) > column.null_count:
             limits = compute.min_max(column).as_py()
-            if max(abs(limits["min"]), abs(limits["max"])) > LARGEST_EXACT:
-                return _text(compute.cast(column, pa.string()))
-        return _integers(column)
+            if max(abs(limits["min"] - origin), abs(limits["max"] - origin)) > LARGEST_EXACT:
+                shifted = compute.subtract(column, origin) if origin else column
+                return _text(compute.cast(shifted, pa.string()))
+        return _integers(_values(column, pa.int64()) - origin, _nulls(column))
     if pa.types.is_boolean(kind):
-        return _integers(compute.cast(column, pa.uint8()), "boolean")
+        return _integers(_values(column, pa.int64()), _nulls(column), "boolean")
     if pa.types.is_floating(kind):
-        values = compute.cast(column, pa.float64()).to_numpy(zero_copy_only=False)
+        values = _values(column, pa.float64())
+        if column.null_count:
+            values = np.where(_nulls(column), np.nan, values)
         return {"type": "double"}, np.ascontiguousarray(values, dtype="<f8").tobytes()
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         return _text(column)
-    values = json.dumps(column.to_pylist(), ensure_ascii=False, default=str)
-    return {"type": "json"}, values.encode()
+    texts = json.dumps(column.to_pylist(), ensure_ascii=False, default=str)
+    return {"type": "json"}, texts.encode()
 
 
-def _integers(column: pa.Array, kind: str = "integer") -> tuple[dict[str, Any], bytes]:
-    nulls = b""
-    if column.null_count:
-        nulls = column.is_null().to_numpy(zero_copy_only=False).astype(np.uint8).tobytes()
-        column = column.fill_null(0)
-    values = column.to_numpy(zero_copy_only=False).astype(np.int64)
-    if nulls:
+# Arrow's to_numpy, and whatever it is given values of Python for, import pandas where that is
+# installed: 30 MB, and half a second.
+def _values(column: pa.Array, kind: pa.DataType) -> np.ndarray[Any, Any]:
+    """Return the values as `kind`; where there is none, anything."""
+    column = compute.cast(column, kind)
+    values = np.frombuffer(column.buffers()[1] or b"", dtype=kind.to_pandas_dtype())
+    return values[column.offset : column.offset + len(column)]
+
+
+def _nulls(column: pa.Array) -> np.ndarray[Any, Any]:
+    return _values(column.is_null(), pa.uint8()).astype(np.bool_)
+
+
+def _integers(
+    values: np.ndarray[Any, Any], is_null: np.ndarray[Any, Any], kind: str = "integer"
+) -> tuple[dict[str, Any], bytes]:
+    has_nulls = bool(is_null.any())
+    if has_nulls:
         # What is missing repeats what was before it: the difference is nothing.
-        present = np.where(np.frombuffer(nulls, dtype=np.uint8) == 0, np.arange(len(values)), -1)
-        latest = np.maximum.accumulate(present)
+        latest = np.maximum.accumulate(np.where(is_null, -1, np.arange(len(values))))
         values = np.where(latest >= 0, values[np.maximum(latest, 0)], 0)
     differences = np.diff(values, prepend=np.int64(0))
     folded = ((differences << 1) ^ (differences >> 63)).astype("<u8")
     largest = int(folded.max()) if len(folded) else 0
     width = max((largest.bit_length() + 7) // 8, 1)
     planes = folded.view(np.uint8).reshape(-1, 8)[:, :width].T
+    nulls = is_null.astype(np.uint8).tobytes() if has_nulls else b""
     return (
-        {"type": kind, "width": width, "nulls": bool(nulls)},
+        {"type": kind, "width": width, "nulls": has_nulls},
         np.ascontiguousarray(planes).tobytes() + nulls,
     )
 
@@ -95,6 +107,7 @@ def _integers(column: pa.Array, kind: str = "integer") -> tuple[dict[str, Any], 
 def _text(column: pa.Array) -> tuple[dict[str, Any], bytes]:
     encoded = column.dictionary_encode()
     words = json.dumps(encoded.dictionary.to_pylist(), ensure_ascii=False).encode()
-    codes = compute.add(compute.cast(encoded.indices, pa.int64()).fill_null(-1), 1)
-    head, body = _integers(codes)
+    # 0: none.
+    codes = np.where(_nulls(column), 0, _values(encoded.indices, pa.int64()) + 1)
+    head, body = _integers(codes, np.zeros(len(codes), np.bool_))
     return {"type": "text", "width": head["width"], "words": len(words)}, words + body

@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
 # Enough for most of what pages ask of ten million events. What needs more gets it, alone.
-USUAL_MEMORY = "200MB"
-_GROWTH = 4
+USUAL_MEMORY = "250MB"
+_GROWTH = 2.5
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pyarrow as pa
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -49,3 +52,15 @@ def test_points_in_time_are_offsets() -> None:
 def test_what_follows_in_steps_takes_few_bytes() -> None:
     table = pa.table({"start": pa.array(range(0, 10_000_000, 1_000), pa.int64())})
     assert len(encode(table)) < 2 * table.num_rows + 200
+
+
+def test_pandas_is_not_imported_where_it_is_installed() -> None:
+    """The server would hold it for nothing."""
+    # Not pa.array: that one does import it.
+    program = (
+        "import sys, duckdb; from msgflow.view.columns import encode;"
+        "rows = duckdb.sql('SELECT unnest([1, NULL]) AS a, a::DOUBLE, a = 1, a::TEXT');"
+        "encode(rows.to_arrow_table()); print('pandas' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("False\n", "")

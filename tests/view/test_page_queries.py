@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -230,6 +231,60 @@ def test_arrows_are_the_links(systems: Path, read: Read) -> None:
         " WHERE run_id = 3 AND kind IN ('periodic_async', 'partial_sync')"
     ).fetchall()
     assert waits == wanted
+
+
+def test_arrows_of_a_window_are_those_that_overlap_it(demo: Path, read: Read) -> None:
+    """On two hosts whose clocks were brought together."""
+    connection = read(demo)
+    pages = Pages()
+    extent = pages.extent(connection, {})
+    every = values(connection, pages) | {"limit": 10**6}
+    arrows = run_page_query(connection, "links", every).to_pylist()
+    for width in (extent.length_ns // 10, extent.length_ns // 1000, 20_000):
+        for tenth in range(0, 11, 2):
+            start = tenth * extent.length_ns // 10 - width // 2
+            window = pages.window(extent, {"start": start, "end": start + width})
+            known = pages.recorded(connection, extent, window) | {"limit": 10**6}
+            found = run_page_query(connection, "links", known).to_pylist()
+            begin, end = (at - extent.origin_ns for at in window)
+            assert found == [
+                arrow
+                for arrow in arrows
+                if min(arrow["from_at"], arrow["to_at"]) < end
+                and max(arrow["from_at"], arrow["to_at"]) >= begin
+            ]
+
+
+def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
+    systems: Path, read: Read
+) -> None:
+    connection = read(systems)
+    pages = Pages()
+    extent = pages.extent(connection, {"run": "3"})
+    middle = extent.length_ns // 2
+    window = pages.window(extent, {"start": middle, "end": middle + extent.length_ns // 100})
+    known = pages.recorded(connection, extent, window) | {"limit": 10**6}
+    sql = statement("links")
+    named = connection.extract_statements(sql)[0].named_parameters
+    rows = connection.execute(
+        f"EXPLAIN (ANALYZE, FORMAT json) {sql}", {name: known[name] for name in named}
+    ).fetchall()
+    held: list[int] = []
+
+    def look(operator: Any) -> None:
+        children = operator.get("children", [])
+        if operator["type"] == "HASH_JOIN":
+            held.append(children[1]["intermediate_rows"])
+        for child in children:
+            look(child)
+
+    (plan,) = json.loads(rows[0][1])["operator"]
+    look(plan)
+    ((all_of_them,),) = connection.execute(
+        "SELECT count(*) FROM publication WHERE run_id = 3"
+    ).fetchall()
+    assert held
+    assert max(held) < all_of_them / 10
 
 
 def test_flows_of_paths_are_those_that_e2e_latency_counts(demo: Path, read: Read) -> None:

@@ -288,7 +288,7 @@ def test_what_needs_more_memory_alone_gets_it_while_it_runs() -> None:
 
         usual = limit()
         assert Turns(memory).ask(ask) == b"answer"
-        assert tries == [usual, "381.1 MiB", "1.4 GiB"]
+        assert tries == [usual, "238.2 MiB", "595.5 MiB"]
         assert limit() == usual == "95.3 MiB"
 
 

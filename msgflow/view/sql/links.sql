@@ -20,7 +20,41 @@
 -- column: is_loss_affected BOOLEAN  Lost events may hide a better partner
 -- needs: store.link_transport, store.link_causal, store.publication, store.take,
 --     store.callback_instance, store.callback, derive.process_clock, derive.corrected_ns
-WITH message AS (
+
+-- Identities follow time on the clocks as recorded. What overlaps the window is found by them, and
+-- joined with times afterwards: joined first, all that was before it would be held in memory.
+WITH bound AS (
+    SELECT
+        (SELECT min(take_id) FROM store.take
+            WHERE run_id = $run AND taken_ns >= $recorded_from_ns) AS first_take,
+        (SELECT max(take_id) FROM store.take
+            WHERE run_id = $run AND taken_ns < $recorded_before_ns) AS last_take,
+        (SELECT min(publication_id) FROM store.publication
+            WHERE run_id = $run AND start_ns >= $recorded_from_ns) AS first_publication,
+        (SELECT max(publication_id) FROM store.publication
+            WHERE run_id = $run AND start_ns < $recorded_before_ns) AS last_publication,
+        (SELECT max(callback_instance_id) FROM store.callback_instance
+            WHERE run_id = $run AND start_ns < $recorded_before_ns) AS last_instance
+),
+near_message AS MATERIALIZED (
+    SELECT
+        l.publication_id, l.take_id, l.publisher_id, l.subscription_id, l.is_loss_affected
+    FROM store.link_transport AS l
+    JOIN bound AS n ON l.take_id >= n.first_take AND l.publication_id <= n.last_publication
+    WHERE l.run_id = $run
+),
+near_cause AS MATERIALIZED (
+    SELECT
+        l.callback_instance_id, l.publication_id, l.take_id, l.subscription_id, l.kind,
+        l.is_loss_affected
+    FROM store.link_causal AS l
+    JOIN bound AS n ON l.publication_id >= n.first_publication
+        AND CASE WHEN l.kind = 'direct' THEN l.publication_id <= n.last_publication
+            WHEN l.callback_instance_id IS NULL THEN l.take_id <= n.last_take
+            ELSE l.callback_instance_id <= n.last_instance END
+    WHERE l.run_id = $run
+),
+message AS (
     SELECT
         0::UTINYINT AS link_kind,
         8 * l.publisher_id + 4 AS from_row,
@@ -30,11 +64,10 @@ WITH message AS (
         b.end_ns AS from_ns,
         t.taken_ns AS to_ns,
         coalesce(l.is_loss_affected, false) AS is_loss_affected
-    FROM store.link_transport AS l
+    FROM near_message AS l
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     JOIN store.take AS t ON l.take_id = t.take_id
-    WHERE l.run_id = $run
-        AND b.end_ns < $recorded_before_ns AND t.taken_ns >= $recorded_from_ns
+    WHERE b.end_ns < $recorded_before_ns AND t.taken_ns >= $recorded_from_ns
 ),
 cause AS (
     SELECT
@@ -53,12 +86,12 @@ cause AS (
             ELSE coalesce(i.end_ns, i.start_ns, t.taken_ns) END AS from_ns,
         b.start_ns AS to_ns,
         coalesce(l.is_loss_affected, false) AS is_loss_affected
-    FROM store.link_causal AS l
+    FROM near_cause AS l
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
     LEFT JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN store.take AS t ON l.take_id = t.take_id
-    WHERE l.run_id = $run AND b.start_ns >= $recorded_from_ns
+    WHERE b.start_ns >= $recorded_from_ns
         AND CASE WHEN l.kind = 'direct' THEN b.start_ns
             ELSE coalesce(i.end_ns, i.start_ns, t.taken_ns) END < $recorded_before_ns
 ),
