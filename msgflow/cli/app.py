@@ -6,12 +6,8 @@ from typing import Annotated
 
 import typer
 
-# Scripts of an editable installation look for it here.
-from msgflow.__main__ import main
 from msgflow.cli.root import RootGroup
 from msgflow.version import __version__
-
-__all__ = ["app", "main"]
 
 app = typer.Typer(
     name="msgflow",

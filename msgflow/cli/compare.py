@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.completion import complete
+from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
-    DEFAULT_DATABASE,
     OUTPUT,
     SELECTION,
     DatabaseOption,

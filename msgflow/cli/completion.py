@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 import typer.core
 
+from msgflow.cli.defaults import DEFAULT_DATABASE, DEFAULT_PATHS
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
@@ -21,7 +23,6 @@ VARIABLE = "_MSGFLOW_COMPLETE"
 # Letters and digits of any language besides. Quotes, $, `, \\ and globs are never completed.
 _SAFE = frozenset("_/.-+@%,:() =<>&#{}")
 _QUOTED_IN_BASH = re.compile(r"([^\w/.\-+@%,])")
-_DEFAULT_DATABASE = "msgflow.duckdb"
 
 
 class _Word(str):
@@ -66,7 +67,7 @@ def complete(kind: str, *more: str) -> Callable[[typer.Context, str], list[str]]
     def completed(ctx: typer.Context, incomplete: str) -> list[str]:
         from msgflow.db.known_names import known_names
 
-        path = ctx.params.get("database") or os.environ.get("MSGFLOW_DB") or _DEFAULT_DATABASE
+        path = ctx.params.get("database") or os.environ.get("MSGFLOW_DB") or DEFAULT_DATABASE
         return words([*more, *known_names(_path(path), kind, incomplete)], incomplete)
 
     return completed
@@ -74,7 +75,6 @@ def complete(kind: str, *more: str) -> Callable[[typer.Context, str], list[str]]
 
 def complete_path(ctx: typer.Context, incomplete: str) -> list[str]:
     """Complete the name of a path from its file."""
-    from msgflow.cli.options import DEFAULT_PATHS
     from msgflow.errors import MsgflowError
     from msgflow.paths.file import read_paths
 

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from msgflow.cli.options import (
-    DEFAULT_DATABASE,
-    DatabaseOption,
-    FormatOption,
-    OutputOption,
-    WideOption,
-)
+from msgflow.cli.defaults import DEFAULT_DATABASE
+from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
 from msgflow.errors import ExitCode
 
 app = typer.Typer(help="Check, upgrade and describe a database file.")

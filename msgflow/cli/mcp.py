@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption
+from msgflow.cli.defaults import DEFAULT_DATABASE
+from msgflow.cli.options import DatabaseOption
 
 
 def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:

@@ -11,9 +11,6 @@ from msgflow.cli.completion import complete
 from msgflow.export.formats import Format
 from msgflow.query.show.times import Times
 
-DEFAULT_DATABASE = Path("msgflow.duckdb")
-DEFAULT_PATHS = "paths.yaml"
-
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
 

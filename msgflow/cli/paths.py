@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from msgflow.cli.options import DEFAULT_DATABASE, DatabaseOption, OutputOption, RunOption
+from msgflow.cli.defaults import DEFAULT_DATABASE
+from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
 
 app = typer.Typer(help="Give paths names, for --path.")
 

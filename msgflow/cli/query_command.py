@@ -9,8 +9,8 @@ import typer
 from typer.core import TyperCommand
 
 from msgflow.cli.completion import complete, is_completing
+from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
-    DEFAULT_DATABASE,
     OUTPUT,
     ColumnsOption,
     DatabaseOption,

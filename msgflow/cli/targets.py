@@ -6,13 +6,8 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import (
-    DEFAULT_DATABASE,
-    DatabaseOption,
-    OutputOption,
-    RunOption,
-    SkipFirstOption,
-)
+from msgflow.cli.defaults import DEFAULT_DATABASE
+from msgflow.cli.options import DatabaseOption, OutputOption, RunOption, SkipFirstOption
 
 app = typer.Typer(help="Write requirements for verify.")
 

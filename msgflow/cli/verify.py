@@ -9,9 +9,8 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.completion import complete
+from msgflow.cli.defaults import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.cli.options import (
-    DEFAULT_DATABASE,
-    DEFAULT_PATHS,
     OUTPUT,
     DatabaseOption,
     EndOption,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from msgflow.export.flow_rows import FlowRows
+from msgflow.export.flow_tree import tree_text
 from msgflow.query.clocks import clock_notes
 from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
 from msgflow.query.show.plain import plain
@@ -16,93 +17,18 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
+    from msgflow.export.flow_rows import Row
     from msgflow.query.flow import Start
-    from msgflow.run.choice import Run
-
-Key = tuple[str, int]
-Row = dict[str, Any]
-
-_LINK = ("link_kind", "wait_ns", "candidate_count", "is_loss_affected")
-_NODE = (
-    "kind",
-    "id",
-    "depth",
-    "start_ns",
-    "end_ns",
-    "node",
-    "label",
-    "topic_name",
-    "symbol",
-    "thread",
-    "host",
-    "busy_min_ns",
-    "busy_max_ns",
-)
-_STATE = ("missing", "reason", "cut_count", "internal_count")
-NOT_TAKEN = "not_taken"
 
 
 @dataclass(frozen=True, repr=False)
-class Flow:
+class Flow(FlowRows):
     """What one message caused and was caused by. Times are integers in nanoseconds.
 
     `str` of it is the tree that `msgflow flow` prints.
 
-    Attributes:
-        start: what it was followed from.
-        direction: 'forward', 'backward' or 'both'.
-        depth: most messages in a row, each way.
-        limit: most vertices.
-        run: the run it belongs to.
-        table: the rows of `main.flow_step`, nearest to the start first, with the bounds of
-            `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns).
-        notes: what the rows do not say themselves, a sentence each.
+    Its attributes are those of `FlowRows`.
     """
-
-    start: Start
-    direction: str
-    depth: int
-    limit: int
-    run: Run
-    table: pa.Table
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def start_key(self) -> Key:
-        """The vertex that it was followed from, as (kind, id)."""
-        return (self.start.kind, self.start.id)
-
-    @property
-    def is_cut(self) -> bool:
-        """Whether the flow goes on beyond depth or limit."""
-        return any(node["cut_count"] for node in self.nodes.values())
-
-    @cached_property
-    def nodes(self) -> dict[Key, Row]:
-        """Vertices by (kind, id), nearest to the start first."""
-        found: dict[Key, Row] = {}
-        for row in self.table.to_pylist():
-            # That a message was not taken is said of the edge: the subscription may miss several.
-            state = dict.fromkeys(_STATE) if row["link_kind"] == NOT_TAKEN else row
-            node = {name: row[name] for name in _NODE} | {name: state[name] for name in _STATE}
-            found.setdefault((row["kind"], row["id"]), node)
-        return found
-
-    @cached_property
-    def edges(self) -> list[Row]:
-        """Links between the vertices, from cause to effect."""
-        return [
-            {
-                "from_kind": row["from_kind"],
-                "from_id": row["from_id"],
-                "to_kind": row["kind"],
-                "to_id": row["id"],
-                **{name: row[name] for name in _LINK},
-                "reason": row["reason"] if row["link_kind"] == NOT_TAKEN else None,
-            }
-            for row in self.table.to_pylist()
-            if row["from_kind"] is not None
-        ]
 
     def to_arrow(self) -> pa.Table:
         """Return the rows, as `table` has them, as a pyarrow.Table."""
@@ -136,7 +62,6 @@ class Flow:
         return f"<Flow of {self.start.kind} {self.start.id}: {len(self.nodes)} nodes>"
 
     def __str__(self) -> str:
-        from msgflow.export.flow_tree import tree_text
 
         return tree_text(self)
 

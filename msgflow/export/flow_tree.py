@@ -19,8 +19,8 @@ from msgflow.run.window import format_epoch
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from msgflow.export.flow import Flow, Row
     from msgflow.export.flow_layout import Branch, Item, Line
+    from msgflow.export.flow_rows import FlowRows, Row
 
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 44
@@ -49,7 +49,7 @@ _NOT_SEEN = {
 
 
 def tree_text(
-    flow: Flow, *, is_absolute: bool = False, width: int | None = None, color: bool = False
+    flow: FlowRows, *, is_absolute: bool = False, width: int | None = None, color: bool = False
 ) -> str:
     """Return the tree of a flow; a line begins with its time since the first line.
 
@@ -100,7 +100,7 @@ class _Painter:
     """Turns items into styled text."""
 
     def __init__(
-        self, flow: Flow, branches: Sequence[Branch], is_absolute: bool, width: int
+        self, flow: FlowRows, branches: Sequence[Branch], is_absolute: bool, width: int
     ) -> None:
         self.flow = flow
         self.is_absolute = is_absolute

@@ -13,12 +13,13 @@ from msgflow.sim.take import take
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.entity import Action
     from msgflow.sim.executor import Executor
     from msgflow.sim.executor_thread import ExecutorThread
     from msgflow.sim.machine import Steps
-    from msgflow.sim.publish import CallbackInstance
-    from msgflow.sim.transport import Middleware, SubscriptionObject
+    from msgflow.sim.objects import SubscriptionObject
+    from msgflow.sim.transport import Middleware
 
 _LONGEST_WAIT_NS = 1_000_000_000
 _TRANSITIONS = {

@@ -2,37 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msgflow.sim.callback_instance import CallbackInstance, Root
 from msgflow.sim.machine import Run, settle
-from msgflow.sim.publish import CallbackInstance
 from msgflow.sim.take import Taken, take
-from msgflow.sim.transport import Root
-from msgflow.sim.user_code import UserCode, execute
+from msgflow.sim.user_code import execute
 
 if TYPE_CHECKING:
-    from msgflow.sim.executor import CallbackGroup
-    from msgflow.sim.intra import IntraBuffer
     from msgflow.sim.machine import Steps, Thread
-    from msgflow.sim.transport import Middleware, SubscriptionObject
-
-
-@dataclass(slots=True, eq=False)
-class TimerObject:
-    """A timer as it exists in its process; `due` is when it has to be called next."""
-
-    node: str
-    handle: int
-    callback: int
-    period: int
-    code: UserCode
-    group: CallbackGroup
-    due: int
-
-    def is_ready(self, time: int) -> bool:
-        """Whether it has to be called."""
-        return self.due <= time
+    from msgflow.sim.objects import IntraBuffer, SubscriptionObject, TimerObject, UserCode
+    from msgflow.sim.transport import Middleware
 
 
 def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: int) -> Run:

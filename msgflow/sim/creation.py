@@ -10,19 +10,20 @@ from typing import TYPE_CHECKING
 
 from msgflow.sim import entity, symbols
 from msgflow.sim.actions import Lifecycle, NodeObjects, deeds
-from msgflow.sim.callbacks import TimerObject
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import CallbackGroup, Executor
-from msgflow.sim.intra import IntraBuffer, RingBuffer, put
+from msgflow.sim.intra import put
 from msgflow.sim.links import CallbackLinks, LinkObject
-from msgflow.sim.services import ClientObject, ServiceNetwork, ServiceObject
-from msgflow.sim.transport import (
+from msgflow.sim.objects import (
+    IntraBuffer,
     IntraProcess,
-    Middleware,
     PublisherObject,
+    RingBuffer,
     SubscriptionObject,
+    TimerObject,
+    UserCode,
 )
-from msgflow.sim.user_code import UserCode
+from msgflow.sim.services import ClientObject, ServiceNetwork, ServiceObject
 from msgflow.sim.write import entity_of
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from msgflow.sim import system
     from msgflow.sim.discovery import Discovery
     from msgflow.sim.machine import Thread
+    from msgflow.sim.transport import Middleware
 
 ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from msgflow.sim.latency import latency_between
 from msgflow.sim.machine import RunningProcess, Thread
-from msgflow.sim.transport import latency_between
 from msgflow.sim.write import read, write
 
 _TOPIC = "ros_discovery_info"

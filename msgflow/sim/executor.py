@@ -13,9 +13,6 @@ from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from msgflow.sim import system
-    from msgflow.sim.callbacks import TimerObject
-    from msgflow.sim.executor_thread import ExecutorThread
-    from msgflow.sim.transport import SubscriptionObject
     from msgflow.sim.world import World
 
 # Some guard conditions look like data on a subscription, which then is not there.
@@ -48,6 +45,22 @@ class Entity(Protocol):
         """Whether there is something to execute."""
 
 
+class Timer(Entity, Protocol):
+    """One that is ready from a time on; `due` is that time."""
+
+    due: int
+
+
+class Spinner(Protocol):
+    """A thread that spins an executor."""
+
+    def wake(self, time: int) -> None:
+        """End its wait: something has arrived at `time`."""
+
+    def go_on(self, time: int) -> None:
+        """Plan its next step for `time`."""
+
+
 class Executor:
     """What the threads of one executor share.
 
@@ -61,24 +74,24 @@ class Executor:
     """
 
     def __init__(self, world: World, description: system.Executor, *, is_rclcpp: bool) -> None:
-        self.timers: list[TimerObject] = []
-        self.subscriptions: list[SubscriptionObject] = []
+        self.timers: list[Timer] = []
+        self.subscriptions: list[Entity] = []
         self.waitables: list[Entity] = []
         self.has_events = is_rclcpp and description.kind in _HAVING_EVENTS
         self.has_callbacks = is_rclcpp and description.kind not in _WITHOUT_CALLBACKS
-        self.owner: ExecutorThread | None = None
-        self.sleeper: ExecutorThread | None = None
+        self.owner: Spinner | None = None
+        self.sleeper: Spinner | None = None
         self.thread_count = description.thread_count
         self._world = world
         self._ready: deque[Entity] = deque()
-        self._blocked: deque[ExecutorThread] = deque()
+        self._blocked: deque[Spinner] = deque()
 
     def wake(self, time: int) -> None:
         """Something has arrived at `time`: end the wait, if there is one."""
         if self.sleeper is not None:
             self.sleeper.wake(time)
 
-    def block(self, thread: ExecutorThread) -> None:
+    def block(self, thread: Spinner) -> None:
         """Let a thread wait until it owns the executor."""
         self._blocked.append(thread)
 
@@ -93,7 +106,7 @@ class Executor:
         """An entity does not exist any more."""
         for entities in (self.subscriptions, self.waitables, self._ready):
             if entity in entities:
-                entities.remove(entity)  # type: ignore[arg-type]
+                entities.remove(entity)
 
     def collect(self, time: int) -> None:
         """A wait is over: see what is ready."""
@@ -103,7 +116,7 @@ class Executor:
             if timer.due <= time:
                 ready.append(timer)
         for subscription in self.subscriptions:
-            if subscription.queue:
+            if subscription.is_ready(time):
                 ready.append(subscription)
         if self.waitables:
             ready.extend(entity for entity in self.waitables if entity.is_ready(time))
@@ -125,7 +138,7 @@ class Executor:
             if (due is None or timer.due < due) and _is_free(timer.group):
                 due = timer.due
         for subscription in self.subscriptions:
-            if subscription.queue and _is_free(subscription.group):
+            if subscription.is_ready(asleep) and _is_free(subscription.group):
                 return asleep
         for entity in self.waitables:
             if entity.is_ready(asleep) and _is_free(entity.group):

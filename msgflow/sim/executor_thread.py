@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.sim.callbacks import TimerObject, run_buffer, run_subscription, run_timer
+from msgflow.sim.callbacks import run_buffer, run_subscription, run_timer
 from msgflow.sim.entity import MICROSECOND
-from msgflow.sim.intra import IntraBuffer
 from msgflow.sim.machine import Run, RunningProcess, Steps, Thread
+from msgflow.sim.objects import IntraBuffer, SubscriptionObject, TimerObject
 from msgflow.sim.services import ClientObject, ServiceObject, run_client, run_service
 from msgflow.sim.states import ExecutorStates
-from msgflow.sim.transport import SubscriptionObject
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

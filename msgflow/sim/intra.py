@@ -5,75 +5,16 @@ What threads share is changed exactly at the time of the event that tells of it.
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from msgflow.sim.publish import CallbackInstance, publish, write_publication
-from msgflow.sim.transport import Message, Middleware, PublisherObject, SubscriptionObject
+from msgflow.sim.objects import Message
+from msgflow.sim.publish import publish, write_publication
 
 if TYPE_CHECKING:
-    from msgflow.sim.executor import CallbackGroup
+    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.machine import Steps, Thread
-
-
-@dataclass(slots=True)
-class RingBuffer:
-    """A ring of slots as rclcpp has it; a message that comes when it is full replaces the oldest.
-
-    `write_index` is the slot that was written last, `read_index` the oldest one.
-    """
-
-    handle: int
-    capacity: int
-    messages: deque[Message] = field(default_factory=deque)
-    write_index: int = -1
-    read_index: int = 0
-
-    def enqueue(self, thread: Thread, time: int, message: Message) -> Message | None:
-        """Put in a message; returns the one that it has replaced, if any."""
-        self.write_index = (self.write_index + 1) % self.capacity
-        replaced = None
-        size = len(self.messages) + 1
-        if size > self.capacity:
-            replaced = self.messages.popleft()
-            self.read_index = (self.read_index + 1) % self.capacity
-        self.messages.append(message)
-        thread.emit(
-            thread.machine.tracepoints.rclcpp_ring_buffer_enqueue, time, thread.context,
-            self.handle, self.write_index, size, int(replaced is not None),
-        )  # fmt: skip
-        return replaced
-
-    def dequeue(self, thread: Thread, time: int) -> Message:
-        """Take out the oldest message."""
-        message = self.messages.popleft()
-        thread.emit(
-            thread.machine.tracepoints.rclcpp_ring_buffer_dequeue, time, thread.context,
-            self.handle, self.read_index, len(self.messages),
-        )  # fmt: skip
-        self.read_index = (self.read_index + 1) % self.capacity
-        return message
-
-
-@dataclass(slots=True, eq=False)
-class IntraBuffer:
-    """The intra-process side of a subscription: what an executor executes for it."""
-
-    subscription: SubscriptionObject
-    ring: RingBuffer
-    callback: int
-    # No executor event names it.
-    handle: int = 0
-
-    @property
-    def group(self) -> CallbackGroup:
-        """That of the subscription."""
-        return self.subscription.group
-
-    def is_ready(self, time: int) -> bool:
-        """Whether a message is in it."""
-        return bool(self.ring.messages)
+    from msgflow.sim.objects import IntraBuffer, PublisherObject
+    from msgflow.sim.transport import Middleware
 
 
 def publish_intra(

@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from msgflow.sim.publish import CallbackInstance, Cause
+from msgflow.sim.callback_instance import CallbackInstance, Cause
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

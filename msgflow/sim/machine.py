@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from msgflow.sim import system
-    from msgflow.sim.executor_thread import ExecutorThread
     from msgflow.sim.host_clock import HostClock
     from msgflow.sim.recorder import Recorder
     from msgflow.sim.recording import Recording
@@ -91,7 +90,7 @@ class RunningProcess:
         self.number = number
         self.pid = description.pid
         self.is_rclcpp = description.client_library == "rclcpp"
-        self.threads: list[ExecutorThread] = []
+        self.threads: list[Thread] = []
         self.is_stopped = False
         self.is_stepwise = description.is_killed
         self.memory = AddressSpace(f"{seed}/{description.pid}")
@@ -199,6 +198,14 @@ class Thread:
         if self._steps is not None:
             self._steps.close()
             self._steps = None
+
+    def stop(self) -> None:
+        """The process ends."""
+        self.cut()
+
+    def finish(self) -> None:
+        """The simulation ends."""
+        self.cut()
 
     def _first_step(self, _: int, plan: int) -> None:
         if plan != self._plan or self._steps is None:

@@ -2,48 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.sim.transport import Message, Middleware, Origin, PublisherObject
+from msgflow.sim.objects import Message
 from msgflow.sim.write import write
 
 if TYPE_CHECKING:
+    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.machine import Thread
-
-
-@dataclass(slots=True)
-class CallbackInstance:
-    """A run of a callback that is going on; what it publishes is caused by it.
-
-    Without `callback_instance_id`, what is done with a message that was taken without a callback.
-
-    Attributes:
-        origins: where the flows that lead to it began, or begin with it.
-        start: time of callback_start, or of the take.
-        causes: what else its next publication is made of.
-    """
-
-    callback_instance_id: int | None
-    start_ns: int | None
-    origins: tuple[Origin, ...]
-    take_id: int | None
-    take_rmw_ns: int | None
-    tid: int
-    start: int = 0
-    causes: tuple[Cause, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Cause:
-    """A run of the callback of an input that an indirect link leads from.
-
-    `is_reuse`: an earlier publication by the same link has used its message already.
-    """
-
-    kind: str
-    instance: CallbackInstance
-    is_reuse: bool
+    from msgflow.sim.objects import PublisherObject
+    from msgflow.sim.transport import Middleware
 
 
 def publish(

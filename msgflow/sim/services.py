@@ -11,14 +11,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from msgflow.sim.callbacks import run_callback
+from msgflow.sim.latency import latency_between
 from msgflow.sim.machine import Run, settle
-from msgflow.sim.transport import latency_between
-from msgflow.sim.user_code import UserCode, execute
+from msgflow.sim.user_code import execute
 
 if TYPE_CHECKING:
+    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.executor import CallbackGroup, Executor
     from msgflow.sim.machine import RunningProcess, Steps, Thread
-    from msgflow.sim.publish import CallbackInstance
+    from msgflow.sim.objects import UserCode
     from msgflow.sim.transport import Middleware
     from msgflow.sim.truth import Truth
     from msgflow.sim.world import World

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from msgflow.sim.machine import RunningProcess
+    from msgflow.sim.objects import PublisherObject
     from msgflow.sim.services import ServiceNetwork
-    from msgflow.sim.transport import Middleware, PublisherObject
+    from msgflow.sim.transport import Middleware
 
 _INTERNAL_DEPTH = 1000
 _PARAMETER_SUBSCRIPTION = entity.Subscription(

@@ -9,7 +9,8 @@ from msgflow.sim.write import read
 
 if TYPE_CHECKING:
     from msgflow.sim.machine import Thread
-    from msgflow.sim.transport import Message, Middleware, SubscriptionObject
+    from msgflow.sim.objects import Message, SubscriptionObject
+    from msgflow.sim.transport import Middleware
 
 
 @dataclass(slots=True)

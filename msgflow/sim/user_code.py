@@ -2,44 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.sim.entity import Work
 from msgflow.sim.intra import publish_intra
 from msgflow.sim.machine import settle
-from msgflow.sim.publish import CallbackInstance, publish
+from msgflow.sim.publish import publish
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.links import CallbackLinks
     from msgflow.sim.machine import Run, Steps, Thread
-    from msgflow.sim.transport import Middleware, PublisherObject
-
-
-@dataclass(slots=True)
-class UserCode:
-    """What a callback does.
-
-    Attributes:
-        work: how long it computes.
-        publishers: where it publishes, in this order.
-        log: the publisher of /rosout, if it logs.
-        deeds: what it does then, each `deed(thread, middleware, time, instance)`.
-        is_stepwise: other threads must be able to act between its publications.
-        is_callback: it runs in a callback that is traced.
-        links: what it has to do with caches of its node.
-    """
-
-    work: Work
-    publishers: tuple[PublisherObject, ...]
-    log: PublisherObject | None
-    deeds: tuple[Callable[..., Steps], ...] = ()
-    is_stepwise: bool = False
-    is_callback: bool = True
-    links: CallbackLinks | None = None
-
+    from msgflow.sim.objects import UserCode
+    from msgflow.sim.transport import Middleware
 
 # A callback that only puts a message into a cache.
 _KEEPING = Work(1_000, 2_000)

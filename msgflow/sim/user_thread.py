@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from msgflow.sim.creation import Creator, NodeContext
     from msgflow.sim.entity import Subscription
-    from msgflow.sim.transport import SubscriptionObject
+    from msgflow.sim.objects import SubscriptionObject
 
 _NUMBER = 8
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.trace.discovery import discover
 from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo, TraceLocation
-from msgflow.trace.reader import TraceSet, open
+from msgflow.trace.reader import open
+from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:
     from msgflow.trace.schemas import COMMON_SCHEMA, PACKET, PACKET_SCHEMA

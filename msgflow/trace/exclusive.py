@@ -7,7 +7,7 @@ from abc import abstractmethod
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.trace.reader import DEFAULT_BATCH_ROWS, TraceSet
+from msgflow.trace.trace_set import DEFAULT_BATCH_ROWS, TraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Mapping

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.archive import is_archive
-from msgflow.trace.reader import DEFAULT_BATCH_ROWS, TraceSet
+from msgflow.trace.trace_set import DEFAULT_BATCH_ROWS, TraceSet
 from msgflow.trace.unpack import unpack
 
 if TYPE_CHECKING:

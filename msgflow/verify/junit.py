@@ -11,24 +11,26 @@ from msgflow.run.window import format_epoch
 if TYPE_CHECKING:
     from typing import Any
 
-    from msgflow.verify.verify import Verification
+    from msgflow.query.result import QueryResult
+    from msgflow.run.choice import Run
 
 
-def junit_xml(verification: Verification, *, allow_not_measured: bool) -> str:
+def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str:
     """Return a document with one test case per requirement and thing that it is of.
 
     Args:
-        verification: the verdicts.
+        result: the verdicts.
+        run: that they are on.
         allow_not_measured: what was not measured is skipped, else an error.
     """
-    rows: list[dict[str, Any]] = verification.result.to_arrow().to_pylist()
+    rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
     missing = "skipped" if allow_not_measured else "errors"
     counts = {"tests": len(rows), "failures": 0, "errors": 0, "skipped": 0}
     counts["failures"] = sum(row["verdict"] == "failed" for row in rows)
     counts[missing] = sum(row["verdict"] == "not measured" for row in rows)
     numbers = {name: str(number) for name, number in counts.items()}
     root = ElementTree.Element("testsuites", {"name": "msgflow verify", **numbers})
-    name = printable(verification.run.name)
+    name = printable(run.name)
     suite = ElementTree.SubElement(root, "testsuite", {"name": name, **numbers})
     for row in rows:
         # Names come from traces and files: characters that XML cannot hold stand there escaped.

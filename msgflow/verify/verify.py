@@ -104,7 +104,7 @@ class Verification:
         """Return the verdicts as JUnit XML: what was not measured is an error, or skipped."""
         from msgflow.verify.junit import junit_xml
 
-        return junit_xml(self, allow_not_measured=allow_not_measured)
+        return junit_xml(self.result, self.run, allow_not_measured=allow_not_measured)
 
 
 def verify(

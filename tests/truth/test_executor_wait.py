@@ -13,7 +13,7 @@ from ingested import ingest_one
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
 from msgflow.sim import executor_thread, simulate
-from msgflow.sim.callbacks import TimerObject
+from msgflow.sim.objects import TimerObject
 from msgflow.sim.transport import Middleware
 
 SCENARIOS = ["demo", "executors", "multi_threaded", "nested", "overload"]

@@ -29,8 +29,8 @@ from msgflow.sim import (
     executor_thread,
     simulate,
 )
-from msgflow.sim.callbacks import TimerObject
 from msgflow.sim.entity import MILLISECOND, SECOND
+from msgflow.sim.objects import TimerObject
 
 _SOURCE = Node(
     "source",

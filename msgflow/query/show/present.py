@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.query.rows import Rows
 
 MOST_ROWS = 50
 _NARROWEST = 40
@@ -95,7 +95,7 @@ def screen_width() -> int:
 
 
 def present(
-    result: QueryResult,
+    result: Rows,
     width: int,
     *,
     most_rows: int | None = MOST_ROWS,
@@ -141,7 +141,7 @@ def present(
     return Presentation(headings, tuple(shown), widths, paths, tuple(notes))
 
 
-def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str], list[str]]:
+def _that_say_something(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
     """Return the columns that have something to say, and those that are 0 or empty throughout."""
     if keeps_all or not len(result):
         return list(result.columns), []
@@ -176,11 +176,11 @@ def _is_nothing(column: pa.ChunkedArray) -> bool:
     return bool(types.is_string(kind) and compute.max(column).as_py() == "")
 
 
-def _title(result: QueryResult, name: str) -> str:
+def _title(result: Rows, name: str) -> str:
     return shown_name(name, result.units.get(name), result.columns)
 
 
-def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownColumn:
+def _column(result: Rows, name: str, values: pa.ChunkedArray) -> ShownColumn:
     import pyarrow.types as types
 
     kind = values.type
@@ -223,7 +223,7 @@ def _measured(
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
 
 
-def _run_names(result: QueryResult) -> dict[int, str]:
+def _run_names(result: Rows) -> dict[int, str]:
     """Return the name of each run by its id; nothing where the rows are about the runs."""
     if result.header is None or result.header.grain == "one row per run":
         return {}
@@ -235,7 +235,7 @@ def _symbols(text: str) -> str:
     return short_symbol(text)
 
 
-def _begin(result: QueryResult) -> int | None:
+def _begin(result: Rows) -> int | None:
     """Return what points in time count from: the start of the only run, unless rows tell it."""
     if len(result.runs) != 1 or result.header is None or result.header.grain == "one row per run":
         return None
@@ -265,7 +265,7 @@ def _with_numbered_paths(
 
 
 def _with_headings(
-    result: QueryResult, columns: list[ShownColumn]
+    result: Rows, columns: list[ShownColumn]
 ) -> tuple[list[ShownColumn], tuple[str, ...]]:
     """Return the columns without those that stand above the rows, and what stands there."""
     by_name = {column.name: column for column in columns}
@@ -294,7 +294,7 @@ def _with_headings(
     return left, lines
 
 
-def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[ShownColumn]:
+def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn]:
     """Return the columns, the most important first; what a note can say of all rows comes last."""
     header = result.header
     brief = () if header is None else header.brief
@@ -310,7 +310,7 @@ def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[Show
     )
 
 
-def _that_fit(result: QueryResult, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
+def _that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
     """Return the most important columns that have a place, in their own order."""
     if _least(columns) <= width:
         return columns

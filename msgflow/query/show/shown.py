@@ -13,12 +13,12 @@ from msgflow.query.show.table import cells
 from msgflow.query.show.wrapping import wrap
 
 if TYPE_CHECKING:
-    from msgflow.query.result import QueryResult
+    from msgflow.query.rows import Rows
 
 _STYLE = "text-align: {}; white-space: pre-wrap"
 
 
-def shown_text(result: QueryResult) -> str:
+def shown_text(result: Rows) -> str:
     """Return what a terminal would show: the first rows as a table that fits, and notes."""
     width = screen_width()
     shown = present(result, width, remedy="to_arrow() has all")
@@ -38,7 +38,7 @@ def _labelled(label: str, text: str, width: int) -> list[str]:
     return [f"{label}{first}", *(" " * len(label) + line for line in more)]
 
 
-def shown_html(result: QueryResult) -> str:
+def shown_html(result: Rows) -> str:
     """Return the first rows as an HTML table; names from a trace are never more than text."""
     names, rows, right = cells(_first(result))
     styles = [_STYLE.format("right" if is_right else "left") for is_right in right]
@@ -63,11 +63,11 @@ def shown_html(result: QueryResult) -> str:
     return "".join(parts)
 
 
-def _first(result: QueryResult) -> QueryResult:
+def _first(result: Rows) -> Rows:
     return replace(result, table=result.table.slice(0, MOST_ROWS))
 
 
-def _notes(result: QueryResult) -> list[str]:
+def _notes(result: Rows) -> list[str]:
     count = len(result)
     if not count:
         return [result.when_empty, *result.notes]

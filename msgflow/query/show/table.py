@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.query.rows import Rows
 
 
-def table_lines(result: QueryResult) -> Iterator[str]:
+def table_lines(result: Rows) -> Iterator[str]:
     """Yield the lines of a table: names, a rule, one line per row, numbers to the right."""
     return lay_out(*cells(result))
 
@@ -43,7 +43,7 @@ def lay_out(
         yield _line(row, widths, right)
 
 
-def markdown_lines(result: QueryResult) -> Iterator[str]:
+def markdown_lines(result: Rows) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
     names, rows, right = cells(result)
     if not names:
@@ -54,7 +54,7 @@ def markdown_lines(result: QueryResult) -> Iterator[str]:
         yield _markdown_line(row)
 
 
-def cells(result: QueryResult) -> tuple[list[str], list[list[str]], list[bool]]:
+def cells(result: Rows) -> tuple[list[str], list[list[str]], list[bool]]:
     """Return titles, rows as people read them, and which columns are numbers."""
     import pyarrow.types
 

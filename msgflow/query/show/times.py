@@ -10,7 +10,7 @@ from msgflow.errors import UsageError
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from msgflow.query.result import QueryResult
+    from msgflow.query.rows import Rows
 
 _NS = "_ns"
 _SECOND = 1e9
@@ -30,7 +30,7 @@ class Times(StrEnum):
     ISO = "iso"
 
 
-def converted(result: QueryResult, times: Times) -> pa.Table:
+def converted(result: Rows, times: Times) -> pa.Table:
     """Return the rows of a result with its times in another form; `_ns` becomes `_s` or `_utc`.
 
     Raises:
@@ -60,7 +60,7 @@ def converted(result: QueryResult, times: Times) -> pa.Table:
     return pyarrow.table(columns, names=names)
 
 
-def _moment(result: QueryResult, column: Any, times: Times) -> tuple[Any, str]:
+def _moment(result: Rows, column: Any, times: Times) -> tuple[Any, str]:
     import pyarrow
     from pyarrow import compute
 
@@ -79,7 +79,7 @@ def _seconds(column: Any) -> Any:
     return compute.divide(column.cast(pyarrow.float64(), safe=False), _SECOND)
 
 
-def _starts(result: QueryResult) -> Any:
+def _starts(result: Rows) -> Any:
     """Return when the run of each row began."""
     import pyarrow
     from pyarrow import compute

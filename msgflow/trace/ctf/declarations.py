@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.types import Structure
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.clock import Clock
 
-
 _SMALLEST_ID, _LARGEST_ID = -(1 << 63), (1 << 64) - 1
-
-
-class MetadataError(Exception):
-    """The metadata cannot be understood; the message says why and where."""
 
 
 @dataclass(eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from msgflow.trace.ctf.declarations import MetadataError
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.types import (
     BYTE,
     Array,

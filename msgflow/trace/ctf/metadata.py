@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, tsdl
-from msgflow.trace.ctf.declarations import MetadataError
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.shape import check_shapes
 from msgflow.trace.metadata import (
     BYTE_ORDER_OF_MAGIC,

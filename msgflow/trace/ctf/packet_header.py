@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from uuid import UUID
 
-from msgflow.trace.ctf.declarations import MetadataError
 from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.types import (
     BYTE,
     CONTENT_SIZE_ROLE,

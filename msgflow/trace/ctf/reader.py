@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
-from msgflow.trace.ctf.declarations import MetadataError
 from msgflow.trace.ctf.describe import describe
 from msgflow.trace.ctf.entries import entries_of
 from msgflow.trace.ctf.index import orphans
 from msgflow.trace.ctf.iteration import Iteration
 from msgflow.trace.ctf.layout import StreamLayout
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.probe import begins_of
 from msgflow.trace.ctf.scan import BEYOND_END

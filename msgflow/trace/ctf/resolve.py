@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.declarations import MetadataError
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.types import (
     Array,
     Choice,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.declarations import MetadataError
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.types import Array, Optional, Sequence, Structure, Variant
 
 if TYPE_CHECKING:

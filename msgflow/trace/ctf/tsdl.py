@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from uuid import UUID
 
 from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.declarations import EventClass, MetadataError, StreamClass, TraceClass
+from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.resolve import resolved
 from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value

@@ -9,7 +9,8 @@ import pytest
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, metadata, tsdl
-from msgflow.trace.ctf.declarations import MetadataError, TraceClass
+from msgflow.trace.ctf.declarations import TraceClass
+from msgflow.trace.ctf.metadata_error import MetadataError
 from msgflow.trace.ctf.types import (
     Array,
     Choice,

@@ -1,0 +1,151 @@
+"""The rows of the query `graph` as vertices and the edges between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from msgflow.query.show.human import printable
+
+if TYPE_CHECKING:
+    from msgflow.query.result import QueryResult
+    from msgflow.run.choice import Run
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Vertex:
+    """A node, topic or service.
+
+    Attributes:
+        id: what edges call it, of letters and digits alone.
+        kind: 'node', 'topic' or 'service'.
+        name: as the trace has it.
+        rate_hz: messages of a topic per second; None: not known.
+        executor: number of the executor that runs the node, in `Graph.executors`.
+    """
+
+    id: str
+    kind: str
+    name: str
+    rate_hz: float | None = None
+    executor: int | None = None
+
+    @property
+    def lines(self) -> list[str]:
+        """What stands in it, each without control characters."""
+        rate = [] if self.rate_hz is None else [f"{self.rate_hz:.4g} Hz"]
+        return [printable(self.name), *rate]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """What a node does with a topic or service.
+
+    Attributes:
+        source: id of the vertex that it begins at.
+        target: id of the vertex that it ends at.
+        kind: 'publish', 'receive', 'call' or 'serve'.
+        indirect: how messages wait in the node for what is published; None: they do not.
+        count: messages or requests.
+        rate_hz: how often; None: not known.
+        median_ns: median latency; None: not known.
+        p95_ns: 95 % are at most this.
+    """
+
+    source: str
+    target: str
+    kind: str
+    indirect: str | None
+    count: int
+    rate_hz: float | None
+    median_ns: int | None
+    p95_ns: int | None
+
+    @property
+    def label(self) -> str:
+        """Median and p95, where there are any."""
+        if self.median_ns is None or self.p95_ns is None:
+            return ""
+        return f"{_brief(self.median_ns)} · {_brief(self.p95_ns)}"
+
+    @property
+    def is_service(self) -> bool:
+        """Whether it belongs to a service."""
+        return self.kind in ("call", "serve")
+
+
+def _brief(duration_ns: int) -> str:
+    """Return a duration with three digits: more do not fit beside an arrow."""
+    for size, unit in ((1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "µs")):
+        if abs(duration_ns) >= size:
+            return f"{float(f'{duration_ns / size:.3g}'):g} {unit}"
+    return f"{duration_ns} ns"
+
+
+@dataclass(frozen=True, repr=False)
+class GraphRows:
+    """Nodes, topics and services of a run, and what passes between them.
+
+    Attributes:
+        run: the run.
+        result: the rows of the query `graph`.
+        notes: what they do not say themselves, a sentence each.
+    """
+
+    run: Run
+    result: QueryResult
+    notes: list[str] = field(default_factory=list)
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """The rows of the query."""
+        rows: list[Row] = self.result.to_arrow().to_pylist()
+        return rows
+
+    @cached_property
+    def executors(self) -> dict[int, str]:
+        """Executors with nodes in the graph: their number and what they are called."""
+        found = {
+            row["executor_id"]: row["executor"]
+            for row in self.rows
+            if row["executor_id"] is not None
+        }
+        return dict(sorted(found.items()))
+
+    @cached_property
+    def vertices(self) -> dict[tuple[str, str], Vertex]:
+        """Vertices by kind and name."""
+        rates: dict[str, float] = {}
+        for row in self.rows:
+            if row["kind"] == "publish" and row["rate_hz"] is not None:
+                rates[row["name"]] = rates.get(row["name"], 0) + row["rate_hz"]
+        found: dict[tuple[str, str], Vertex] = {}
+        for row in self.rows:
+            far = "service" if row["kind"] in ("call", "serve") else "topic"
+            for kind, name in (("node", row["node"]), (far, row["name"])):
+                if (kind, name) not in found:
+                    found[kind, name] = Vertex(
+                        f"v{len(found)}",
+                        kind,
+                        name,
+                        rates.get(name) if kind == "topic" else None,
+                        row["executor_id"] if kind == "node" else None,
+                    )
+        return found
+
+    @cached_property
+    def edges(self) -> list[Edge]:
+        """Edges, from who sends to who gets."""
+        found = []
+        for row in self.rows:
+            far = "service" if row["kind"] in ("call", "serve") else "topic"
+            source = self.vertices["node", row["node"]].id
+            target = self.vertices[far, row["name"]].id
+            if row["kind"] in ("receive", "serve"):
+                source, target = target, source
+            same = ("kind", "indirect", "count", "rate_hz", "median_ns", "p95_ns")
+            found.append(Edge(source, target, **{name: row[name] for name in same}))
+        return found

@@ -1,0 +1,70 @@
+"""A run of a callback that goes on, and where the flows that lead to it began."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class Root:
+    """A run of a timer's callback, where flows begin."""
+
+    callback_instance_id: int
+    hostname: str
+    pid: int
+    tid: int
+    start: int
+    start_ns: int
+
+
+# Where a flow began, and the topics since then.
+Origin = tuple[Root, tuple[str, ...]]
+
+
+@dataclass(slots=True)
+class CallbackInstance:
+    """A run of a callback that is going on; what it publishes is caused by it.
+
+    Without `callback_instance_id`, what is done with a message that was taken without a callback.
+
+    Attributes:
+        origins: where the flows that lead to it began, or begin with it.
+        start: time of callback_start, or of the take.
+        causes: what else its next publication is made of.
+    """
+
+    callback_instance_id: int | None
+    start_ns: int | None
+    origins: tuple[Origin, ...]
+    take_id: int | None
+    take_rmw_ns: int | None
+    tid: int
+    start: int = 0
+    causes: tuple[Cause, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """A run of the callback of an input that an indirect link leads from.
+
+    `is_reuse`: an earlier publication by the same link has used its message already.
+    """
+
+    kind: str
+    instance: CallbackInstance
+    is_reuse: bool
+
+
+def origins_on(instance: CallbackInstance, topic: str) -> tuple[Origin, ...]:
+    """The flows that a message is part of; a timer is no begin where it uses messages."""
+    if not instance.causes:
+        return tuple((root, (*path, topic)) for root, path in instance.origins)
+    inputs = [cause.instance for cause in instance.causes]
+    if instance.take_id is not None:
+        inputs.insert(0, instance)
+    origins = {
+        (root.callback_instance_id, path): (root, (*path, topic))
+        for each in inputs
+        for root, path in each.origins
+    }
+    return tuple(origins.values())
