@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.export import perfetto_rows as rows
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -79,8 +79,7 @@ def write_perfetto(
     with replacing(path) as temporary, temporary.open("wb") as file:
         writer = _Writer(StreamingTraceProtoBuilder(file), connection, run, window)
         writer.describe()
-        slices, arrows = writer.slices(rows.SLICES)
-        slices += writer.slices(rows.STATES)[0]
+        slices, arrows = writer.slices()
         values = writer.values()
         gaps = writer.gaps()
     return PerfettoTrace(path, run, slices, arrows, values, gaps)
@@ -99,12 +98,11 @@ class _Writer:
         self.builder = builder
         self.connection = connection
         self.run = run
-        self.bindings = {"run": run.run_id, "start_ns": window[0], "end_ns": window[1]}
+        self.bindings = {"run_id": run.run_id, "start_ns": window[0], "end_ns": window[1]}
         self.packets = perfetto_trace_pb2
 
-    def rows(self, sql: str) -> Iterator[dict[str, Any]]:
-        used = self.connection.extract_statements(sql)[0].named_parameters
-        relation = self.connection.sql(sql, params={name: self.bindings[name] for name in used})
+    def rows(self, name: str) -> Iterator[dict[str, Any]]:
+        relation = program().run(self.connection, name, self.bindings)
         with relation.to_arrow_reader(_AT_ONCE) as reader:
             for batch in reader:
                 yield from batch.to_pylist()
@@ -119,12 +117,12 @@ class _Writer:
             packet.clock_snapshot.clocks.add(clock_id=number, timestamp=start_ns)
         packet.trusted_packet_sequence_id = _SEQUENCE
         self.builder.write_packet(packet)
-        for row in self.rows(rows.PROCESSES):
+        for row in self.rows("perfetto_process"):
             track = self.track(row["track"])
             track.track_descriptor.process.pid = row["pid"]
             track.track_descriptor.process.process_name = row["name"]
             self.builder.write_packet(track)
-        for row in self.rows(rows.THREADS):
+        for row in self.rows("perfetto_thread"):
             track = self.track(row["track"], row["parent"])
             track.track_descriptor.thread.pid = row["pid"]
             track.track_descriptor.thread.tid = row["tid"]
@@ -134,7 +132,7 @@ class _Writer:
                 track = self.track(row["state_track"], row["track"])
                 track.track_descriptor.name = "executor"
                 self.builder.write_packet(track)
-        for row in self.rows(rows.COUNTERS):
+        for row in self.rows("perfetto_counter"):
             track = self.track(row["track"], row["parent"])
             track.track_descriptor.name = row["name"]
             track.track_descriptor.counter.unit_name = row["unit"]
@@ -157,11 +155,11 @@ class _Writer:
             packet.interned_data.debug_annotation_names.add(iid=number, name=name)
         for number, name in enumerate(_CATEGORIES, start=1):
             packet.interned_data.event_categories.add(iid=number, name=name)
-        for row in self.rows(rows.NAMES):
+        for row in self.rows("perfetto_name"):
             packet.interned_data.event_names.add(
                 iid=row["id"] * 8 + row["code"] + 1, name=row["name"]
             )
-        for row in self.rows(rows.SYMBOLS):
+        for row in self.rows("perfetto_symbol"):
             packet.interned_data.debug_annotation_string_values.add(
                 iid=row["id"], str=row["name"].encode()
             )
@@ -176,12 +174,12 @@ class _Writer:
         packet.track_event.track_uuid = row["track"]
         return packet
 
-    def slices(self, sql: str) -> tuple[int, int]:
+    def slices(self) -> tuple[int, int]:
         """Write slices; return how many, and how many arrows begin at them."""
         kind = self.packets.TrackEvent
         kinds = (kind.TYPE_SLICE_END, kind.TYPE_SLICE_BEGIN, kind.TYPE_INSTANT)
         slices = arrows = 0
-        for row in self.rows(sql):
+        for row in self.rows("perfetto_slice"):
             packet = self.event(row, kinds[row["rank"]])
             if row["rank"]:
                 slices += 1
@@ -202,7 +200,7 @@ class _Writer:
     def values(self) -> int:
         """Write what counters show; return how many values."""
         count = 0
-        for row in self.rows(rows.VALUES):
+        for row in self.rows("perfetto_value"):
             packet = self.event(row, self.packets.TrackEvent.TYPE_COUNTER)
             packet.track_event.double_counter_value = row["value"]
             self.builder.write_packet(packet)
@@ -214,7 +212,7 @@ class _Writer:
         kind = self.packets.TrackEvent
         count = 0
         known = None
-        for row in self.rows(rows.GAPS):
+        for row in self.rows("perfetto_gap"):
             if row["track"] != known:
                 known = row["track"]
                 track = self.track(known)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING
+
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -11,74 +15,6 @@ if TYPE_CHECKING:
 
     from msgflow.run.choice import Run
 
-_CLOCKS = """
-SELECT
-    run_id,
-    count(DISTINCT coalesce(reference_clock_id, -clock_id)),
-    run_id IN (SELECT run_id FROM main.diagnostic WHERE name = 'clock_not_synchronised')
-FROM main.clock
-WHERE list_contains($runs, run_id)
-GROUP BY run_id
-HAVING count(DISTINCT coalesce(reference_clock_id, -clock_id)) > 1
-"""
-
-
-_UNCERTAINTIES = """
-WITH named AS (
-    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
-    FROM main.host
-    GROUP BY clock_id
-),
-known AS (
-    SELECT clock_id, min(uncertainty_ns) AS least_ns, max(uncertainty_ns) AS greatest_ns
-    FROM main.clock_uncertainty
-    GROUP BY clock_id
-)
-SELECT
-    c.run_id, r.hosts, n.hosts, coalesce(k.least_ns, c.uncertainty_ns) / 1e6,
-    coalesce(k.greatest_ns, c.uncertainty_ns) / 1e6
-FROM main.clock AS c
-JOIN named AS n ON c.clock_id = n.clock_id
-JOIN named AS r ON c.reference_clock_id = r.clock_id
-LEFT JOIN known AS k ON c.clock_id = k.clock_id
-WHERE list_contains($runs, c.run_id) AND c.reference_clock_id <> c.clock_id
-ORDER BY c.clock_id
-"""
-
-
-# The bound of two clocks is the sum of theirs, and that of the reference is 0.
-_GROUPS = """
-WITH named AS (
-    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
-    FROM main.host
-    GROUP BY clock_id
-),
-known AS (
-    SELECT clock_id, max(uncertainty_ns) AS greatest_ns
-    FROM main.clock_uncertainty
-    GROUP BY clock_id
-),
-bound AS (
-    SELECT
-        c.run_id, c.clock_id, n.hosts,
-        coalesce(c.reference_clock_id, -c.clock_id) AS together,
-        coalesce(k.greatest_ns, c.uncertainty_ns) AS bound_ns
-    FROM main.clock AS c
-    JOIN named AS n ON c.clock_id = n.clock_id
-    LEFT JOIN known AS k ON c.clock_id = k.clock_id
-    WHERE list_contains($runs, c.run_id)
-)
-SELECT
-    run_id,
-    string_agg(hosts, ', ' ORDER BY clock_id),
-    count(*),
-    CASE WHEN bool_and(bound_ns IS NOT NULL) THEN list_sum(max(bound_ns, 2)) / 1e6 END,
-    run_id IN (SELECT run_id FROM main.diagnostic WHERE name = 'clock_not_synchronised')
-FROM bound
-GROUP BY run_id, together
-ORDER BY run_id, min(clock_id)
-"""
-
 
 def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
     """Return what limits times between hosts, a sentence each.
@@ -86,13 +22,14 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
     For each run with several clocks that are as recorded: how many, where clocks that are corrected
     to the same one count as one. For each clock that is corrected: how far it can be wrong.
     """
-    rows = connection.execute(_CLOCKS, {"runs": [run.run_id for run in runs]}).fetchall()
+    chosen = {"runs": [run.run_id for run in runs]}
+    groups = program().run(connection, "clock_group", chosen).fetchall()
     clocks = {
-        run_id: (number, "FILE" if in_vain else "messages") for run_id, number, in_vain in rows
+        run_id: (len(together), "FILE" if together[0][-1] else "messages")
+        for run_id, (*together,) in groupby(groups, key=itemgetter(0))
+        if len(together) > 1
     }
-    uncertainties = connection.execute(
-        _UNCERTAINTIES, {"runs": [run.run_id for run in runs]}
-    ).fetchall()
+    corrections = program().run(connection, "clock_correction", chosen).fetchall()
     return [
         f"{'the run' if len(runs) == 1 else f'run {run.name} ({run.run_id})'} has"
         f" {clocks[run.run_id][0]} clocks that are not synchronised: times between their hosts are"
@@ -103,7 +40,7 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
         f"{'' if len(runs) == 1 else f'run {run.name} ({run.run_id}): '}times between {reference}"
         f" and {hosts} {_wrong_by(least, greatest)}; msgflow clocks show"
         for run in runs
-        for run_id, reference, hosts, least, greatest in uncertainties
+        for run_id, reference, hosts, least, greatest in corrections
         if run_id == run.run_id
     ]
 
@@ -118,7 +55,8 @@ def clock_verdicts(
         runs: the runs.
         only_several: leave out runs with one clock, of which nothing can be wrong.
     """
-    rows = connection.execute(_GROUPS, {"runs": [run.run_id for run in runs]}).fetchall()
+    chosen = {"runs": [run.run_id for run in runs]}
+    rows = program().run(connection, "clock_group", chosen).fetchall()
     verdicts = []
     for run in runs:
         groups = [tuple(row[1:]) for row in rows if row[0] == run.run_id]

@@ -13,6 +13,7 @@ from msgflow.query.run import first_line, read_runs
 from msgflow.run.choice import Run, choose_one
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
 from msgflow.sql.failure import is_of_the_file
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -35,22 +36,6 @@ SELECT max(b.start_ns)
 FROM main.publication AS b
 JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
 WHERE b.run_id = $run_id AND p.topic_name = $topic
-"""
-_STEPS = """
-SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
-    s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
-    s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
-    w.busy_min_ns, w.busy_max_ns
-FROM main.flow_step(
-    $kind, $id,
-    direction := $direction, max_depth := $max_depth, max_vertices := $limit, internal := $internal
-) AS s
-LEFT JOIN (
-    SELECT callback_instance_id, busy_min_ns, busy_max_ns
-    FROM main.executor_wait
-    WHERE run_id = $run_id AND since IN ('publication', 'request')
-) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
-ORDER BY abs(s.depth), s.depth, s.start_ns, s.kind, s.id, s.from_kind, s.from_id, s.link_kind
 """
 
 
@@ -170,7 +155,7 @@ def read_steps(
         "internal": internal,
     }
     try:
-        return connection.sql(_STEPS, params=bindings).to_arrow_table()
+        return program().run(connection, "flow_steps", bindings).to_arrow_table()
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise

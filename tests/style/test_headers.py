@@ -13,6 +13,7 @@ from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.query.run import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
+from msgflow.sql.statement import program
 
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
@@ -22,6 +23,7 @@ VIEWS = [
     if file.layer in {"link", "flow", "clock", "stat", "public"} and file.header.kind == "view"
 ]
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
+PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 
 
@@ -56,7 +58,11 @@ def test_the_name_is_the_place(file: SqlFile) -> None:
 
 @pytest.mark.parametrize("file", FILES, ids=str)
 def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
-    needs = [name for name in file.header.needs if is_defined_in_sql(name)]
+    needs = [
+        name
+        for name in file.header.needs
+        if is_defined_in_sql(name) and not name.startswith("program.")
+    ]
     assert sorted(needs) == sorted(filter(is_defined_in_sql, file.references))
 
 
@@ -66,8 +72,8 @@ def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
     for name in file.references:
         layer = "store" if name.startswith("store.") else LAYER_OF.get(name, "model")
         assert LAYERS.index(layer) <= position, f"{file} reads {name}"
-    if file.layer == "queries":
-        assert {name.partition(".")[0] for name in file.references} == {"main"}
+    if file.layer in {"queries", "program"}:
+        assert {name.partition(".")[0] for name in file.references} <= {"main"}
 
 
 @pytest.mark.parametrize("file", FILES, ids=str)
@@ -140,6 +146,20 @@ def test_columns_say_what_they_name(file: SqlFile) -> None:
 def test_a_query_has_a_title_and_a_grain(file: SqlFile) -> None:
     assert file.header.title != file.header.name
     assert file.header.grain.startswith("one row per ")
+
+
+@pytest.mark.parametrize("file", PROGRAM, ids=str)
+def test_headers_of_what_the_program_asks_are_those_of_its_sql(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    name = file.path.stem
+    (statement,) = connection.extract_statements(program().text(name))
+    assert {param.name for param in file.header.params} == statement.named_parameters
+    values = {"run_id": 1, "runs": [1], "start_ns": 0, "end_ns": 1, "kind": "take", "id": 1}
+    values |= {"direction": "both", "max_depth": 1, "limit": 1, "internal": False}
+    # Those without columns say of what they have the columns; changes reads what is made for it.
+    if file.header.columns and name != "changes":
+        assert described(program().run(connection, name, values)) == declared(file)
 
 
 @pytest.mark.parametrize("file", VIEWS, ids=str)

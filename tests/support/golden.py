@@ -12,7 +12,8 @@
         expected.csv         the output in order; create it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
-A query is run as `Database.query` runs it; a page query (view.<name>) of run 1, with times from 0
+A query is run as `Database.query` runs it; what the program asks for itself (program.<name>) of
+run 1, likewise over tables of scratch/; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
 `main.node`) is read whole, a table macro called with its arguments, both sorted by all columns. An
 empty field is NULL, "" is an empty text. Lines of input that begin with # are comments. Tables of
@@ -39,6 +40,7 @@ from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.run import run_query
+from msgflow.sql.statement import program
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Scratch
 
@@ -56,7 +58,8 @@ SYSTEMS = Path(__file__).parent / "systems"
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SELECTION = ("run", "start", "end", "skip_first", "internal")
 _PAGE_QUERY = "view."
-_FRAME = {"run": 1, "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
+_PROGRAM = "program."
+_FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _TEMPLATE = pytest.StashKey[Path]()
 
 
@@ -223,6 +226,8 @@ def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:
     name = folder.parent.name
     if name.startswith(_PAGE_QUERY):
         return QueryResult(_page_rows(connection, folder, name.removeprefix(_PAGE_QUERY), given))
+    if name.startswith(_PROGRAM):
+        return QueryResult(_program_rows(connection, folder, name.removeprefix(_PROGRAM), given))
     if "." in name:
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
         source = f"{name}({arguments})" if parameters.exists() else name
@@ -230,6 +235,14 @@ def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:
         return QueryResult(relation.to_arrow_table())
     selection = {key: given.pop(key) for key in _SELECTION if key in given}
     return run_query(connection, load_query(name), given, **selection)
+
+
+def _program_rows(
+    connection: duckdb.DuckDBPyConnection, folder: Path, name: str, given: dict[str, Any]
+) -> pa.Table:
+    for path in (folder / "scratch").glob("*.csv"):
+        connection.execute(f"CREATE TEMP TABLE {path.stem} AS FROM read_csv(?)", [str(path)])
+    return program().run(connection, name, _FRAME | given).to_arrow_table()
 
 
 def _page_rows(

@@ -21,6 +21,7 @@ LAYERS = (
     "check",
     "finding",
     "queries",
+    "program",
 )
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
@@ -32,6 +33,7 @@ SCHEMAS = {
     "public": "main",
     "check": "check",
     "finding": "finding",
+    "program": "program",
 }
 _REFERENCE = re.compile(r"\b(?:staging|store|derive|main)\.[a-z_0-9]+\b")
 _COMMENT = re.compile(r"--[^\n]*")

@@ -1,0 +1,102 @@
+"""SQL statements in files: parts of each other are put in front, parameters are bound by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from msgflow.resources import resource_directory
+from msgflow.sql.header import Header, read
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    import duckdb
+
+
+@dataclass(frozen=True)
+class Statements:
+    """The statements of a folder and those below it.
+
+    Attributes:
+        layer: what stands before their names in headers. A statement has those that it names as
+            `layer.NAME` in `needs` in front of it, as NAME.
+        directory: the folder.
+    """
+
+    layer: str
+    directory: Path
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all statements, sorted; reads no file."""
+        return tuple(sorted(_paths(self)))
+
+    def header(self, name: str) -> Header:
+        """Return the header of a statement.
+
+        Raises:
+            KeyError: there is none of this name.
+        """
+        return _header(self, name)
+
+    def text(self, name: str) -> str:
+        """Return the SQL of a statement, with what it needs of the others in front."""
+        return _text(self, name)
+
+    def run(
+        self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
+    ) -> duckdb.DuckDBPyRelation:
+        """Return the rows of a statement.
+
+        Args:
+            connection: to a database with the public views.
+            name: of the statement.
+            values: its parameters; those with a default may be left out, others are ignored.
+        """
+        inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
+        text = self.text(name)
+        used = connection.extract_statements(text)[0].named_parameters
+        bound = {key: values.get(key, inherited.get(key)) for key in used}
+        return connection.sql(text, params=bound)
+
+
+@cache
+def program() -> Statements:
+    """Return what the program asks for itself: rows that become files, pictures or sentences."""
+    return Statements("program", resource_directory("schema") / "program")
+
+
+@cache
+def _paths(statements: Statements) -> Mapping[str, Path]:
+    return {path.stem: path for path in statements.directory.rglob("*.sql")}
+
+
+@cache
+def _header(statements: Statements, name: str) -> Header:
+    return read(_paths(statements)[name])
+
+
+@cache
+def _text(statements: Statements, name: str) -> str:
+    header = statements.header(name)
+    parts = [
+        f"{need} AS (\n{statements.header(need).body}\n)" for need in _parts(statements, header)
+    ]
+    if not parts:
+        return header.body
+    body = header.body
+    if body.startswith("WITH "):
+        return "WITH " + ",\n".join(parts) + ",\n" + body.removeprefix("WITH ")
+    return "WITH " + ",\n".join(parts) + "\n" + body
+
+
+def _parts(statements: Statements, header: Header) -> list[str]:
+    # Each after those that it needs.
+    names: list[str] = []
+    for need in header.needs:
+        layer, _, name = need.partition(".")
+        if layer == statements.layer:
+            names += [*_parts(statements, statements.header(name)), name]
+    return list(dict.fromkeys(names))

@@ -1,0 +1,27 @@
+-- name: program.flow_steps
+-- title: Steps of a flow
+-- description: The steps of `main.flow_step`, with how long the executor was busy before the
+--     callbacks of takes and requests.
+-- grain: one row per vertex and link that leads to it
+-- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
+-- param: id BIGINT  Its identity
+-- param: direction VARCHAR  'forward', 'backward' or 'both'
+-- param: max_depth INTEGER  Most links in a row, each way
+-- param: limit INTEGER  Most vertices
+-- param: internal BOOLEAN  Follow effects on topics and services of ROS itself too
+-- param: run_id BIGINT  Its run
+-- needs: main.executor_wait, main.flow_step
+SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
+    s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
+    s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
+    w.busy_min_ns, w.busy_max_ns
+FROM main.flow_step(
+    $kind, $id,
+    direction := $direction, max_depth := $max_depth, max_vertices := $limit, internal := $internal
+) AS s
+LEFT JOIN (
+    SELECT callback_instance_id, busy_min_ns, busy_max_ns
+    FROM main.executor_wait
+    WHERE run_id = $run_id AND since IN ('publication', 'request')
+) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
+ORDER BY abs(s.depth), s.depth, s.start_ns, s.kind, s.id, s.from_kind, s.from_id, s.link_kind
