@@ -7,7 +7,7 @@
 --     `bound_ns` tells most.
 -- grain: one row per pair of clocks and message or packet between them
 -- needs: derive.clock_way
-CREATE OR REPLACE MACRO derive.clock_bound(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.clock_bound(only_run) AS TABLE
 SELECT
     greatest(from_clock_id, to_clock_id) AS clock_id,
     least(from_clock_id, to_clock_id) AS other_clock_id,
@@ -16,4 +16,4 @@ SELECT
     CASE WHEN to_clock_id > from_clock_id THEN received_ns ELSE sent_ns END AS at_ns,
     sent_ns - received_ns AS bound_ns
 FROM derive.clock_way
-WHERE run_id = of_run
+WHERE run_id = only_run

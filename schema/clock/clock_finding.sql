@@ -4,11 +4,11 @@
 --     with the others, and why, and those that do not run evenly.
 -- grain: one row per pair of clocks or clock
 -- needs: store.host, store.clock, derive.clock_pair
-CREATE OR REPLACE MACRO derive.clock_finding(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.clock_finding(only_run) AS TABLE
 WITH clock_name AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS name
     FROM store.host
-    WHERE run_id = of_run
+    WHERE run_id = only_run
     GROUP BY clock_id
 ),
 pair AS MATERIALIZED (
@@ -16,14 +16,14 @@ pair AS MATERIALIZED (
         p.clock_id, p.other_clock_id, c.name, o.name AS other_name, p.received_count,
         p.sent_count, p.received_packet_count, p.sent_packet_count, p.offset_ns,
         p.uncertainty_ns, p.is_even
-    FROM derive.clock_pair(of_run) AS p
+    FROM derive.clock_pair(only_run) AS p
     JOIN clock_name AS c ON p.clock_id = c.clock_id
     JOIN clock_name AS o ON p.other_clock_id = o.clock_id
 ),
 sync AS MATERIALIZED (
     SELECT clock_id, coalesce(reference_clock_id, clock_id) AS reference_clock_id
     FROM store.clock
-    WHERE run_id = of_run
+    WHERE run_id = only_run
 )
 SELECT
     'clock_not_synchronised' AS name,

@@ -8,10 +8,10 @@
 --     differences from `base_bound_ns`, which keeps them exact as DOUBLE.
 -- grain: one row per pair of clocks, direction and corner
 -- needs: derive.clock_bound, derive.clock_drift_limit
-CREATE OR REPLACE MACRO derive.clock_hull(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.clock_hull(only_run) AS TABLE
 WITH RECURSIVE bound AS MATERIALIZED (
     SELECT clock_id, other_clock_id, is_packet, sense, at_ns, bound_ns
-    FROM derive.clock_bound(of_run)
+    FROM derive.clock_bound(only_run)
 ),
 base AS MATERIALIZED (
     SELECT

@@ -15,12 +15,12 @@
 --     directions, all is NULL.
 -- grain: one row per pair of clocks with messages or packets between them
 -- needs: derive.clock_bound, derive.clock_hull, derive.clock_drift_limit, store.trace, store.host
-CREATE OR REPLACE MACRO derive.clock_pair(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.clock_pair(only_run) AS TABLE
 WITH corner AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, sense, moment, bound, base_ns, base_bound_ns, received_count,
         sent_count, received_packet_count, sent_packet_count
-    FROM derive.clock_hull(of_run)
+    FROM derive.clock_hull(only_run)
 ),
 pair AS MATERIALIZED (
     SELECT
@@ -163,7 +163,7 @@ miss AS (
             ) AS least_miss
         FROM line AS l
         JOIN pair AS p ON l.clock_id = p.clock_id AND l.other_clock_id = p.other_clock_id
-        JOIN derive.clock_bound(of_run) AS b
+        JOIN derive.clock_bound(only_run) AS b
             ON l.clock_id = b.clock_id AND l.other_clock_id = b.other_clock_id
         WHERE NOT l.is_even
         GROUP BY
@@ -176,7 +176,7 @@ recorded AS (
     SELECT h.clock_id, min(t.start_ns) AS begin_ns, max(t.end_ns) AS end_ns
     FROM store.host AS h
     JOIN store.trace AS t ON h.host_id = t.host_id
-    WHERE h.run_id = of_run
+    WHERE h.run_id = only_run
     GROUP BY h.clock_id
 ),
 -- From the first to the last moment at which either of the two was recorded.

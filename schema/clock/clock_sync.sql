@@ -8,14 +8,14 @@
 -- grain: one row per clock
 -- needs: store.clock, derive.clock_pair, derive.corrected_ns, derive.recorded_ns,
 --     derive.clock_drift_limit
-CREATE OR REPLACE MACRO derive.clock_sync(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.clock_sync(only_run) AS TABLE
 WITH RECURSIVE pair AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, reference_ns, offset_ns, drift_ppb / 1e9 AS drift,
         uncertainty_ns, coalesce(drift_uncertainty_ppb, 0) / 1e9 AS drift_uncertainty, is_even,
         received_packet_count + sent_packet_count > 0 AS has_packets, greatest_uncertainty_ns,
         bounds
-    FROM derive.clock_pair(of_run)
+    FROM derive.clock_pair(only_run)
     WHERE offset_ns IS NOT NULL
 ),
 -- The times of clock_id in those of other_clock_id, and the other way round.
@@ -46,7 +46,7 @@ chain (
         clock_id, clock_id, NULL::BIGINT, reference_ns, 0::BIGINT, 0::DOUBLE, 0::BIGINT,
         0::DOUBLE, true, false, 0::BIGINT
     FROM store.clock
-    WHERE run_id = of_run
+    WHERE run_id = only_run
     UNION
     (
         SELECT

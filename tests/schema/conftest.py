@@ -52,7 +52,7 @@ CREATE TABLE bound (clock_id BIGINT DEFAULT 2, other_clock_id BIGINT DEFAULT 1,
 CREATE TABLE store.host (run_id BIGINT DEFAULT 1, host_id BIGINT, clock_id BIGINT);
 CREATE TABLE store.trace (host_id BIGINT, start_ns BIGINT, end_ns BIGINT);
 INSERT INTO store.host (host_id, clock_id) VALUES (1, 1), (2, 2);
-CREATE MACRO derive.clock_bound(of_run) AS TABLE FROM bound;
+CREATE MACRO derive.clock_bound(only_run) AS TABLE FROM bound;
 """
 
 

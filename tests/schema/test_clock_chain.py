@@ -20,7 +20,7 @@ CREATE TABLE pair (clock_id BIGINT, other_clock_id BIGINT, reference_ns BIGINT,
     greatest_uncertainty_ns BIGINT, bounds STRUCT(at_ns BIGINT, uncertainty_ns BIGINT)[],
     offset_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0, is_even BOOLEAN DEFAULT true,
     received_packet_count BIGINT DEFAULT 0);
-CREATE MACRO derive.clock_pair(of_run) AS TABLE FROM pair;
+CREATE MACRO derive.clock_pair(only_run) AS TABLE FROM pair;
 """
 Bounds = Sequence[tuple[int, int]]
 

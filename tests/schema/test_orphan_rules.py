@@ -42,8 +42,8 @@ CREATE TABLE derive.process_presence (run_id BIGINT DEFAULT 1, process_id BIGINT
     begin_ns BIGINT DEFAULT {100 * MS}, recorded_from_ns BIGINT DEFAULT {100 * MS});
 CREATE TABLE missed (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
 CREATE TABLE rival (take_id BIGINT);
-CREATE MACRO derive.process_gap(of_run) AS TABLE FROM missed;
-CREATE MACRO derive.take_candidate(of_run) AS TABLE FROM rival;
+CREATE MACRO derive.process_gap(only_run) AS TABLE FROM missed;
+CREATE MACRO derive.take_candidate(only_run) AS TABLE FROM rival;
 INSERT INTO store.subscription (created_ns) VALUES (0);
 INSERT INTO store.process (process_id) VALUES (1), (2), (9);
 INSERT INTO store.trace (start_ns) VALUES ({100 * MS});

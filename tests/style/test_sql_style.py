@@ -12,6 +12,8 @@ KEYWORDS = re.compile(
     r"(?<![\w$.'\"])(select|from|where|join|left join|group by|order by|having|union all|with|case"
     r"|when|then|else|end|over|partition by|limit|on|and|or|not|in|is null|as)(?![\w.'\"])"
 )
+SIGNATURE = re.compile(r"MACRO [a-z_.]+\(([^()]*)\) AS")
+MACROS = [file for file in FILES if file.header.kind == "macro"]
 SHOWN = [file for file in FILES if file.layer in {"public", "queries"}]
 
 
@@ -39,3 +41,17 @@ def test_keywords_are_upper_case(file: SqlFile) -> None:
 def test_columns_are_listed(file: SqlFile) -> None:
     last = "\n".join(code_lines(file)).rpartition("SELECT")[2]
     assert not re.match(r"\s*(DISTINCT\s+)?\*", last)
+
+
+@pytest.mark.parametrize("file", MACROS, ids=str)
+def test_parameters_for_runs_have_one_name(file: SqlFile) -> None:
+    """A run that a macro is of is `only_run`, of which no column has the name; several are `runs`.
+
+    The two sides of a comparison are not the run that it is of.
+    """
+    signatures = SIGNATURE.findall("\n".join(code_lines(file)))
+    assert signatures
+    for signature in signatures:
+        names = {part.partition(":=")[0].strip() for part in signature.split(",")}
+        about_runs = {name for name in names if re.search(r"(?:^|_)runs?(?:_|$)", name)}
+        assert about_runs <= {"only_run", "runs", "run_a", "run_b"}

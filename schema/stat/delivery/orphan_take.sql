@@ -14,35 +14,35 @@
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
 --     derive.process_presence, derive.take_candidate, store.nearest_message,
 --     derive.delivery_limit
-CREATE OR REPLACE MACRO derive.orphan_take(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT
         t.take_id, t.subscription_id, t.process_id, t.method, t.taken_ns, t.is_loss_affected,
         t.source_timestamp_ns AS stamp_ns, s.topic_name, s.created_ns
-    FROM (SELECT * FROM store.take WHERE run_id = of_run) AS t
+    FROM (SELECT * FROM store.take WHERE run_id = only_run) AS t
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
 ),
 presence AS MATERIALIZED (
     SELECT process_id, min(begin_ns) AS begin_ns, min(recorded_from_ns) AS recorded_from_ns
     FROM derive.process_presence
-    WHERE run_id = of_run AND EXISTS (SELECT 1 FROM orphan)
+    WHERE run_id = only_run AND EXISTS (SELECT 1 FROM orphan)
     GROUP BY process_id
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap(of_run)
+    FROM derive.process_gap(only_run)
     WHERE EXISTS (SELECT 1 FROM orphan)
 ),
 run_begin AS (
     SELECT min(start_ns) AS begin_ns
     FROM store.trace
-    WHERE run_id = of_run AND domain IS DISTINCT FROM 'kernel'
+    WHERE run_id = only_run AND domain IS DISTINCT FROM 'kernel'
 ),
 stampless AS (
     SELECT process_id
     FROM store.publication
-    WHERE run_id = of_run AND publisher_id IS NOT NULL
+    WHERE run_id = only_run AND publisher_id IS NOT NULL
     GROUP BY process_id
     HAVING count(source_timestamp_ns) = 0
 ),
@@ -54,7 +54,7 @@ stamping AS (
         SELECT p.host_id
         FROM store.take AS t
         JOIN store.process AS p ON t.process_id = p.process_id
-        WHERE t.run_id = of_run AND t.source_timestamp_ns IS NOT NULL
+        WHERE t.run_id = only_run AND t.source_timestamp_ns IS NOT NULL
             AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
     )
 ),
@@ -63,13 +63,13 @@ nameless AS (
     SELECT b.process_id, b.end_ns
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-    WHERE b.run_id = of_run AND p.topic_name IS NULL AND b.source_timestamp_ns IS NULL
+    WHERE b.run_id = only_run AND p.topic_name IS NULL AND b.source_timestamp_ns IS NULL
         AND EXISTS (SELECT 1 FROM orphan)
 ),
 sending AS (
     SELECT topic_name, process_id, min(coalesce(created_ns, 0)) AS created_ns
     FROM store.publisher
-    WHERE run_id = of_run
+    WHERE run_id = only_run
     GROUP BY topic_name, process_id
 ),
 -- Processes that may have publishers whose topic the trace does not show.
@@ -78,13 +78,13 @@ incomplete AS (
     UNION
     SELECT process_id
     FROM store.publisher
-    WHERE run_id = of_run AND is_inferred AND NOT coalesce(is_internal, false)
+    WHERE run_id = only_run AND is_inferred AND NOT coalesce(is_internal, false)
     UNION
     SELECT process_id
     FROM store.subscription
-    WHERE run_id = of_run AND is_inferred AND NOT coalesce(is_internal, false)
+    WHERE run_id = only_run AND is_inferred AND NOT coalesce(is_internal, false)
     UNION
-    SELECT process_id FROM store.node WHERE run_id = of_run AND is_inferred
+    SELECT process_id FROM store.node WHERE run_id = only_run AND is_inferred
 ),
 topic AS (
     SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL
@@ -126,7 +126,7 @@ sent AS (
         o.stamp_ns + coalesce(h.greatest_shift_ns, 0) AS latest_ns
     FROM orphan AS o
     JOIN sender AS s ON o.topic_name IS NOT DISTINCT FROM s.topic_name
-    ASOF LEFT JOIN (SELECT * FROM derive.stamp_shift WHERE run_id = of_run) AS h
+    ASOF LEFT JOIN (SELECT * FROM derive.stamp_shift WHERE run_id = only_run) AS h
         ON s.host_id = h.host_id AND o.stamp_ns >= h.from_ns
     WHERE o.stamp_ns IS NOT NULL
         AND (
@@ -168,7 +168,7 @@ passed AS (
     FROM store.link_transport AS l
     JOIN store.take AS t ON l.take_id = t.take_id
     JOIN store.publication AS b ON l.publication_id = b.publication_id
-    WHERE l.run_id = of_run
+    WHERE l.run_id = only_run
         AND l.method = 'ring_buffer'
         AND l.subscription_id IN (SELECT subscription_id FROM orphan WHERE method = 'ring_buffer')
 ),
@@ -197,13 +197,13 @@ replaced AS (
         FROM orphan AS o
         JOIN store.publication AS b ON o.stamp_ns = b.source_timestamp_ns
         JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-        WHERE b.run_id = of_run AND o.stamp_ns <> 0 AND p.topic_name <> o.topic_name
+        WHERE b.run_id = only_run AND o.stamp_ns <> 0 AND p.topic_name <> o.topic_name
     ) AS o
     ASOF JOIN gap AS g ON o.process_id = g.process_id AND o.taken_ns >= g.start_ns
     WHERE g.covered_until_ns >= o.created_ns
 )
 SELECT
-    of_run::BIGINT AS run_id,
+    only_run::BIGINT AS run_id,
     o.take_id,
     o.subscription_id,
     CASE
@@ -218,11 +218,11 @@ SELECT
         WHEN j.has_gap THEN 'publisher_gap'
         WHEN j.has_none_left AND NOT j.has_nameless THEN 'publisher_trace_ends'
         WHEN o.take_id IN (
-            SELECT take_id FROM derive.take_candidate(of_run)
+            SELECT take_id FROM derive.take_candidate(only_run)
         ) OR (o.topic_name, o.stamp_ns) IN (
             SELECT (topic_name, source_timestamp_ns)
             FROM store.nearest_message
-            WHERE run_id = of_run AND publication_id IS NULL
+            WHERE run_id = only_run AND publication_id IS NULL
         ) THEN 'ambiguous'
         WHEN o.take_id IN (SELECT take_id FROM replaced) THEN 'receiver_gap'
         WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)

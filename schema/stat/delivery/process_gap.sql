@@ -8,11 +8,11 @@
 -- grain: one row per process and gap
 -- needs: derive.process_presence, derive.recording, store.loss_interval, store.publication,
 --     store.take, store.callback_instance, store.executor_state, store.thread
-CREATE OR REPLACE MACRO derive.process_gap(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.process_gap(only_run) AS TABLE
 WITH presence AS MATERIALIZED (
     SELECT run_id, process_id, recording_id, begin_ns, end_ns, first_ns, last_ns, is_born
     FROM derive.process_presence
-    WHERE run_id = of_run
+    WHERE run_id = only_run
 ),
 interval_of_process AS MATERIALIZED (
     SELECT p.run_id, p.process_id, l.kind, l.start_ns, l.end_ns
@@ -25,20 +25,20 @@ pause AS MATERIALIZED (
 ),
 -- What the paused processes did, where there are any.
 moment AS (
-    SELECT process_id, start_ns AS at_ns FROM store.publication WHERE run_id = of_run
+    SELECT process_id, start_ns AS at_ns FROM store.publication WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, end_ns FROM store.publication WHERE run_id = of_run
+    SELECT process_id, end_ns FROM store.publication WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, taken_ns FROM store.take WHERE run_id = of_run
+    SELECT process_id, taken_ns FROM store.take WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, start_ns FROM store.callback_instance WHERE run_id = of_run
+    SELECT process_id, start_ns FROM store.callback_instance WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, end_ns FROM store.callback_instance WHERE run_id = of_run
+    SELECT process_id, end_ns FROM store.callback_instance WHERE run_id = only_run
     UNION ALL
     SELECT t.process_id, s.start_ns
     FROM store.executor_state AS s
     JOIN store.thread AS t ON s.thread_id = t.thread_id
-    WHERE s.run_id = of_run
+    WHERE s.run_id = only_run
 ),
 active AS MATERIALIZED (
     SELECT process_id, at_ns

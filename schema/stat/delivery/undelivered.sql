@@ -13,25 +13,25 @@
 -- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap, store.publisher,
 --     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state,
 --     derive.delivery_limit
-CREATE OR REPLACE MACRO derive.undelivered(of_run) AS TABLE
+CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
         publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
         has_one_clock
     FROM derive.expected_arrival
-    WHERE run_id = of_run
+    WHERE run_id = only_run
 ),
 life AS MATERIALIZED (
     SELECT
         subscription_id, topic_name, process_id, clock_id, queue_depth, created_ns, last_seen_ns,
         replaced_ns, host_end_ns, only_thread_id
     FROM derive.subscription_life
-    WHERE run_id = of_run AND topic_name IS NOT NULL
+    WHERE run_id = only_run AND topic_name IS NOT NULL
 ),
 link AS (
     SELECT publication_id, publisher_id, subscription_id, min(take_id) AS take_id
     FROM store.link_transport
-    WHERE run_id = of_run AND subscription_id IS NOT NULL AND is_copy IS NOT TRUE
+    WHERE run_id = only_run AND subscription_id IS NOT NULL AND is_copy IS NOT TRUE
     GROUP BY publication_id, publisher_id, subscription_id
 ),
 missing AS MATERIALIZED (
@@ -47,7 +47,7 @@ missing AS MATERIALIZED (
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap(of_run)
+    FROM derive.process_gap(only_run)
     WHERE EXISTS (SELECT 1 FROM missing)
 ),
 -- The order of messages, where any is missing.
@@ -108,14 +108,14 @@ unidentified AS MATERIALIZED (
     SELECT t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp
     FROM store.take AS t
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
-    WHERE t.run_id = of_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
+    WHERE t.run_id = only_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
 ),
 long_wait AS (
     SELECT s.subscription_id, w.start_ns, w.end_ns
     FROM life AS s
     JOIN store.executor_state AS w ON s.only_thread_id = w.thread_id
     LEFT JOIN pace AS p ON s.subscription_id = p.subscription_id
-    WHERE w.run_id = of_run
+    WHERE w.run_id = only_run
         AND w.state = 'wait'
         AND w.end_ns - w.start_ns > coalesce(p.patience_ns, derive.delivery_limit().longest_ns)
         AND s.subscription_id IN (SELECT subscription_id FROM missing)
@@ -215,7 +215,7 @@ facts AS (
     ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id
         AND coalesce(b.awake_until_ns, b.until_ns) >= g.start_ns
     ASOF LEFT JOIN gap AS i ON b.process_id = i.process_id AND b.arrival_ns >= i.start_ns
-    ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = of_run) AS f
+    ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = only_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
         SELECT subscription_id, taken_ns, false AS for_no_stamp
@@ -234,7 +234,7 @@ facts AS (
         AND b.gone_ns >= q.arrival_ns
 )
 SELECT
-    of_run::BIGINT AS run_id,
+    only_run::BIGINT AS run_id,
     publication_id,
     publisher_id,
     subscription_id,
