@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import duckdb
 
 from msgflow.db.connection import connect
+from msgflow.db.objects import public_names
 from msgflow.db.reading import reading_statements, require_condition
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
@@ -316,7 +317,7 @@ class Database:
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
-        header = load_query(name)
+        header = load_query(name, public_names)
         connection = self.connection
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):

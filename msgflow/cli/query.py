@@ -11,6 +11,12 @@ from msgflow.cli.query_command import build_command, refuse_list
 from msgflow.query.catalogue import load_queries, load_query, query_names
 
 
+def _view_names() -> tuple[str, ...]:
+    from msgflow.db.objects import public_names
+
+    return public_names()
+
+
 class QueryGroup(TyperGroup):
     """The named queries as commands, each built when it is asked for."""
 
@@ -28,7 +34,7 @@ class QueryGroup(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a query; an unknown name is a UsageError with a suggestion."""
-        header = load_query(cmd_name)
+        header = load_query(cmd_name, _view_names)
         if self._is_completed:
             return TyperCommand(header.name, short_help=header.title)
         return build_command(header)

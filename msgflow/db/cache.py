@@ -1,7 +1,7 @@
 """What is the same for all databases and takes long to make, kept in the user's cache.
 
-It belongs to a version of DuckDB and to the files of `schema/`. Nothing depends on it: where it
-cannot be written, is damaged or missing, it is made again.
+It belongs to a version of DuckDB, to the files of `schema/` and to what declares the tables.
+Nothing depends on it: where it cannot be written, is damaged or missing, it is made again.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from pathlib import Path
 import duckdb
 
 from msgflow.db.objects import definition_hash, head_revision
-from msgflow.resources import resource_directory
 from msgflow.version import __version__
 
 _MOST_OF_A_KIND = 8
@@ -53,7 +52,6 @@ def keep(kind: str, made_by: str, content: bytes) -> None:
 def _file(kind: str, made_by: str) -> Path:
     given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
     root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
-    tables = (resource_directory("schema") / "tables.sql").read_text(encoding="utf-8")
-    made_of = "\0".join((__version__, head_revision(), definition_hash(), tables, made_by))
+    made_of = "\0".join((__version__, head_revision(), definition_hash(), made_by))
     key = hashlib.sha256(made_of.encode()).hexdigest()[:32]
     return root / "msgflow" / f"{kind}-{duckdb.__version__}-{key}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.db.definition import remember, require_ours
-from msgflow.db.objects import definition_hash, head_revision, known_revisions
+from msgflow.db.objects import definition_hash, head_revision, is_before_release, known_revisions
 from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
@@ -231,13 +231,18 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
     """Return the revision of a database that this msgflow can read or upgrade.
 
     Raises:
-        DatabaseError: it is foreign or newer.
+        DatabaseError: it is foreign, newer, or of before the first release.
     """
     with database_errors(path):
         revision = recorded_revision(con)
     if revision is None:
         raise DatabaseError(
             f"a DuckDB database, but not one of msgflow — {path}", "give another file with --db"
+        )
+    if is_before_release(revision):
+        raise DatabaseError(
+            f"database has schema revision {revision}, from before the first release — {path}",
+            "ingest the traces into a new file",
         )
     if revision not in known_revisions() and revision <= head_revision():
         raise DatabaseError(

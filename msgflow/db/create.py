@@ -2,7 +2,7 @@
 
 Nothing is migrated for that, so that neither Alembic nor a dialect of SQLAlchemy is needed. What
 came out is kept in the user's cache, as DuckDB takes long to look at each view: a new database is a
-copy of that.
+copy of that, for which not even the declaration of the tables is read.
 """
 
 from __future__ import annotations
@@ -12,23 +12,15 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import cache, objects
 from msgflow.db.connection import STORAGE_VERSION, open_file
-from msgflow.db.tables import SCHEMA, metadata
-from msgflow.resources import resource_directory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from sqlalchemy import Table
+
 
 _KIND = "database"
-
-# As Alembic makes it.
-_REVISION_TABLE = f"""
-CREATE TABLE {SCHEMA}.alembic_version (
-    version_num VARCHAR(32) NOT NULL,
-    CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num)
-)
-"""
 
 
 def write_new(path: Path) -> None:
@@ -46,10 +38,6 @@ def write_new(path: Path) -> None:
         con.begin()
         for statement in _statements():
             con.execute(statement)
-        con.execute(
-            f"INSERT INTO {SCHEMA}.alembic_version (version_num) VALUES (?)",
-            [objects.head_revision()],
-        )
         objects.apply(con)
         con.commit()
         con.execute("CHECKPOINT")  # closing would fail silently, and leave a log behind
@@ -57,13 +45,31 @@ def write_new(path: Path) -> None:
 
 
 def _statements() -> Iterator[str]:
+    from msgflow.db.tables import SCHEMA, metadata
+
     yield f"CREATE SCHEMA {SCHEMA}"
-    yield (resource_directory("schema") / "tables.sql").read_text(encoding="utf-8")
     for table in metadata.tables.values():
-        yield f"COMMENT ON TABLE {table.fullname} IS {objects.literal(table.comment or '')}"
-        for column in table.columns:
-            yield (
-                f'COMMENT ON COLUMN {table.fullname}."{column.name}" IS '
-                f"{objects.literal(column.comment or '')}"
-            )
-    yield _REVISION_TABLE
+        yield from _table(table)
+    # As Alembic makes it.
+    yield (
+        f"CREATE TABLE {SCHEMA}.alembic_version (version_num VARCHAR(32) NOT NULL, "
+        "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
+    )
+    revision = objects.literal(objects.head_revision())
+    yield f"INSERT INTO {SCHEMA}.alembic_version (version_num) VALUES ({revision})"
+
+
+def _table(table: Table) -> Iterator[str]:
+    columns = ", ".join(
+        f'"{column.name}" {column.type.compile()}'
+        + (" PRIMARY KEY" if column.primary_key else "" if column.nullable else " NOT NULL")
+        + (" DEFAULT false" if column.server_default is not None else "")
+        for column in table.columns
+    )
+    yield f"CREATE TABLE {table.fullname} ({columns})"
+    yield f"COMMENT ON TABLE {table.fullname} IS {objects.literal(table.comment or '')}"
+    for column in table.columns:
+        yield (
+            f'COMMENT ON COLUMN {table.fullname}."{column.name}" IS '
+            f"{objects.literal(column.comment or '')}"
+        )

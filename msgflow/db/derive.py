@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
@@ -12,15 +13,12 @@ if TYPE_CHECKING:
 
     import duckdb
 
-# Tables of `store` that hold the rows of the view of that name in `derive`, each after those that
-# it is derived from.
-DERIVED = ("stamp_clock", "nearest_message", "link_transport", "link_causal")
-
-# Likewise, of what is missing: they need the links, the topics learned from them, and the clocks.
-DERIVED_FROM_LINKS = ("orphan_take", "undelivered")
+# What `synchronise` writes.
+_CLOCKS = {"store.clock", "store.clock_uncertainty"}
 
 # Tables of `store` whose rows can learn their topic from a link.
 _TOPIC_OWNERS = ("publisher", "subscription")
+_TOPICS = "derive.topic_learned"
 
 _PATHS_SHOWN = 3
 
@@ -56,8 +54,9 @@ def derive(
     """
     _forget_topics(con, run_id)
     _learn_topics(con, run_id)
-    for name in DERIVED:
-        _store(con, name, run_id)
+    for name in derived_tables():
+        if not _reads_clocks(name):
+            _store(con, name, run_id)
     if synchronise is not None:
         synchronise()
     derive_from_clocks(con, run_id)
@@ -68,14 +67,46 @@ def derive(
     con.execute(_PATH_CUT, {"run_id": run_id, "shown": _PATHS_SHOWN})
     con.execute(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
-        [objects.derivation_hash(), run_id],
+        [derivation_hash(), run_id],
     )
 
 
 def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Derive anew what depends on links and clocks, inside the open transaction."""
-    for name in DERIVED_FROM_LINKS:
-        _store(con, name, run_id)
+    """Derive anew what depends on the correction of clocks, inside the open transaction."""
+    for name in derived_tables():
+        if _reads_clocks(name):
+            _store(con, name, run_id)
+
+
+@cache
+def derived_tables() -> tuple[str, ...]:
+    """Return the tables of `store` that hold the rows of the object of that name in `derive`.
+
+    Each comes after those that it is derived from.
+    """
+    return tuple(
+        name
+        for header in objects.views()
+        for schema, _, name in [header.name.partition(".")]
+        if schema == "derive" and f"{SCHEMA}.{name}" in metadata.tables
+    )
+
+
+@cache
+def _reads_clocks(name: str) -> bool:
+    return not _CLOCKS.isdisjoint(objects.sources_of([f"derive.{name}"]))
+
+
+@cache
+def derivation_hash() -> str:
+    """Return the SHA-256 of the SQL that derives what is stored of links and of what is missing."""
+    names = objects.sources_of([_TOPICS, *(f"derive.{name}" for name in derived_tables())])
+    return objects.hash_of(
+        text
+        for header in objects.views()
+        if header.name in names
+        for text in (header.name, header.body)
+    )
 
 
 def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
@@ -109,7 +140,7 @@ def _learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         con.execute(
             f"UPDATE store.{kind} SET topic_name = learned.topic_name, "
             "is_internal = learned.is_internal, is_topic_learned = true "
-            "FROM derive.topic_learned(?) AS learned "
+            f"FROM {_TOPICS}(?) AS learned "
             f"WHERE learned.kind = '{kind}' AND {kind}.{kind}_id = learned.id "
             f"AND {kind}.run_id = ?",
             [run_id, run_id],
@@ -120,5 +151,5 @@ def stale_runs(con: duckdb.DuckDBPyConnection) -> list[tuple[int, str]]:
     """Return (run_id, name) of the runs whose links were derived by other SQL than today's."""
     return con.execute(
         "SELECT run_id, name FROM store.run WHERE derivation_hash <> ? ORDER BY run_id",
-        [objects.derivation_hash()],
+        [derivation_hash()],
     ).fetchall()

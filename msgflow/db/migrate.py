@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from alembic.config import Config
     from sqlalchemy.engine import Connection
 
 
@@ -135,8 +134,7 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection) -> None:
     if recorded_revision(con) != objects.head_revision():
-        with sqlalchemy_connection(con) as connection:
-            _alembic_upgrade(connection)
+        _migrate(con)
     con.begin()
     try:
         objects.apply(con)
@@ -165,42 +163,25 @@ def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
     return tuple(name for _, name in stale)
 
 
-def downgrade(con: duckdb.DuckDBPyConnection, revision: str) -> None:
-    """Take the tables back to an older revision; the views go with them.
-
-    Args:
-        con: a writable connection.
-        revision: the revision to go back to, or 'base' for no tables at all.
-    """
+def _migrate(con: duckdb.DuckDBPyConnection) -> None:
+    # Only files of an older revision need any of this.
     from alembic import command
-
-    with con.cursor() as cursor:
-        cursor.begin()
-        objects.drop(cursor)
-        cursor.commit()
-    with sqlalchemy_connection(con) as connection:
-        command.downgrade(alembic_config(connection), revision)
-
-
-def _alembic_upgrade(connection: Connection) -> None:
-    from alembic import command
-
-    command.upgrade(alembic_config(connection), "head")
-
-
-def alembic_config(connection: Connection) -> Config:
-    """Return what Alembic needs to know to migrate the database of a connection."""
     from alembic.config import Config
+    from sqlalchemy.exc import DBAPIError
 
     config = Config()
     config.set_main_option("script_location", str(resource_directory("migrations")))
     config.set_main_option("path_separator", "os")
-    config.attributes["connection"] = connection
-    return config
+    try:
+        with _sqlalchemy_connection(con) as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
+    except DBAPIError as error:  # a full disk is told as everywhere else
+        raise (error.orig or error) from error
 
 
 @contextmanager
-def sqlalchemy_connection(con: duckdb.DuckDBPyConnection) -> Iterator[Connection]:
+def _sqlalchemy_connection(con: duckdb.DuckDBPyConnection) -> Iterator[Connection]:
     """Lend a DuckDB connection to SQLAlchemy; it stays open and is committed at the end."""
     from duckdb_engine import ConnectionWrapper
     from sqlalchemy import create_engine

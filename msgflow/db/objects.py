@@ -1,67 +1,110 @@
-"""The SQL objects of `schema/`: loaded, ordered by what they need, and applied to a database."""
+"""The SQL objects of `schema/`: loaded, ordered by what they need, and applied to a database.
+
+A public view that shows a table as it is has no file, but a declaration in `tables.py`.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import re
+from dataclasses import replace
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.resources import resource_directory
-from msgflow.sql.header import Header, parse
+from msgflow.sql.header import Header, HeaderError, read
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
+    from collections.abc import Iterable, Mapping, Sequence
 
     import duckdb
 
 # Folders whose objects live in the database; each may need only those to its left, and itself.
-VIEW_LAYERS = ("link", "flow", "clock", "stat", "public")
+PUBLIC = "public"
+VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Of a database: tables, what is derived from them, and what users read.
 SCHEMAS = ("store", "derive", "main")
+
+
+_REVISION = re.compile(r"[0-9]{4}")
+# What makes tables, and views of them, beside `schema/`: read as text, as SQLAlchemy takes long.
+_DECLARATION = ("tables.py", "table_view.py", "create.py")
 
 
 @cache
 def load(layer: str) -> tuple[Header, ...]:
     """Return the objects of one folder of `schema/` and its rooms, each after those it needs.
 
+    Among those of `public` are the views that `tables.py` declares, and columns that their header
+    only names are as they stand there.
+
     Raises:
-        ValueError: two objects need each other.
+        ValueError: two objects need each other, or a column is declared nowhere.
     """
     directory = resource_directory("schema") / layer
-    return sort(
-        parse(path.read_text(encoding="utf-8"), path) for path in sorted(directory.rglob("*.sql"))
-    )
+    headers = [read(path) for path in sorted(directory.rglob("*.sql"))]
+    if layer == PUBLIC:
+        from msgflow.db.table_view import table_views
+
+        headers = [*map(_completed, headers), *table_views()]
+    return sort(headers)
+
+
+def _completed(header: Header) -> Header:
+    """Fill in the columns that a header only names: they are those of the table of its name."""
+    if all(column.type for column in header.columns):
+        return header
+    from msgflow.db.table_view import declared_columns
+
+    declared = declared_columns(header.name.partition(".")[2])
+    try:
+        columns = [column if column.type else declared[column.name] for column in header.columns]
+    except KeyError as error:
+        raise HeaderError(f"{header.path}: store has no column {error} of that table") from None
+    return replace(header, columns=tuple(columns))
 
 
 def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
     """Order objects so that each comes after those that it needs; ties by name.
 
     Raises:
-        ValueError: two objects need each other.
+        ValueError: two objects need each other, be it by way of what is stored of one.
     """
     by_name = {header.name: header for header in headers}
-    sorter = TopologicalSorter(
-        {
-            name: [need for need in by_name[name].needs if need in by_name]
-            for name in sorted(by_name)
-        }
-    )
+    sorter = TopologicalSorter({name: sources(by_name, name) for name in sorted(by_name)})
     try:
         return tuple(by_name[name] for name in sorter.static_order())
     except CycleError as error:
         raise ValueError(f"objects need each other: {error.args[1]}") from error
 
 
+def sources(by_name: Mapping[str, Header], name: str) -> list[str]:
+    """Return which of these objects one is made of: those that it needs, and who fills tables.
+
+    What the table `store.x` holds was read from `derive.x`, where there is such an object.
+    """
+    needs = dict.fromkeys(by_name[name].needs)
+    needs |= dict.fromkeys(need.replace("store.", "derive.", 1) for need in needs)
+    return [need for need in needs if need in by_name and need != name]
+
+
+@cache
 def views() -> tuple[Header, ...]:
     """Return every view and macro of a database, in the order of creation."""
     return sort(header for layer in VIEW_LAYERS for header in load(layer))
 
 
-def _hash(texts: Iterable[str]) -> str:
+def public_names() -> tuple[str, ...]:
+    """Return the names of all public views and table macros, without their schema."""
+    return tuple(header.name.partition(".")[2] for header in load(PUBLIC))
+
+
+def hash_of(texts: Iterable[str]) -> str:
+    """Return the SHA-256 of some texts, in this order."""
     digest = hashlib.sha256()
     for text in texts:
         digest.update(text.encode())
@@ -75,13 +118,21 @@ def definition_hash() -> str:
 
     Reads the files without parsing them, so that opening a database stays quick.
     """
-    return _hash(_texts(VIEW_LAYERS))
+    return hash_of([*_texts(VIEW_LAYERS), *_declaration()])
 
 
-@cache
-def derivation_hash() -> str:
-    """Return the SHA-256 of the SQL that derives what is stored of links and of what is missing."""
-    return _hash(_texts(("link", "clock", "stat")))
+def sources_of(names: Iterable[str]) -> frozenset[str]:
+    """Return these objects and tables, and all that they are made of, step by step."""
+    by_name = {header.name: header for header in views()}
+    found: set[str] = set()
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            if name in by_name:
+                waiting += [*by_name[name].needs, *sources(by_name, name)]
+    return frozenset(found)
 
 
 def _texts(layers: Sequence[str]) -> Iterable[str]:
@@ -92,6 +143,12 @@ def _texts(layers: Sequence[str]) -> Iterable[str]:
             yield path.read_text(encoding="utf-8")
 
 
+def _declaration() -> Iterable[str]:
+    for name in _DECLARATION:
+        yield name
+        yield Path(__file__).with_name(name).read_text(encoding="utf-8")
+
+
 @cache
 def head_revision() -> str:
     """Return the newest schema revision: the number that the last migration begins with."""
@@ -100,9 +157,14 @@ def head_revision() -> str:
 
 @cache
 def known_revisions() -> frozenset[str]:
-    """Return all schema revisions that there have been."""
+    """Return all schema revisions that can be upgraded, or are current."""
     versions = resource_directory("migrations") / "versions"
     return frozenset(_revision(path) for path in versions.glob("[0-9]*_*.py"))
+
+
+def is_before_release(revision: str) -> bool:
+    """Tell whether only databases from before the first release had this schema revision."""
+    return bool(_REVISION.fullmatch(revision)) and "0000" < revision < min(known_revisions())
 
 
 def _revision(path: Path) -> str:

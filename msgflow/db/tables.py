@@ -1,8 +1,9 @@
-"""The one definition of the tables in schema `store`.
+"""The one definition of the tables in schema `store`, and of what users see of them.
 
-`schema/tables.sql` is rendered from here, and new databases are made of it; the migrations are the
-frozen history of how older files come to look like this, and the public views in schema `main` are
-what users read.
+New databases are made of it (`create.py`), rows are stored in its order (`store.py`), and where a
+table says what its public view is, that view is made of it, too, with its comments and its page of
+the documentation (`table_view.py`). Other public views over a table are files of `schema/public`;
+what their columns share with the table stands only here.
 
 Every table has one comment that states its grain; every column one that states its meaning.
 Relations are declared in `info["references"]`: DuckDB's foreign keys would forbid replacing a run
@@ -18,6 +19,7 @@ from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    DefaultClause,
     Integer,
     LargeBinary,
     MetaData,
@@ -61,15 +63,26 @@ def _column(
     type_: TypeEngine[Any] | type[TypeEngine[Any]],
     comment: str,
     *,
+    unit: str | None = None,
     key: bool = False,
     required: bool = False,
     references: str | None = None,
+    hidden: bool = False,
+    clock_of: str | None = None,
+    sql: str | None = None,
 ) -> Column[Any]:
-    info = {} if references is None else {"references": references}
+    info = {
+        "description": comment,
+        "unit": unit,
+        "references": references,
+        "is_public": not hidden,
+        "clock_of": clock_of,
+        "sql": sql,
+    }
     return Column(
         name,
         type_,
-        comment=comment,
+        comment=comment if unit is None else f"{comment} [{unit}]",
         primary_key=key,
         autoincrement=False,
         nullable=not (required or key),
@@ -94,10 +107,8 @@ def _run() -> Column[Any]:
     return _reference("run_id", RUN_COMMENT, to="run.run_id", required=True)
 
 
-def _trace(required: bool = True) -> Column[Any]:
-    return _reference(
-        "trace_id", "Trace it was recorded in", to="trace.trace_id", required=required
-    )
+def _trace(comment: str = "Trace it was recorded in", required: bool = True) -> Column[Any]:
+    return _reference("trace_id", comment, to="trace.trace_id", required=required)
 
 
 def _process() -> Column[Any]:
@@ -110,37 +121,77 @@ def _thread(
     return _reference(name, comment, to="thread.thread_id", required=required)
 
 
-def _time(name: str, comment: str, *, required: bool = False) -> Column[Any]:
-    return _column(name, BigInteger, f"{comment} [epoch ns]", required=required)
+def _time(
+    name: str,
+    comment: str,
+    *,
+    clock_of: str | None = None,
+    required: bool = False,
+    hidden: bool = False,
+) -> Column[Any]:
+    """A moment; `clock_of` is the column of the table that leads to the clock that showed it.
+
+    The view has such times on the common axis, those without as they were recorded.
+    """
+    return _column(
+        name,
+        BigInteger,
+        comment,
+        unit="epoch ns",
+        required=required,
+        hidden=hidden,
+        clock_of=clock_of,
+    )
 
 
 def _order(name: str, comment: str) -> Column[Any]:
-    return _column(name, BigInteger, f"{comment} [event order]")
+    return _column(name, BigInteger, comment, unit="event order", hidden=True)
 
 
 def _text(name: str, comment: str, *, required: bool = False) -> Column[Any]:
     return _column(name, String, comment, required=required)
 
 
-def _count(name: str, comment: str) -> Column[Any]:
-    return _column(name, BigInteger, comment)
+def _count(name: str, comment: str, *, unit: str | None = None) -> Column[Any]:
+    return _column(name, BigInteger, comment, unit=unit)
 
 
-def _flag(name: str, comment: str) -> Column[Any]:
-    return _column(name, Boolean, comment, required=True)
-
-
-def _loss_affected(comment: str) -> Column[Any]:
-    # Runs of before this column have NULL: DuckDB cannot add a column that must have a value.
-    return _column("is_loss_affected", Boolean, f"{comment}; NULL: not known")
+def _flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
+    """A truth value, false where nobody says otherwise."""
+    column = _column(name, Boolean, comment, required=True, hidden=hidden)
+    column.server_default = DefaultClause("false")
+    return column
 
 
 def _handle(name: str, comment: str) -> Column[Any]:
     return _column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
 
 
-def _table(name: str, comment: str, *columns: Column[Any]) -> Table:
-    return Table(name, metadata, *columns, comment=comment)
+def _computed(name: str, type_: type[TypeEngine[Any]], comment: str, *, sql: str) -> Column[Any]:
+    """A column of the view alone, from those of the table, which is called `self`."""
+    return _column(name, type_, comment, sql=sql)
+
+
+def _table(name: str, comment: str, *parts: str | Column[Any]) -> Table:
+    """Declare a table.
+
+    Args:
+        name: of the table, and of its public view.
+        comment: what a row is.
+        parts: what the public view is, where that shows the table as it is: the view is made of
+            this declaration then; and the columns in order.
+    """
+    declared = [part for part in parts if not isinstance(part, str)]
+    return Table(
+        name,
+        metadata,
+        *(column for column in declared if column.info["sql"] is None),
+        comment=comment,
+        info={
+            "view": next((part for part in parts if isinstance(part, str)), None),
+            "columns": declared,
+        },
+    )
 
 
 # --- the database itself -------------------------------------------------------------------------
@@ -174,6 +225,7 @@ run = _table(
 trace = _table(
     "trace",
     "One row per CTF trace read",
+    "CTF traces that were read.",
     _key("trace_id", "Identity of the trace"),
     _run(),
     _reference("host_id", "Host that was traced", to="host.host_id", required=True),
@@ -181,8 +233,8 @@ trace = _table(
     _text("uuid", "UUID of the trace"),
     _text("tracer", "Tracer and its version"),
     _text("domain", "'ust' or 'kernel'"),
-    _time("start_ns", "First event or packet begin"),
-    _time("end_ns", "Last event or packet end"),
+    _time("start_ns", "First event or start of a packet", clock_of="host_id"),
+    _time("end_ns", "Last event or end of a packet", clock_of="host_id"),
     _count("event_count", "Events read"),
     _count("discarded_event_count", "Events that the tracer counted as discarded"),
 )
@@ -207,57 +259,73 @@ packet = _table(
 loss_interval = _table(
     "loss_interval",
     "One row per gap in a trace",
+    "Gaps in the traces: no two events are paired across one.",
     _run(),
-    _trace(),
+    _trace("Trace it was recorded in; between two chunks of a recording, the later"),
     _column("cpu", Integer, "CPU concerned; NULL: all"),
     _text(
         "kind",
         "'loss' (discarded events), 'packets' (lost packets) or 'pause' (not tracing)",
         required=True,
     ),
-    _time("start_ns", "Last moment before the gap"),
-    _time("end_ns", "First moment after the gap"),
+    _time("start_ns", "Last moment before the gap", clock_of="trace_id"),
+    _time("end_ns", "First moment after the gap", clock_of="trace_id"),
     _count("event_count", "Events lost, where the tracer counted them"),
 )
 
 clock = _table(
     "clock",
     "One row per clock: hosts of one clock need no synchronisation",
+    "Clocks and how their times are corrected. Times in the other views are corrected already.",
     _key("clock_id", "Identity of the clock"),
     _run(),
     _text("uuid", "UUID of the clock (LTTng: boot identity)"),
     _column(
-        "offset_ns", BigInteger, "Added to a time of this clock to correct it [ns]", required=True
+        "offset_ns",
+        BigInteger,
+        "Added to a time of this clock to correct it",
+        unit="ns",
+        required=True,
     ),
     _column(
-        "drift_ppb", BigInteger, "Added per elapsed time since reference_ns [1e-9]", required=True
+        "drift_ppb",
+        BigInteger,
+        "Added per unit of time since reference_ns",
+        unit="1e-9",
+        required=True,
     ),
     _time("reference_ns", "Moment at which the correction is offset_ns alone", required=True),
-    _column("uncertainty_ns", BigInteger, "Bound of the error of the correction [ns]"),
+    _count("uncertainty_ns", "Bound of the error of the correction at reference_ns", unit="ns"),
     _text("method", "'none', 'messages', 'packets' or 'file'", required=True),
-    _column(
+    _count(
         "drift_uncertainty_ppb",
-        BigInteger,
-        "What its bound grows by per time elapsed since reference_ns or before it; NULL: none, "
-        "or not known [1e-9]",
+        "Growth of the error bound per unit of time from reference_ns; "
+        "NULL: the bound holds throughout, or is not known",
+        unit="1e-9",
     ),
     _reference(
         "reference_clock_id",
-        "Clock whose times its times become; NULL: not brought together with others",
+        "Clock that this one is corrected to: times of clocks with the same one can be compared; "
+        "NULL: as recorded",
         to="clock.clock_id",
     ),
 )
 
 clock_uncertainty = _table(
     "clock_uncertainty",
-    "One row per clock and moment; between two the bound is a straight line",
+    "One row per clock and moment",
+    "How wrong the correction of a clock can be at most, at any time: at the moments listed here "
+    "by uncertainty_ns, between two of them by what the straight line between them gives. Times "
+    "of two clocks with the same reference can be compared to within the sum of both bounds. The "
+    "reference itself has no error and no rows.",
     _run(),
     _reference("clock_id", "The clock", to="clock.clock_id", required=True),
     _time("at_ns", "Moment, as the clock showed it", required=True),
     _column(
         "uncertainty_ns",
         BigInteger,
-        "Bound of the error of the correction at that moment [ns]",
+        "Bound of the error of the correction at that moment",
+        unit="ns",
         required=True,
     ),
 )
@@ -265,6 +333,7 @@ clock_uncertainty = _table(
 host = _table(
     "host",
     "One row per machine or container",
+    "Machines and containers.",
     _key("host_id", "Identity of the host"),
     _run(),
     _reference("clock_id", "Clock of the host", to="clock.clock_id", required=True),
@@ -274,30 +343,42 @@ host = _table(
 process = _table(
     "process",
     "One row per process life",
+    "Process lives: a pid that is used again is another process.",
     _key("process_id", "Identity of the process life"),
     _run(),
     _reference("host_id", "Host it ran on", to="host.host_id", required=True),
-    _column("pid", Integer, "Process id, virtual where the trace has no other", required=True),
+    _column(
+        "pid",
+        Integer,
+        "Process id; the one inside its PID namespace if the trace has no other",
+        required=True,
+    ),
     _text("name", "Name of the process (its first thread)"),
-    _text("tracetools_version", "Version that rcl_init stated; for display only"),
-    _time("first_seen_ns", "First event"),
-    _time("last_seen_ns", "Last event"),
+    _text("tracetools_version", "Version that rcl_init reported; for display only"),
+    _time("first_seen_ns", "First event", clock_of="process_id"),
+    _time("last_seen_ns", "Last event", clock_of="process_id"),
     _column("pid_namespace", BigInteger, "PID namespace, where the trace has it"),
-    _column("life", Integer, "Number of the life among those of one pid, from 1", required=True),
+    _column("life", Integer, "Number of this life among those of the pid, from 1", required=True),
 )
 
 thread = _table(
     "thread",
     "One row per thread",
+    "Threads, each with its last name.",
     _key("thread_id", "Identity of the thread"),
     _run(),
     _process(),
-    _column("tid", Integer, "Thread id, virtual where the trace has no other", required=True),
+    _column(
+        "tid",
+        Integer,
+        "Thread id; the one inside its PID namespace if the trace has no other",
+        required=True,
+    ),
     _text("name", "Name of the thread"),
     _order("first_event_id", "First event"),
     _order("last_event_id", "Last event"),
-    _time("first_seen_ns", "First event"),
-    _time("last_seen_ns", "Last event"),
+    _time("first_seen_ns", "First event", clock_of="process_id"),
+    _time("last_seen_ns", "Last event", clock_of="process_id"),
 )
 
 # --- entities ------------------------------------------------------------------------------------
@@ -310,6 +391,7 @@ def _node_reference() -> Column[Any]:
 node = _table(
     "node",
     "One row per ROS node",
+    "ROS nodes.",
     _key("node_id", "Identity of the node"),
     _run(),
     _process(),
@@ -317,13 +399,14 @@ node = _table(
     _text("namespace", "Namespace, beginning with /"),
     _text("full_name", "Namespace and name"),
     _handle("node_handle", "rcl node handle"),
-    _time("created_ns", "rcl_node_init"),
+    _time("created_ns", "rcl_node_init", clock_of="process_id"),
     _flag("is_inferred", "Its initialisation was not traced"),
 )
 
 publisher = _table(
     "publisher",
     "One row per publisher",
+    "Publishers, those of ROS itself marked as internal.",
     _key("publisher_id", "Identity of the publisher"),
     _run(),
     _process(),
@@ -333,15 +416,16 @@ publisher = _table(
     _handle("rmw_handle", "rmw publisher handle"),
     _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
     _count("queue_depth", "History depth asked for"),
-    _time("created_ns", "First initialisation event"),
+    _time("created_ns", "First initialisation event", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
     _flag("is_inferred", "Its initialisation was not traced"),
-    _column("is_topic_learned", Boolean, "Its topic was deduced from a link; NULL: no"),
+    _flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
 )
 
 subscription = _table(
     "subscription",
     "One row per subscription",
+    "Subscriptions, those of ROS itself marked as internal.",
     _key("subscription_id", "Identity of the subscription"),
     _run(),
     _process(),
@@ -351,27 +435,32 @@ subscription = _table(
     _handle("rmw_handle", "rmw subscription handle"),
     _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
     _count("queue_depth", "History depth asked for"),
-    _time("created_ns", "First initialisation event"),
+    _time("created_ns", "First initialisation event", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
     _flag("is_inferred", "Its initialisation was not traced"),
-    _column("is_topic_learned", Boolean, "Its topic was deduced from a link; NULL: no"),
+    _flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
 )
 
 timer = _table(
     "timer",
     "One row per timer",
+    "Timers. If the initialisation of a timer was not traced, its period is not known.",
     _key("timer_id", "Identity of the timer"),
     _run(),
     _process(),
     _node_reference(),
-    _column("period_ns", BigInteger, "Period [ns]"),
+    _count("period_ns", "Period; NULL: not known", unit="ns"),
     _handle("timer_handle", "rcl timer handle"),
-    _time("created_ns", "rcl_timer_init"),
+    _time("created_ns", "rcl_timer_init", clock_of="process_id"),
+    _computed(
+        "is_inferred", Boolean, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+    ),
 )
 
 service = _table(
     "service",
     "One row per service",
+    "Services, those of ROS itself marked as internal.",
     _key("service_id", "Identity of the service"),
     _run(),
     _process(),
@@ -380,13 +469,17 @@ service = _table(
     _handle("service_handle", "rcl service handle"),
     _handle("rmw_handle", "rmw service handle"),
     _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
-    _time("created_ns", "rcl_service_init"),
+    _time("created_ns", "rcl_service_init", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+    _computed(
+        "is_inferred", Boolean, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+    ),
 )
 
 client = _table(
     "client",
     "One row per service client",
+    "Service clients, those of ROS itself marked as internal.",
     _key("client_id", "Identity of the client"),
     _run(),
     _process(),
@@ -395,13 +488,17 @@ client = _table(
     _handle("client_handle", "rcl client handle"),
     _handle("rmw_handle", "rmw client handle"),
     _column("gid", LargeBinary, "Identifier that servers see, 16 bytes; NULL: none"),
-    _time("created_ns", "rcl_client_init"),
+    _time("created_ns", "rcl_client_init", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+    _computed(
+        "is_inferred", Boolean, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+    ),
 )
 
 callback = _table(
     "callback",
     "One row per callback object",
+    "Callback objects and what they belong to.",
     _key("callback_id", "Identity of the callback"),
     _run(),
     _process(),
@@ -412,12 +509,13 @@ callback = _table(
     _reference("service_id", "Its service", to="service.service_id"),
     _handle("callback_handle", "Address of the callback object"),
     _text("symbol", "Function registered for it; NULL: none or unresolvable"),
-    _time("created_ns", "First initialisation event"),
+    _time("created_ns", "First initialisation event", clock_of="process_id"),
 )
 
 executor = _table(
     "executor",
     "One row per executor",
+    "Executors.",
     _key("executor_id", "Identity of the executor"),
     _run(),
     _process(),
@@ -432,6 +530,7 @@ executor = _table(
 executor_thread = _table(
     "executor_thread",
     "One row per thread of an executor",
+    "Threads of the executors.",
     _run(),
     _reference("executor_id", "The executor", to="executor.executor_id", required=True),
     _thread("The thread"),
@@ -439,7 +538,9 @@ executor_thread = _table(
 
 callback_group = _table(
     "callback_group",
-    "One row per callback group of an executor, where the trace tells (CARET)",
+    "One row per callback group of an executor",
+    "Callback groups, where the trace has them (CARET). Callbacks of a mutually exclusive group "
+    "never run at the same time.",
     _key("callback_group_id", "Identity of the callback group"),
     _run(),
     _process(),
@@ -452,6 +553,7 @@ callback_group = _table(
 callback_group_member = _table(
     "callback_group_member",
     "One row per callback in a callback group",
+    "Callbacks of the callback groups.",
     _run(),
     _reference(
         "callback_group_id",
@@ -465,6 +567,7 @@ callback_group_member = _table(
 annotation = _table(
     "annotation",
     "One row per declared indirect link",
+    "Declared indirect links.",
     _key("annotation_id", "Identity of the annotation"),
     _run(),
     _text("kind", "'periodic_async' or 'partial_sync'", required=True),
@@ -475,6 +578,7 @@ annotation = _table(
 annotation_input = _table(
     "annotation_input",
     "One row per subscription of an annotation",
+    "Subscriptions of the declared indirect links.",
     _run(),
     _reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
     _reference("subscription_id", "Its input", to="subscription.subscription_id", required=True),
@@ -483,6 +587,7 @@ annotation_input = _table(
 annotation_output = _table(
     "annotation_output",
     "One row per publisher of an annotation",
+    "Publishers of the declared indirect links.",
     _run(),
     _reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
     _reference("publisher_id", "Its output", to="publisher.publisher_id", required=True),
@@ -491,19 +596,20 @@ annotation_output = _table(
 lifecycle_transition = _table(
     "lifecycle_transition",
     "One row per state change of a managed node",
+    "State changes of managed nodes.",
     _run(),
     _reference("node_id", "The node", to="node.node_id"),
-    _time("at_ns", "Moment of the change", required=True),
+    _time("at_ns", "Moment of the change", required=True, clock_of="node_id"),
     _text("start_state", "State that was left"),
     _text("goal_state", "State that was entered"),
 )
 
 diagnostic = _table(
     "diagnostic",
-    "One row per thing worth knowing about the input",
+    "One row per finding",
     _run(),
-    _trace(required=False),
-    _text("name", "What was found; a closed vocabulary", required=True),
+    _trace("Trace it was recorded in; NULL: not one trace alone", required=False),
+    _text("name", "What was found", required=True),
     _text("severity", "'info', 'warning', 'data_loss' or 'error'", required=True),
     _count("count", "How often"),
     _text("detail", "Where, and what it means"),
@@ -514,6 +620,7 @@ diagnostic = _table(
 publication = _table(
     "publication",
     "One row per publish() call",
+    "Messages at the moment they were published, with the time of each layer seen.",
     _id("publication_id", "Identity of the publication"),
     _run(),
     _trace(),
@@ -522,50 +629,56 @@ publication = _table(
     ),
     _process(),
     _thread(),
-    _time("start_ns", "First layer seen", required=True),
-    _time("end_ns", "Last layer seen", required=True),
-    _time("intra_ns", "rclcpp_intra_publish"),
-    _time("rclcpp_ns", "rclcpp_publish"),
-    _time("rcl_ns", "rcl_publish"),
-    _time("rmw_ns", "rmw_publish"),
-    _time("dds_ns", "dds:write"),
-    _time("source_timestamp_ns", "Stamp that the middleware sent along, clock of ROS"),
+    _time("start_ns", "First layer seen", required=True, clock_of="process_id"),
+    _time("end_ns", "Last layer seen", required=True, clock_of="process_id"),
+    _time("intra_ns", "rclcpp_intra_publish", clock_of="process_id"),
+    _time("rclcpp_ns", "rclcpp_publish", clock_of="process_id"),
+    _time("rcl_ns", "rcl_publish", clock_of="process_id"),
+    _time("rmw_ns", "rmw_publish", clock_of="process_id"),
+    _time("dds_ns", "dds:write", clock_of="process_id"),
+    _time("source_timestamp_ns", "Stamp that the middleware gave to the message, clock of ROS"),
     _order("start_event_id", "First layer seen"),
     _order("end_event_id", "Last layer seen"),
     _order("callback_event_id", "Last begin or end of a callback before it; NULL: none"),
-    _loss_affected("A gap right before or after it on its thread may hide a layer"),
+    _flag("is_loss_affected", "A gap right before or after it on its thread may hide a layer"),
     _time(
         "next_event_ns",
         "Next event of the thread, where it has no stamp; NULL: none, or a gap may hide it",
+        hidden=True,
     ),
 )
 
 take = _table(
     "take",
     "One row per message handed over to a subscription",
+    "Messages at the moment they were handed over to a subscription.",
     _id("take_id", "Identity of the take"),
     _run(),
     _trace(),
     _reference("subscription_id", "Subscription", to="subscription.subscription_id"),
     _process(),
     _thread(),
-    _time("taken_ns", "Moment of the hand-over", required=True),
+    _time("taken_ns", "Moment of the hand-over", required=True, clock_of="process_id"),
     _time("source_timestamp_ns", "Stamp that came with the message, clock of ROS"),
     _text("method", "'rmw', 'ring_buffer', 'caret' or 'callback_only'", required=True),
     _order("start_event_id", "First layer seen"),
     _order("end_event_id", "Last layer seen"),
-    _loss_affected("A gap right before or after it on its thread may hide a layer or its callback"),
+    _flag(
+        "is_loss_affected",
+        "A gap right before or after it on its thread may hide a layer or its callback",
+    ),
 )
 
 failed_take = _table(
     "failed_take",
-    "One row per attempt to take from a subscription that took nothing",
+    "One row per attempt that took nothing",
+    "Attempts to take from a subscription that got nothing.",
     _run(),
     _trace(),
     _reference("subscription_id", "Subscription", to="subscription.subscription_id"),
     _process(),
     _thread(),
-    _time("failed_ns", "Moment of the attempt", required=True),
+    _time("failed_ns", "Moment of the attempt", required=True, clock_of="process_id"),
 )
 
 ring_buffer_event = _table(
@@ -591,35 +704,44 @@ ring_buffer_event = _table(
 callback_instance = _table(
     "callback_instance",
     "One row per callback instance",
+    "Callback instances.",
     _id("callback_instance_id", "Identity of the callback instance"),
     _run(),
     _trace(),
     _reference("callback_id", "Callback that ran", to="callback.callback_id", required=True),
     _process(),
     _thread(),
-    _time("start_ns", "callback_start", required=True),
-    _time("end_ns", "callback_end; NULL: never seen to end"),
+    _time("start_ns", "callback_start", required=True, clock_of="process_id"),
+    _time("end_ns", "callback_end; NULL: never seen to end", clock_of="process_id"),
     _reference("take_id", "Message it was called with", to="take.take_id"),
     _reference("request_id", "Request it was called with", to="request.request_id"),
     _flag("is_intra_process", "Called with an intra-process message"),
-    _reference("parent_id", "Run it is nested in", to="callback_instance.callback_instance_id"),
+    _reference(
+        "parent_id",
+        "Callback instance that it is nested in",
+        to="callback_instance.callback_instance_id",
+    ),
     _column("depth", Integer, "Nesting depth on its thread, from 1", required=True),
     _order("start_event_id", "callback_start"),
     _order("end_event_id", "callback_end; NULL: never seen to end"),
     _order("effective_end_event_id", "callback_end, else the first event that cannot be inside"),
-    _loss_affected("A gap inside or beside it on its thread may hide its end or what it did"),
+    _flag(
+        "is_loss_affected",
+        "A gap inside or beside it on its thread may hide its end or what it did",
+    ),
 )
 
 request = _table(
     "request",
     "One row per service request",
+    "Service requests.",
     _id("request_id", "Identity of the request"),
     _run(),
     _reference("client_id", "Client that sent it", to="client.client_id"),
     _reference("service_id", "Service that took it", to="service.service_id"),
     _count("sequence_number", "Number given by the client"),
-    _time("sent_ns", "rmw_send_request"),
-    _time("taken_ns", "rmw_take_request"),
+    _time("sent_ns", "rmw_send_request", clock_of="sender_thread_id"),
+    _time("taken_ns", "rmw_take_request", clock_of="receiver_thread_id"),
     _thread("Thread that sent it", "sender_thread_id", required=False),
     _thread("Thread that took it", "receiver_thread_id", required=False),
     _reference(
@@ -632,13 +754,14 @@ request = _table(
 response = _table(
     "response",
     "One row per service response",
+    "Service responses.",
     _id("response_id", "Identity of the response"),
     _run(),
     _reference("client_id", "Client that took it", to="client.client_id"),
     _reference("service_id", "Service that sent it", to="service.service_id"),
     _count("sequence_number", "Number given by the client"),
-    _time("sent_ns", "rmw_send_response"),
-    _time("taken_ns", "rmw_take_response"),
+    _time("sent_ns", "rmw_send_response", clock_of="sender_thread_id"),
+    _time("taken_ns", "rmw_take_response", clock_of="receiver_thread_id"),
     _thread("Thread that sent it", "sender_thread_id", required=False),
     _thread("Thread that took it", "receiver_thread_id", required=False),
     _reference(
@@ -652,12 +775,17 @@ response = _table(
 executor_state = _table(
     "executor_state",
     "One row per interval between two executor events of a thread",
+    "What executor threads did, as their three events literally say.",
     _run(),
     _reference("executor_id", "Executor", to="executor.executor_id"),
     _thread(),
     _text("state", "'wait', 'process' or 'execute'", required=True),
-    _time("start_ns", "Executor event that began it", required=True),
-    _time("end_ns", "Next executor event; NULL: not known (the last, or a gap)"),
+    _time("start_ns", "Executor event that began it", required=True, clock_of="thread_id"),
+    _time(
+        "end_ns",
+        "Next executor event of the thread; NULL: not known (the last, or a gap follows)",
+        clock_of="thread_id",
+    ),
     _reference(
         "callback_instance_id",
         "First callback instance in it",
@@ -669,14 +797,21 @@ executor_state = _table(
 thread_break = _table(
     "thread_break",
     "One row per gap in the record of a thread",
+    "Where the record of a thread breaks: events of the thread may be missing before these "
+    "moments. No executor state reaches across a break, and pairs of events that do are marked.",
     _run(),
     _thread("Thread whose events may be missing"),
-    _time("resumed_ns", "First event of the thread behind the gap", required=True),
+    _time(
+        "resumed_ns",
+        "First event of the thread behind the gap",
+        required=True,
+        clock_of="thread_id",
+    ),
     _order("resumed_event_id", "First event of the thread behind the gap"),
-    _column(
+    _flag(
         "is_elsewhere",
-        Boolean,
-        "Only other CPUs lost events, which it may have visited; NULL: no",
+        "Only other CPUs lost events, which the thread may have visited meanwhile: "
+        "pairs may reach across",
     ),
 )
 
@@ -693,10 +828,11 @@ stamp_clock = _table(
     _column(
         "difference_ns",
         BigInteger,
-        "Clock of ROS less clock of the traces, with the shortest delay of a stamp [ns]",
+        "Clock of ROS less clock of the traces, with the shortest delay of a stamp",
+        unit="ns",
         required=True,
     ),
-    _count("drift_ppb", "Change of the difference in the stretch [ppb]"),
+    _count("drift_ppb", "Change of the difference in the stretch", unit="ppb"),
     _count("message_count", "Messages that agree with it"),
     _count("segment", "Number of jumps of the clock before it"),
     _column(
@@ -738,14 +874,10 @@ link_transport = _table(
         to="subscription.subscription_id",
     ),
     _text("method", "'exact', 'exact_stamp', 'nearest' or 'ring_buffer'", required=True),
-    _count("candidate_count", "Publications that it could have been"),
+    _count("candidate_count", "Number of publications that are possible"),
     _flag("is_self_loop", "Received by the publishing node itself"),
     _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
-    _column(
-        "is_copy",
-        Boolean,
-        "Of what a ring buffer carries as well: no callback gets it; NULL: no",
-    ),
+    _flag("is_copy", "A ring buffer carries the same message: no callback gets this one"),
 )
 
 link_packet = _table(
@@ -767,7 +899,7 @@ link_packet = _table(
 
 link_causal = _table(
     "link_causal",
-    "One row per callback instance, or take outside of any, that led to a publication",
+    "One row per callback instance, or take outside of any, and publication that it led to",
     _run(),
     _reference(
         "callback_instance_id",
@@ -775,20 +907,31 @@ link_causal = _table(
         to="callback_instance.callback_instance_id",
     ),
     _reference("publication_id", "Effect", to="publication.publication_id", required=True),
-    _reference("take_id", "Message that led to it", to="take.take_id"),
+    _reference(
+        "take_id", "Message that led to it; NULL: none (timers, services)", to="take.take_id"
+    ),
     _reference(
         "subscription_id", "Subscription of that message", to="subscription.subscription_id"
     ),
     _reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
     _text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
-    _reference("annotation_id", "Annotation that declares it", to="annotation.annotation_id"),
-    _count("candidate_count", "Callback instances that it could have been"),
+    _reference(
+        "annotation_id",
+        "Annotation that declares it; NULL for direct links",
+        to="annotation.annotation_id",
+    ),
+    _count(
+        "candidate_count",
+        "Callback instances that it could have been; one more if it is the input of an indirect "
+        "link and had no message when the publishing callback began",
+    ),
     _flag("is_loss_affected", "A gap of the trace may hide a better partner"),
 )
 
 link_request = _table(
     "link_request",
     "One row per request that a callback instance or thread sent",
+    "Requests and what sent them.",
     _run(),
     _reference("request_id", "Effect", to="request.request_id", required=True),
     _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
@@ -797,6 +940,7 @@ link_request = _table(
 link_response = _table(
     "link_response",
     "One row per response and the callback instance that sent it",
+    "Responses and the callback instance that sent them.",
     _run(),
     _reference("response_id", "Effect", to="response.response_id", required=True),
     _reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),

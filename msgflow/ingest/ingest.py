@@ -15,10 +15,10 @@ import duckdb
 
 from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
-from msgflow.db import migrate, objects
+from msgflow.db import migrate
 from msgflow.db.check import run_checks
 from msgflow.db.connection import attach, open_memory, shut_in
-from msgflow.db.derive import derive
+from msgflow.db.derive import derivation_hash, derive
 from msgflow.db.memory import Memory
 from msgflow.db.runs import require_run_name
 from msgflow.db.spill import most_spilled
@@ -299,7 +299,7 @@ def _store(
         "min(start_ns) FILTER (domain IS DISTINCT FROM 'kernel'), "
         "max(end_ns) FILTER (domain IS DISTINCT FROM 'kernel'), sum(event_count) "
         "FROM store.trace WHERE run_id = ?",
-        [run_id, run_name, __version__, objects.derivation_hash(), run_id],
+        [run_id, run_name, __version__, derivation_hash(), run_id],
     )
     if loaded.duplicate_packet_count:
         _add_diagnostic(

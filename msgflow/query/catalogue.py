@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.nearest import nearest
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
 
 # What people call what a query answers; without the s of a plural.
 _WORDS = {
@@ -66,23 +71,26 @@ def query_names() -> tuple[str, ...]:
 
 
 @cache
-def load_query(name: str) -> Header:
+def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Header:
     """Return the query called `name`.
+
+    Args:
+        name: of the query.
+        views: what gives the names of the public views, one of which somebody may have meant.
 
     Raises:
         UsageError: there is no such query; the message names similar ones.
     """
     if name not in query_names():
-        raise UsageError(f"there is no such query — {name}", _meant(name))
+        raise UsageError(f"there is no such query — {name}", _meant(name, views))
     return read(resource_directory("queries") / f"{name}.sql")
 
 
-def _meant(name: str) -> str:
+def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
     """Return the commands that somebody may have meant by a name that no query has."""
     words = _WORDS.get(name.lower().removesuffix("s").replace("_", "-"))
     if words is None:
-        views = resource_directory("schema") / "public"
-        if name.isidentifier() and (views / f"{name}.sql").is_file():
+        if name in views():
             return f"it is a view: msgflow sql 'FROM {name}'"
         words = tuple(nearest(name, query_names()))
     return " or ".join(f"msgflow query {other}" for other in words) or "msgflow query --list"

@@ -21,7 +21,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 those that stay where they are 0 in all rows, since this is what people ask for, `heading` those
 that stand above a table on a terminal, once for each value of the first, on which the others
 depend, `slowest` the one that `--slowest N` goes by. The unit of a column may also be what it
-names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choose rows by them.
+names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choose rows by them. Of a
+public view over the table of its name, a column may be named alone: it is what the table declares.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ class Column:
 
     Attributes:
         name: column name.
-        type: DuckDB type as `DESCRIBE` prints it.
+        type: DuckDB type as `DESCRIBE` prints it; empty where only a table says so.
         unit: 'ns' for a duration, 'epoch ns' for a point in time, another unit, what it names
             ('node', 'topic', 'callback', 'host', 'path'), or None.
         description: one sentence.
@@ -295,6 +296,8 @@ def _param(field: _Field, path: Path) -> Param:
 
 
 def _column(field: _Field, path: Path) -> Column:
+    if re.fullmatch(_NAME, field.value):
+        return Column(field.value, "", None, "")
     match = _COLUMN.fullmatch(field.value)
     if match is None:
         raise _error(

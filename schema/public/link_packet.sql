@@ -2,19 +2,19 @@
 -- description: Network packets that kernel traces recorded at both ends, between hosts of two
 --     clocks. A negative latency means that the clocks are apart.
 -- grain: one row per network packet and clock that received it from another
--- column: run_id BIGINT  Run that the row belongs to
--- column: sent_trace_id BIGINT  Trace of its sender
--- column: received_trace_id BIGINT  Trace of its receiver
--- column: sent_ns BIGINT [epoch ns]  Handed to the network device
--- column: received_ns BIGINT [epoch ns]  Came from the network device
+-- column: run_id
+-- column: sent_trace_id
+-- column: received_trace_id
+-- column: sent_ns
+-- column: received_ns
 -- column: latency_ns BIGINT [ns]  From sent_ns to received_ns
--- column: protocol VARCHAR  'tcp' or 'udp'
--- column: source_address VARCHAR  IP address that it was sent from
--- column: source_port INTEGER  Port that it was sent from
--- column: destination_address VARCHAR  IP address that it was sent to
--- column: destination_port INTEGER  Port that it was sent to
--- column: identification INTEGER  Identification of the datagram; NULL: IPv6 has none
--- column: sequence_number BIGINT  Sequence number of its first byte; NULL: not TCP
+-- column: protocol
+-- column: source_address
+-- column: source_port
+-- column: destination_address
+-- column: destination_port
+-- column: identification
+-- column: sequence_number
 -- needs: store.link_packet, store.trace, store.host, store.clock, derive.corrected_ns
 WITH trace_clock AS (
     SELECT t.trace_id, c.offset_ns, c.drift_ppb, c.reference_ns

@@ -2,14 +2,14 @@
 -- description: Messages from publication to take. A negative latency means that the clocks of two
 --     hosts are apart.
 -- grain: one row per take whose publication is known
--- column: run_id BIGINT  Run that the row belongs to
--- column: publication_id BIGINT  Where the message came from
--- column: take_id BIGINT  Where it was received
--- column: method VARCHAR  'exact', 'exact_stamp', 'nearest' or 'ring_buffer'
--- column: candidate_count BIGINT  Number of publications that are possible
--- column: is_self_loop BOOLEAN  Received by the publishing node itself
--- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
--- column: is_copy BOOLEAN  A ring buffer carries the same message: no callback gets this one
+-- column: run_id
+-- column: publication_id
+-- column: take_id
+-- column: method
+-- column: candidate_count
+-- column: is_self_loop
+-- column: is_loss_affected
+-- column: is_copy
 -- column: latency_ns BIGINT [ns]  From the end of the publication to the take
 -- needs: store.link_transport, main.publication, main.take
 SELECT

@@ -1,15 +1,15 @@
 -- name: main.run
 -- description: Recordings: the traces that one ingest read. Nothing is ever linked across runs.
 -- grain: one row per ingest of traces that belong together
--- column: run_id BIGINT  Identity of the run
--- column: name VARCHAR  Name given by the user, or the name of the first trace directory
+-- column: run_id
+-- column: name
 -- column: created_at VARCHAR  When the run was ingested: ISO 8601, UTC
--- column: msgflow_version VARCHAR  Version of msgflow that ingested the run
--- column: derivation_hash VARCHAR  SHA-256 of the SQL that derived the links
+-- column: msgflow_version
+-- column: derivation_hash
 -- column: start_ns BIGINT [epoch ns]  First event of any trace but kernel traces
 -- column: end_ns BIGINT [epoch ns]  Last event of any trace but kernel traces
--- column: event_count BIGINT  Events read
--- column: labels VARCHAR[]  What users say of the run, KEY=VALUE each, sorted; NULL: nothing
+-- column: event_count
+-- column: labels
 -- needs: store.run, store.trace, main.trace
 WITH extent AS (
     SELECT

@@ -41,7 +41,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         seen.append({"name": name} | arguments)
         return QueryResult(pa.table({"at_ns": [1]}), HEADER)
 
-    monkeypatch.setattr("msgflow.cli.query.load_query", lambda _: HEADER)
+    monkeypatch.setattr("msgflow.cli.query.load_query", lambda *_: HEADER)
     monkeypatch.setattr(Database, "query", query)
     return seen
 

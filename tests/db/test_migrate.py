@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
 import pytest
-from alembic import command
 
-from msgflow.db import create, derive, migrate, objects
+from msgflow.db import create, definition, derive, migrate, objects
 from msgflow.db.connection import connect, open_file, recorded_revision
 from msgflow.errors import DatabaseError
+from msgflow.resources import resource_directory
+
+LABELS = Path(__file__).parents[1] / "data" / "migrations" / "0008_labels.py"
 
 # All that a schema is, row by row.
 SCHEMA = {
@@ -51,23 +55,85 @@ def database(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("revision", sorted(objects.known_revisions() - {objects.head_revision()}))
-def test_a_file_of_any_revision_becomes_what_a_new_one_is(
-    database: Path, tmp_path: Path, revision: str
+@pytest.fixture
+def next_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A msgflow of one revision more, made up: the one whose migration added the labels of runs."""
+    later = tmp_path / "later"
+    shutil.copytree(resource_directory("migrations"), later)
+    shutil.copy(LABELS, later / "versions")
+
+    def directory(name: str) -> Path:
+        return later if name == "migrations" else resource_directory(name)
+
+    caches = (objects.head_revision, objects.known_revisions, definition.expected)
+    with monkeypatch.context() as patched:
+        patched.setattr(objects, "resource_directory", directory)
+        patched.setattr(migrate, "resource_directory", directory)
+        for cache in caches:
+            cache.cache_clear()
+        yield
+    for cache in caches:
+        cache.cache_clear()
+
+
+def test_an_older_file_becomes_what_a_new_one_is(
+    small_database: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    old = tmp_path / "old.duckdb"
-    with open_file(old, read_only=False) as con:
-        con.execute("CREATE SCHEMA store")
-        with migrate.sqlalchemy_connection(con) as connection:
-            command.upgrade(migrate.alembic_config(connection), revision)
-        assert recorded_revision(con) == revision
-    with pytest.raises(DatabaseError, match=f"has schema revision {revision}"):
-        connect(old, read_only=True)
-    assert migrate.upgrade(old).before == revision
-    found, wanted = schema_of(old), schema_of(database)
+    before = objects.head_revision()
+    kept = "run_id, name, created_at, start_ns, end_ns, event_count"
+    with duckdb.connect(str(small_database)) as con:
+        objects.drop(con)
+        con.execute("ALTER TABLE store.run DROP COLUMN labels")
+        runs = con.execute(f"SELECT {kept} FROM store.run ORDER BY run_id").fetchall()
+        counted = con.execute("SELECT count(*) FROM store.publication").fetchall()
+    assert len(runs) == 2
+
+    request.getfixturevalue("next_revision")
+    with pytest.raises(DatabaseError, match=f"has schema revision {before}, .* needs 0008") as told:
+        connect(small_database, read_only=True)
+    assert told.value.hint == f"msgflow db upgrade --db {small_database}"
+    done = migrate.upgrade(small_database)
+    assert (done.before, done.after, done.views_changed) == (before, "0008", True)
+
+    new = tmp_path / "new.duckdb"
+    migrate.create(new)
+    found, wanted = schema_of(small_database), schema_of(new)
     for name in SCHEMA:
         assert found[name], name
         assert found[name] == wanted[name], name
+    with connect(small_database, read_only=True) as con:
+        assert con.execute(f"SELECT {kept} FROM store.run ORDER BY run_id").fetchall() == runs
+        assert con.execute("SELECT count(*) FROM main.publication").fetchall() == counted
+
+
+@pytest.mark.usefixtures("next_revision")
+def test_a_failing_migration_leaves_the_file_as_it_was(small_database: Path) -> None:
+    """It adds a column that is there already."""
+    with pytest.raises(duckdb.CatalogException, match="labels"):
+        migrate.upgrade(small_database)
+    with duckdb.connect(str(small_database), read_only=True) as con:
+        assert recorded_revision(con) == "0007"
+        assert con.execute("SELECT count(*) FROM main.run").fetchall() == [(2,)]
+
+
+@pytest.mark.parametrize("revision", ["0001", "0006"])
+def test_files_of_before_the_first_release_are_ingested_anew(database: Path, revision: str) -> None:
+    with duckdb.connect(str(database)) as con:
+        con.execute("UPDATE store.alembic_version SET version_num = ?", [revision])
+    for action in (lambda: connect(database, read_only=True), lambda: migrate.upgrade(database)):
+        with pytest.raises(DatabaseError, match=f"{revision}, from before the first") as told:
+            action()
+        assert told.value.hint == "ingest the traces into a new file"
+
+
+def test_other_tables_without_another_revision_are_refused(database: Path) -> None:
+    """As databases of between two releases have them."""
+    with duckdb.connect(str(database)) as con:
+        con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
+    for action in (lambda: connect(database, read_only=True), lambda: migrate.upgrade(database)):
+        with pytest.raises(DatabaseError, match=r"another table store\.take") as told:
+            action()
+        assert told.value.hint == "ingest the traces into a new file"
 
 
 def test_a_new_database_is_the_same_with_and_without_a_cache(
@@ -168,16 +234,6 @@ def test_upgrade_of_an_empty_database_file(tmp_path: Path) -> None:
     duckdb.connect(str(path)).close()
     assert migrate.upgrade(path).before is None
     assert recorded_revision(connect(path, read_only=True)) == objects.head_revision()
-
-
-def test_downgrade_leaves_no_table(database: Path) -> None:
-    con = open_file(database, read_only=False)
-    migrate.downgrade(con, "base")
-    rows = con.execute(
-        "SELECT table_name FROM duckdb_tables() WHERE schema_name = 'store' "
-        "AND table_name <> 'alembic_version'"
-    ).fetchall()
-    assert rows == []
 
 
 def test_create_refuses_a_file_that_is_there(database: Path) -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
 from msgflow.nearest import nearest
 from msgflow.query.catalogue import _WORDS, load_queries, load_query, query_names
@@ -43,12 +44,13 @@ def test_nearest_finds_slips_and_parts() -> None:
         ("topics", "msgflow query info-topics"),
         ("loss", "msgflow query delivery or msgflow query data-quality"),
         ("executor_wait", "it is a view: msgflow sql 'FROM executor_wait'"),
+        ("take", "it is a view: msgflow sql 'FROM take'"),
         ("../x/../node.", "msgflow query --list"),
     ],
 )
 def test_words_for_what_a_query_answers(name: str, hint: str) -> None:
     with pytest.raises(UsageError) as raised:
-        load_query(name)
+        load_query(name, public_names)
     assert raised.value.hint == hint
 
 

@@ -109,7 +109,7 @@ def test_a_macro_keeps_its_whole_statement() -> None:
         ("-- param: a VARCHAR {1..}  x", "only an integer has a minimum"),
         ("-- note: moon", "note 'moon' is not one of clocks"),
         ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
-        ("-- column: a", "example.sql:3: expected '-- column: name TYPE [unit]"),
+        ("-- column: a-b", "example.sql:3: expected '-- column: name TYPE [unit]"),
         ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
     ],
 )

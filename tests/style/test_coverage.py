@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from sql_files import SqlFile, sql_files
 
+from msgflow.db.table_view import table_views
 from msgflow.view.page_query import DIRECTORY, page_query
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -64,6 +65,7 @@ def test_every_page_query_has_a_case(name: str) -> None:
 
 def test_every_case_belongs_to_something_that_exists() -> None:
     names = {file.header.name for file in FILES} | set(PAGE_QUERIES)
+    names |= {header.name for header in table_views()}
     for folder in TESTS.glob("*/cases/*"):
         assert folder.name in names, folder
 

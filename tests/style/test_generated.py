@@ -7,9 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.db.render import render
-from msgflow.resources import resource_directory
-
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -27,8 +24,3 @@ def _generated_pages() -> dict[Path, str]:
 def test_page_is_current(page: str) -> None:
     path = ROOT / "docs" / page
     assert path.read_text() == _generated_pages()[path], "run: python docs/generate.py"
-
-
-def test_tables_sql_is_current() -> None:
-    text = (resource_directory("schema") / "tables.sql").read_text()
-    assert text == render(), "run: python -m msgflow.db.render > schema/tables.sql"

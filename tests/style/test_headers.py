@@ -11,20 +11,18 @@ import pytest
 from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.query_command import COMMON_OPTIONS
+from msgflow.db import objects
 from msgflow.query.run import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.statement import program
 
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
-VIEWS = [
-    file
-    for file in FILES
-    if file.layer in {"link", "flow", "clock", "stat", "public"} and file.header.kind == "view"
-]
+VIEWS = [file for file in FILES if file.layer in objects.VIEW_LAYERS and file.header.kind == "view"]
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
 PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
+LAYER_OF |= {header.name: "public" for header in objects.load("public")}
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +68,9 @@ def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
 def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
     position = LAYERS.index(file.layer)
     for name in file.references:
-        layer = "store" if name.startswith("store.") else LAYER_OF.get(name, "model")
+        # What is stored of an object of `derive` is as far to the right as that.
+        stored_of = LAYER_OF.get(name.replace("store.", "derive.", 1), "store")
+        layer = stored_of if name.startswith("store.") else LAYER_OF.get(name, "model")
         assert LAYERS.index(layer) <= position, f"{file} reads {name}"
     if file.layer in {"queries", "program"}:
         assert {name.partition(".")[0] for name in file.references} <= {"main"}

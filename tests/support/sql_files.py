@@ -6,29 +6,22 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from msgflow.db import objects
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
-    "model",
-    "store",
-    "link",
-    "flow",
-    "clock",
-    "stat",
-    "public",
-    "check",
-    "finding",
-    "queries",
-    "program",
-)
+    "model", "store", "link", "clock", "delivery", "flow", "stat", "public",
+    "check", "finding", "queries", "program",
+)  # fmt: skip
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
     "model": "staging",
     "link": "derive",
-    "flow": "derive",
     "clock": "derive",
+    "delivery": "derive",
+    "flow": "derive",
     "stat": "derive",
     "public": "main",
     "check": "check",
@@ -71,5 +64,6 @@ def sql_paths() -> list[tuple[str, Path]]:
 
 
 def sql_files() -> list[SqlFile]:
-    """Return every SQL file, parsed."""
-    return [SqlFile(layer, path, read(path)) for layer, path in sql_paths()]
+    """Return every SQL file, parsed, with what its columns share with a table."""
+    public = {header.path: header for header in objects.load("public")}
+    return [SqlFile(layer, path, public.get(path) or read(path)) for layer, path in sql_paths()]

@@ -1,14 +1,11 @@
-"""What users say of a run: which robot, which build.
-
-Frozen: it does not follow later changes of msgflow/db/tables.py.
-"""
+"""Labels of runs: a migration as a release writes them, of a column that is in truth older."""
 
 import sqlalchemy as sa
 from alembic import op
 from sqlalchemy.types import UserDefinedType
 
-revision = "0006"
-down_revision = "0005"
+revision = "0008"
+down_revision = "0007"
 branch_labels = None
 depends_on = None
 
@@ -31,8 +28,3 @@ def upgrade() -> None:
         ),
         schema="store",
     )
-
-
-def downgrade() -> None:
-    """Drop the column."""
-    op.drop_column("run", "labels", schema="store")

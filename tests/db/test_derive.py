@@ -1,0 +1,71 @@
+"""What is stored of links follows from what the objects say that they need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from msgflow.db import derive, objects
+from msgflow.sql.header import parse
+
+
+def header(name: str, *needs: str) -> objects.Header:
+    text = f"-- name: {name}\n-- description: A rule.\n-- needs: {', '.join(needs)}\nSELECT 1\n"
+    return parse(text, Path("rule.sql"))
+
+
+def test_what_a_table_holds_comes_from_the_object_of_its_name() -> None:
+    headers = [
+        header("derive.a", "store.link"),
+        header("derive.link", "derive.z"),
+        header("derive.z", "store.host"),
+    ]
+    assert [one.name for one in objects.sort(headers)] == ["derive.z", "derive.link", "derive.a"]
+
+
+def test_a_way_back_by_a_table_is_a_circle() -> None:
+    headers = [header("derive.link", "derive.z"), header("derive.z", "store.link")]
+    with pytest.raises(ValueError, match="need each other"):
+        objects.sort(headers)
+
+
+def test_each_table_is_derived_after_those_that_it_reads() -> None:
+    order = derive.derived_tables()
+    assert set(order) == {
+        "stamp_clock", "nearest_message", "link_transport", "link_causal", "orphan_take",
+        "undelivered",
+    }  # fmt: skip
+    for later, earlier in (
+        ("nearest_message", "stamp_clock"),
+        ("link_transport", "nearest_message"),
+        ("orphan_take", "link_transport"),
+        ("undelivered", "link_transport"),
+    ):
+        assert order.index(later) > order.index(earlier), later
+
+
+def test_only_what_reads_clocks_waits_for_them() -> None:
+    assert [name for name in derive.derived_tables() if derive._reads_clocks(name)] == [
+        "undelivered"
+    ]
+
+
+def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPatch) -> None:
+    def hashes(changed: str) -> str:
+        for cached in (derive.derivation_hash, derive.derived_tables):
+            cached.cache_clear()
+        views = [
+            objects.replace(one, body=f"{one.body} -- changed") if one.name == changed else one
+            for one in objects.views.__wrapped__()
+        ]
+        with monkeypatch.context() as patched:
+            patched.setattr(objects, "views", lambda: views)
+            return derive.derivation_hash()
+
+    now = hashes("none")
+    for read in ("derive.link_causal_direct", "derive.process_gap", "derive.topic_group"):
+        assert hashes(read) != now, read
+    for not_read in ("derive.executor_busy", "main.flow_edge", "derive.clock_finding"):
+        assert hashes(not_read) == now, not_read
+    derive.derivation_hash.cache_clear()
