@@ -29,7 +29,6 @@ VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 # Of a database: tables, what is derived from them, and what users read.
 SCHEMAS = ("store", "derive", "main")
 
-
 _REVISION = re.compile(r"[0-9]{4}")
 # What makes tables, and views of them, beside `schema/`: read as text, as SQLAlchemy takes long.
 _DECLARATION = ("tables.py", "table_view.py", "create.py")
