@@ -72,7 +72,8 @@ def look(address: str, database: Path) -> tuple[int, float, list[float]]:
             page.wait_for_selector("html[data-ready]", timeout=120_000)
             address = address.partition("?")[0]
             page.goto("about:blank")
-        page.goto(f"{address}#/timeline")
+        # A run of this length would open on a part of itself.
+        page.goto(f"{address}#/timeline?from=0&to=1e15")
         page.wait_for_selector("html[data-painted]", timeout=120_000)
         page.wait_for_selector("html[data-ready]", timeout=120_000)
         painted = float(page.locator("html").get_attribute("data-painted") or "nan")

@@ -43,6 +43,7 @@ MOST_BINS = 2_000
 LEVEL_BINS = 8_192
 MOST_LINKS = 20_000
 _KEPT_BYTES = 32 * 2**20
+_OF_CLOCKS = ("clocks_apart", "clocks_not_together")
 _KINDS = ("publication", "take", "callback_instance", "request", "response")
 _LARGEST = 2**62
 
@@ -222,7 +223,9 @@ class Pages:
         fields = ("name", "severity", "title", "subject", "count", "detail", "description",
                   "cause", "cure")  # fmt: skip
         table = pa.table({field: [found[field] for found in findings] for field in fields})
-        notes = clock_notes(connection, [extent.run])
+        # What a finding says is not said once more below it.
+        is_said = any(found["name"] in _OF_CLOCKS for found in findings)
+        notes = [] if is_said else clock_notes(connection, [extent.run])
         return encode(table, meta={"notes": notes, "command": "msgflow check"})
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:

@@ -193,6 +193,7 @@ def test_clicking_a_bar_picks_it(
 def test_keys_and_boxes_move_and_hide(demo: Path, report: Report, page: Page) -> None:
     page.open(report(demo))
     page.go("#/timeline")
+    page.page.keyboard.press("f")
 
     def view() -> tuple[float, float]:
         found = page.page.evaluate(
@@ -311,6 +312,130 @@ def test_a_histogram_has_bins_without_flows_too(
     )
     assert low[0] == expected["min_ns"]
     assert low[-2] <= expected["max_ns"] < low[-1]
+
+
+def test_a_long_run_opens_where_bars_can_be_read(systems: Path, serve: Serve, page: Page) -> None:
+    """Around the longest callback, with a way to the whole."""
+    page.open(serve(systems).address)
+    page.go("#/timeline?run=3")
+    view = "[msgflow.page.renderer.view.from, msgflow.page.renderer.view.to]"
+    start, end = page.page.evaluate(view)
+    length = page.page.evaluate("msgflow.run.length")
+    found, longest = page.page.evaluate(
+        """() => {
+            const { table } = msgflow.page.renderer.bars;
+            const inside = [...table.start_at.keys()].filter(at =>
+                table.start_at[at] < msgflow.page.renderer.view.to
+                && table.start_at[at] + table.length[at] > msgflow.page.renderer.view.from);
+            const calls = inside.filter(at => table.kind[at] === 0);
+            return [inside.length, Math.max(...calls.map(at => table.length[at]))];
+        }"""
+    )
+    assert end - start < length / 10
+    assert 100 < found < 1600
+    with open_db(systems) as opened:
+        ((slowest,),) = opened.connection.execute(
+            "SELECT max(end_ns - start_ns) FROM callback_instance WHERE run_id = 3"
+        ).fetchall()
+    assert longest == slowest
+    page.page.locator("button.whole").click()
+    assert page.page.evaluate(view) == [0, length]
+    # A window in the address is kept, and so is the whole of a run with few bars.
+    page.go("#/timeline?run=3&from=0&to=1000000")
+    assert page.page.evaluate(view) == [0, 1_000_000]
+    assert page.page.locator("button.whole").count() == 0
+
+
+def test_a_topic_with_the_name_of_its_node_is_written_once(
+    systems: Path, report: Report, page: Page
+) -> None:
+    page.open(report(systems))
+    for place in ("#/paths", "#/overview"):
+        page.go(place)
+        texts = page.page.locator("td.long, .path-text").all_inner_texts()
+        assert any("/PointsTransformerFront" in text for text in texts)
+        for text in texts:
+            parts = text.split(" → ")
+            assert all(one != other for one, other in itertools.pairwise(parts))
+
+
+@pytest.mark.parametrize("is_together", [False, True])
+def test_durations_between_clocks_that_are_apart_are_marked(
+    is_together: bool, systems: Path, demo: Path, report: Report, page: Page
+) -> None:
+    page.open(report(demo if is_together else systems))
+    page.go("#/paths")
+    marked = page.page.locator("[data-path]:has(.doubt)").count()
+    paths = page.page.locator("[data-path]").count()
+    assert (marked == 0) if is_together else (0 < marked < paths)
+    page.go("#/overview")
+    page.page.locator(".slow li").first.wait_for()
+    assert (page.page.locator(".slow .doubt").count() == 0) == is_together
+
+
+def test_slow_edges_and_hosts_stand_out_in_the_graph(
+    systems: Path, report: Report, page: Page
+) -> None:
+    page.open(report(systems))
+    page.go("#/graph")
+    with open_db(systems) as opened:
+        rows = opened.query("transport-latency").to_arrow().to_pylist()
+    medians = [row["median_ns"] for row in rows if row["median_ns"] is not None]
+    slow = page.page.evaluate("msgflow.page.model.slow")
+    assert slow == pytest.approx(10 * page.page.evaluate(
+        "(all => all[all.length >> 1])(msgflow.page.model.edges.map(edge => edge.median)"
+        ".filter(median => median > 0).sort((a, b) => a - b))"
+    ))  # fmt: skip
+    assert page.page.locator("path.stroke-slow").count() == sum(m >= slow for m in medians) > 0
+    colors_of = page.page.locator(".group-box").evaluate_all(
+        "all => [...new Set(all.map(one => getComputedStyle(one).stroke))].length"
+    )
+    assert colors_of == 2
+    legend = page.page.locator(".legend").inner_text()
+    assert "on reference-system-1" in legend
+    assert "on reference-system-2" in legend
+    # Ten pixels at least.
+    sizes = page.page.locator(".graph text").evaluate_all(
+        "all => all.map(one => parseFloat(getComputedStyle(one).fontSize) * one.getScreenCTM().a)"
+    )
+    assert min(sizes) > 9.5
+
+
+def test_executors_have_a_scale_and_a_legend_above_them(
+    demo: Path, report: Report, page: Page
+) -> None:
+    page.open(report(demo))
+    page.go("#/executors")
+    page.page.locator("canvas.strip").first.wait_for()
+    ticks = page.page.locator(".axis span").all_inner_texts()
+    length = page.page.evaluate("msgflow.run.length")
+    assert (ticks[0], ticks[-1]) == ("0", shown(length))
+    tops = [
+        page.page.locator(name).first.bounding_box()["y"]
+        for name in (".legend", ".axis", "canvas.strip")
+    ]
+    assert tops == sorted(tops)
+
+
+def test_a_table_that_is_wider_says_so_and_is_cards_on_a_phone(
+    systems: Path, report: Report, page: Page
+) -> None:
+    page.open(report(systems))
+    page.page.set_viewport_size({"width": 700, "height": 800})
+    page.go("#/paths")
+    edge = page.page.locator(".table-edge").first
+    inside = edge.locator(".table-scroll")
+    page.page.locator(".table-edge.has-more").first.wait_for()
+    inside.evaluate("one => { one.scrollLeft = one.scrollWidth; }")
+    page.page.wait_for_function(
+        "() => !document.querySelector('.table-edge').classList.contains('has-more')"
+    )
+    page.page.set_viewport_size({"width": 390, "height": 844})
+    assert inside.evaluate("one => one.scrollWidth <= one.clientWidth")
+    said = inside.locator("td.number").first.evaluate(
+        "one => getComputedStyle(one, '::before').content"
+    )
+    assert said == '"median "'
 
 
 def test_a_screenshot_is_no_blank_page(demo: Path, read: Read, report: Report, page: Page) -> None:

@@ -287,6 +287,38 @@ def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
     assert max(held) < all_of_them / 10
 
 
+def test_what_a_finding_says_of_clocks_is_not_said_below_it_too(
+    systems: Path, demo: Path, read: Read
+) -> None:
+    for path, run, said in ((systems, "3", False), (demo, "1", True)):
+        found = decoded(Pages().answer(read(path), "finding", {"run": run}))
+        names = {row["name"] for row in found.rows}
+        assert bool(names & {"clocks_apart", "clocks_not_together"}) != said
+        assert bool(found.meta["notes"]) == said
+
+
+def test_paths_whose_hosts_have_clocks_that_are_apart_are_known(
+    systems: Path, demo: Path, read: Read
+) -> None:
+    together = run_page_query(read(demo), "path", {"run": 1}).to_pylist()
+    assert {path["is_comparable"] for path in together} == {True}
+    connection = read(systems)
+    found = run_page_query(connection, "path", {"run": 3}).to_pylist()
+    host_of = {
+        table: dict(
+            connection.execute(
+                f"SELECT {table}_id, host_id FROM {table} JOIN process USING (process_id)"
+            ).fetchall()
+        )
+        for table in ("publisher", "subscription")
+    }
+    for path in found:
+        hosts = {host_of["publisher"][one] for one in path["publishers"]}
+        hosts |= {host_of["subscription"][one] for one in path["subscriptions"]}
+        assert path["is_comparable"] == (len(hosts) == 1)
+    assert {path["is_comparable"] for path in found} == {True, False}
+
+
 def test_flows_of_paths_are_those_that_e2e_latency_counts(demo: Path, read: Read) -> None:
     connection = read(demo)
     pages = Pages()

@@ -9,8 +9,34 @@
 -- column: publishers BIGINT[]  Publishers in order
 -- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: is_cut BOOLEAN  The path goes on or has siblings beyond the limits of the search
--- needs: main.flow_path
-SELECT path_id, path, topics, publishers, subscriptions, is_cut
-FROM main.flow_path([$run], NULL, NULL)
-WHERE is_path
-ORDER BY path, path_id
+-- column: is_comparable BOOLEAN  The clocks of all its hosts were brought together, or are one
+-- needs: main.flow_path, main.publisher, main.subscription, main.process, main.host, main.clock
+WITH path AS MATERIALIZED (
+    SELECT path_id, path, topics, publishers, subscriptions, is_cut
+    FROM main.flow_path([$run], NULL, NULL)
+    WHERE is_path
+),
+visited AS (
+    SELECT v.path_id, b.process_id
+    FROM (SELECT path_id, unnest(publishers) AS publisher_id FROM path) AS v
+    JOIN main.publisher AS b ON v.publisher_id = b.publisher_id
+    UNION
+    SELECT v.path_id, s.process_id
+    FROM (SELECT path_id, unnest(subscriptions) AS subscription_id FROM path) AS v
+    JOIN main.subscription AS s ON v.subscription_id = s.subscription_id
+),
+timed AS (
+    SELECT
+        v.path_id, count(DISTINCT coalesce(c.reference_clock_id, -c.clock_id)) = 1 AS is_comparable
+    FROM visited AS v
+    JOIN main.process AS p ON v.process_id = p.process_id
+    JOIN main.host AS h ON p.host_id = h.host_id
+    JOIN main.clock AS c ON h.clock_id = c.clock_id
+    GROUP BY v.path_id
+)
+SELECT
+    a.path_id, a.path, a.topics, a.publishers, a.subscriptions, a.is_cut,
+    coalesce(t.is_comparable, true) AS is_comparable
+FROM path AS a
+LEFT JOIN timed AS t ON a.path_id = t.path_id
+ORDER BY a.path, a.path_id

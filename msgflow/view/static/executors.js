@@ -27,7 +27,9 @@ export class ExecutorsPage {
         const [usage, shares] = await Promise.all([app.query("executor-usage"), app.fetch("executor_share")]);
         this.strips = { usage, shares, places: [] };
         if (!usage.rows) return h("p", {}, "No executor is known: the trace has no callbacks.");
-        const list = h("div", { className: "strips" });
+        const ticks = [0, 0.25, 0.5, 0.75, 1].map((share) => h("span", {}, duration(share * this.app.run.length)));
+        const list = h("div", { className: "strips" },
+          h("div", { className: "strip-row strip-axis" }, h("div", {}, "since the begin of the run"), h("div", { className: "axis" }, ticks)));
         for (let row = 0; row < usage.rows; row++) {
           const canvas = h("canvas", { className: "strip", role: "img", "aria-label": `states of thread ${usage.tid[row]} over time` });
           this.strips.places.push({ canvas, thread: usage.thread_id[row] });
@@ -36,9 +38,10 @@ export class ExecutorsPage {
             h("div", {}, h("b", {}, `${usage.process[row] ?? "?"} ${usage.tid[row]}`), h("div", { className: "soft" }, `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${percent(busy)} in callbacks`)), canvas));
         }
         requestAnimationFrame(() => this.drawStrips());
-        return [h("p", { className: "soft" }, "Each column is a piece of the run, filled with the share of time in each state. Click to see it in the timeline."), list,
+        return [h("p", { className: "soft" }, "Each column is a piece of the run, filled with the share of time in each state: a full column is 100 %. Click to see it in the timeline."),
           h("div", { className: "legend" }, [["execute", "execute (or in callbacks, where the executor tells nothing)"], ["process", "process: looking for work"], ["wait", "wait"]].map(([name, text]) =>
             h("span", { className: "legend-item" }, h("span", { className: `swatch color-${name}` }), text))),
+          list,
           besides("as a table", dataTable(usage, { label: "executor threads", columns: ["host", "process", "pid", "tid", "executor_kind", "seen_ns", "wait_ns", "process_ns", "execute_ns", "callback_ns", "callbacks", "callback_share"] })),
           notes(usage.meta.notes), command(usage.meta.command)];
       }),

@@ -8,6 +8,12 @@ import { command, failed, notes, waiting } from "./notice.js";
 
 // What is laid out without being asked: beyond it the layout takes longer than one waits.
 const MOST_VERTICES = 260;
+// An edge whose median is so many times that of the middle edge is drawn as slow.
+const SLOW = 10;
+// What is smaller cannot be read: then one scrolls.
+const LEAST_SCALE = 0.8;
+// Hosts have a colour each, as far as there are some in the style sheet.
+const HOSTS = 5;
 const INDIRECT = { periodic_async: "8 4", partial_sync: "2 4" };
 
 export class GraphPage {
@@ -38,7 +44,9 @@ export class GraphPage {
       h("div", { className: "legend" },
         item("box", "node"), item("pill", "topic, with its rate"), item("diamond", "service, with its round trip"),
         h("span", { className: "legend-item" }, h("span", { className: "stroke color-transport" }), "published, received: median · p95 from publication to take"),
-        h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link")),
+        h("span", { className: "legend-item" }, h("span", { className: "stroke dashed color-indirect" }), "published by an indirect link"),
+        this.model.edges.some((edge) => edge.median >= this.model.slow) && h("span", { className: "legend-item" }, h("span", { className: "stroke color-critical" }), `slow: a median of ${brief(this.model.slow)} or more, ${SLOW} times that of the middle one`),
+        this.model.hosts.length > 1 && this.model.hosts.map((host, place) => h("span", { className: "legend-item" }, h("span", { className: `swatch host-mark host-${place % HOSTS}` }), `on ${host}`))),
       besides("topics and their publishers as a table", dataTable(rates, { label: "publication rates" }), command(rates.meta.command)),
       besides("receivers and their latencies as a table", dataTable(transports, { label: "latencies from publication to take" }), notes(transports.meta.notes), command(transports.meta.command)),
       services.rows ? besides("services as a table", dataTable(services, { label: "services" }), command(services.meta.command)) : null);
@@ -85,7 +93,7 @@ export class GraphPage {
     const room = this.picture.clientWidth || 900;
     let graph = this.place(chosen, edges, room < 700 ? "TB" : "LR");
     // Long chains are read from the top where a line of them would become too small.
-    if (room >= 700 && (room - 4) / graph.graph().width < 0.75) graph = this.place(chosen, edges, "TB");
+    if (room >= 700 && (room - 4) / graph.graph().width < LEAST_SCALE) graph = this.place(chosen, edges, "TB");
     return this.paint(graph, chosen, edges, room);
   }
 
@@ -96,26 +104,26 @@ export class GraphPage {
     graph.setDefaultEdgeLabel(() => ({}));
     for (const key of chosen) {
       const vertex = this.model.vertices.get(key);
-      const wide = Math.max(...[vertex.label, vertex.under].filter(Boolean).map((text) => Math.min(text.length, 34) * 7)) + 26;
+      const wide = Math.max(...[vertex.label, vertex.under].filter(Boolean).map((text) => Math.min(text.length, 34) * 7.6)) + 26;
       graph.setNode(key, { width: Math.max(wide, 60), height: vertex.under ? 40 : 28 });
       if (this.grouped && vertex.group) {
         graph.setNode(vertex.group, {});
         graph.setParent(key, vertex.group);
       }
     }
-    edges.forEach((edge, place) => graph.setEdge(edge.from, edge.to, { width: edge.label ? 104 : 0, height: edge.label ? 14 : 0, labelpos: "c" }, String(place)));
+    edges.forEach((edge, place) => graph.setEdge(edge.from, edge.to, { width: edge.label ? 122 : 0, height: edge.label ? 14 : 0, labelpos: "c" }, String(place)));
     dagre.layout(graph);
     return graph;
   }
 
   paint(graph, chosen, edges, room) {
-    const { vertices, groups } = this.model;
+    const { vertices, groups, hosts } = this.model;
     const used = new Set([...chosen].map((key) => vertices.get(key).group).filter((group) => this.grouped && group));
     const { width, height } = graph.graph();
     // Made smaller to fit, but not beyond what can be read.
-    const scale = Math.min(1, Math.max((room - 4) / width, 0.6));
+    const scale = Math.min(1, Math.max((room - 4) / width, LEAST_SCALE));
     const root = svg("svg", { width: Math.ceil(width * scale), height: Math.ceil(height * scale), viewBox: `0 0 ${Math.ceil(width)} ${Math.ceil(height)}`, role: "img", "aria-label": "graph of nodes and topics" });
-    root.append(svg("defs", {}, ["transport", "indirect", "service"].map((name) => svg("marker", { id: `tip-${name}`, viewBox: "0 0 8 8", refX: 7, refY: 4, markerWidth: 7, markerHeight: 7, orient: "auto" },
+    root.append(svg("defs", {}, ["transport", "indirect", "service", "slow"].map((name) => svg("marker", { id: `tip-${name}`, viewBox: "0 0 8 8", refX: 7, refY: 4, markerWidth: name === "slow" ? 4 : 7, markerHeight: name === "slow" ? 4 : 7, orient: "auto" },
       svg("path", { d: "M0,0 L8,4 L0,8 z", class: `fill-${name}` })))));
     const along = graph.graph().rankdir === "TB" ? "y" : "x";
     const first = [...chosen].map((key) => graph.node(key)).reduce((a, b) => (b[along] < a[along] ? b : a));
@@ -123,14 +131,16 @@ export class GraphPage {
     const names = [];
     for (const key of used) {
       const box = graph.node(key);
-      root.append(svg("rect", { x: box.x - box.width / 2, y: box.y - box.height / 2 - 10, width: box.width, height: box.height + 10, rx: 8, class: "group-box" }));
-      names.push(svg("text", { x: box.x - box.width / 2 + 8, y: box.y - box.height / 2 + 2, class: "group-text" }, shortened(groups.get(key), Math.max(Math.floor((box.width - 16) / 6.2), 8)), svg("title", {}, groups.get(key))));
+      root.append(svg("rect", { x: box.x - box.width / 2, y: box.y - box.height / 2 - 10, width: box.width, height: box.height + 10, rx: 8, class: `group-box host-${hosts.indexOf(groups.get(key).host) % HOSTS}` }));
+      const { text } = groups.get(key);
+      names.push(svg("text", { x: box.x - box.width / 2 + 8, y: box.y - box.height / 2 + 3, class: "group-text" }, shortened(text, Math.max(Math.floor((box.width - 16) / 6.8), 8)), svg("title", {}, text)));
     }
     edges.forEach((edge, place) => {
       const line = graph.edge(edge.from, edge.to, String(place));
-      const style = edge.indirect ? "indirect" : edge.kind === "service" ? "service" : "transport";
+      const isSlow = edge.median >= this.model.slow;
+      const style = isSlow ? "slow" : edge.indirect ? "indirect" : edge.kind === "service" ? "service" : "transport";
       root.append(svg("path", { d: curve(line.points), class: `edge stroke-${style}`, "stroke-dasharray": INDIRECT[edge.indirect] ?? null, "marker-end": `url(#tip-${style})` }, svg("title", {}, edge.title)));
-      if (edge.label) names.push(svg("text", { x: line.x, y: line.y - 4, class: "edge-text" }, edge.label, svg("title", {}, edge.title)));
+      if (edge.label) names.push(svg("text", { x: line.x, y: line.y - 4, class: `edge-text${isSlow ? " slow-text" : ""}` }, edge.label, svg("title", {}, edge.title)));
     });
     // What is written lies above all arrows.
     root.append(...names);
@@ -183,7 +193,7 @@ function model({ rates, transports, services, indirect, executors, rows }) {
   const kindsOf = new Map();
   for (let row = 0; row < executors.rows; row++) {
     const key = `executor ${executors.executor_id[row]}`;
-    groups.set(key, `${executors.process[row]} on ${executors.host[row]}: ${String(executors.executor_kind[row]).replace("_", "-")}, ${count(executors.threads[row], "thread")}`);
+    groups.set(key, { host: executors.host[row], text: `${executors.process[row]} on ${executors.host[row]}: ${String(executors.executor_kind[row]).replace("_", "-")}, ${count(executors.threads[row], "thread")}` });
     // A node of several executors belongs to none of them alone.
     groupOf.set(executors.node[row], groupOf.has(executors.node[row]) ? null : key);
   }
@@ -214,7 +224,7 @@ function model({ rates, transports, services, indirect, executors, rows }) {
     const topic = transports.topic_name[row] ?? "?";
     const node = transports.subscriber[row];
     const known = !Number.isNaN(transports.median_ns[row]);
-    edges.push({ from: add("topic", topic), to: add("node", node), kind: "receive", indirect: null, count: transports.takes[row],
+    edges.push({ from: add("topic", topic), to: add("node", node), kind: "receive", indirect: null, median: known ? transports.median_ns[row] : undefined, count: transports.takes[row],
       label: known ? `${brief(transports.median_ns[row])} · ${brief(transports.p95_ns[row])}` : "",
       title: `${node} received ${count(transports.takes[row], "message")} on ${topic}${known ? `: ${duration(transports.median_ns[row])} median, ${duration(transports.p95_ns[row])} p95` : ", none with a known publication"}` });
   }
@@ -226,7 +236,9 @@ function model({ rates, transports, services, indirect, executors, rows }) {
     if (services.client[row]) edges.push({ from: add("node", services.client[row]), to: service, kind: "service", count: services.requests[row], label: "", title: `${services.client[row]} called ${name}: ${said}` });
     if (services.server[row]) edges.push({ from: service, to: add("node", services.server[row]), kind: "service", count: services.requests[row], label: "", title: `${services.server[row]} serves ${name}: ${said}` });
   }
-  return { vertices, edges: merged(edges), groups };
+  const medians = edges.map((edge) => edge.median).filter((median) => median > 0).sort((a, b) => a - b);
+  return { vertices, edges: merged(edges), groups, slow: medians.length ? SLOW * medians[medians.length >> 1] : Infinity,
+    hosts: [...new Set([...groups.values()].map(({ host }) => host))].sort() };
 }
 
 function merged(edges) {

@@ -22,3 +22,12 @@ export function notes(list) {
 export function command(text) {
   return text ? h("p", { className: "command" }, "the same numbers: ", h("code", {}, text)) : null;
 }
+
+// The mark of a duration between clocks that are not synchronised, and what it means.
+const DOUBT = "between hosts whose clocks are not synchronised: the difference of the clocks is in it";
+export function doubt() {
+  return h("abbr", { className: "doubt", title: DOUBT }, "†");
+}
+export function doubtHelp() {
+  return h("p", { className: "soft" }, h("span", { className: "doubt" }, "†"), ` ${DOUBT}`);
+}

@@ -2,9 +2,9 @@
 
 import { h, clear, breakable } from "./dom.js";
 import { address } from "./state.js";
-import { count, duration, wallClock } from "./words.js";
+import { PATH_HELP, count, duration, pathText, wallClock } from "./words.js";
 import { dataTable, besides } from "./table.js";
-import { command, failed, notes, waiting } from "./notice.js";
+import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 
 export class OverviewPage {
   constructor(app, root) {
@@ -43,7 +43,7 @@ export class OverviewPage {
         const first = rows[0];
         return h("article", { className: `finding ${table.severity[first]}` },
           h("h3", {}, h("span", { className: "severity" }, table.severity[first]), " ", table.title[first]),
-          h("ul", {}, rows.slice(0, 5).map((row) => h("li", {}, h("b", {}, table.subject[row]), ` — ${table.detail[row]}`)),
+          h("ul", {}, rows.slice(0, 5).map((row) => h("li", {}, h("b", {}, table.subject[row]), `: ${table.detail[row]}`)),
             rows.length > 5 && h("li", {}, `… and ${rows.length - 5} more`)),
           h("p", {}, table.description[first]),
           h("p", {}, h("b", {}, "Cause: "), table.cause[first]),
@@ -57,16 +57,19 @@ export class OverviewPage {
         .sort((a, b) => table.p99_ns[b] - table.p99_ns[a]);
       const most = order.length ? table.p99_ns[order[0]] : 1;
       if (!order.length) return [h("p", {}, table.rows ? "No flow reached the end of a path." : "There are no paths: no message is known to have been taken."), notes(table.meta.notes)];
-      const ids = pathNumbers(table, await app.fetch("path"));
+      const known = await app.fetch("path");
+      const ids = pathNumbers(table, known);
+      const isDoubted = doubted(table, known, ids);
       return [
-        h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. A click shows more."),
+        h("p", { className: "soft" }, `A path is a chain of nodes and topics that messages took. ${PATH_HELP} A click shows more.`),
         h("div", { className: "legend" }, [["bar-median", "median: half of its flows took no longer"], ["bar-p99", "p99: 99 % of them took no longer"]].map(([shade, text]) =>
           h("span", { className: "legend-item" }, h("span", { className: `swatch ${shade}` }), text))),
         h("ol", { className: "slow" }, order.slice(0, 10).map((row) => h("li", {},
           h("a", { href: address({ page: "paths", path: ids[row] }) },
             h("span", { className: "bar-track" }, bar(table.median_ns[row] / most, "bar-median"), bar(table.p99_ns[row] / most, "bar-p99")),
-            h("span", { className: "numbers" }, `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`),
-            h("span", { className: "path-text" }, breakable(table.path[row])))))),
+            h("span", { className: "numbers" }, `${duration(table.median_ns[row])} median · ${duration(table.p99_ns[row])} p99`, isDoubted(row) && doubt()),
+            h("span", { className: "path-text" }, breakable(pathText(table.path[row]))))))),
+        order.slice(0, 10).some(isDoubted) && doubtHelp(),
         order.length > 10 && h("p", {}, h("a", { href: address({ page: "paths" }) }, `all ${count(order.length, "path")}`)),
         notes(table.meta.notes), command(table.meta.command),
       ];
@@ -104,6 +107,12 @@ export async function fill(place, make) {
   } catch (error) {
     if (error.name !== "AbortError") clear(place.body, failed(error));
   }
+}
+
+// Whether the hosts of a path, a row of `table`, have clocks that are not synchronised.
+export function doubted(table, paths, ids) {
+  const apart = new Set(Array.from(paths.path_id).filter((_, row) => paths.is_comparable[row] === false));
+  return (row) => apart.has(ids[row]);
 }
 
 // Which path of `paths` each row of a query is about: the same text, and where several paths bear

@@ -2,11 +2,11 @@
 
 import { h, clear, color, breakable } from "./dom.js";
 import { address, current, replace } from "./state.js";
-import { PALE, PART_COLORS, count, duration, partTitle, percent } from "./words.js";
+import { PALE, PART_COLORS, PATH_HELP, count, duration, partTitle, pathText, percent } from "./words.js";
 import { dataTable, besides } from "./table.js";
-import { command, failed, notes, waiting } from "./notice.js";
+import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";
-import { pathNumbers } from "./overview.js";
+import { doubted, pathNumbers } from "./overview.js";
 
 const COLUMNS = ["path", "median_ns", "p95_ns", "p99_ns", "max_ns", "min_ns", "mean_ns", "roots", "reached", "superseded", "lost", "cut_by_recording", "loss_affected", "lost_reasons"];
 // Shown only where they are not 0 or empty on every path.
@@ -26,6 +26,7 @@ export class PathsPage {
     this.table = table;
     this.paths = paths;
     this.ids = pathNumbers(table, paths);
+    this.isDoubted = doubted(table, paths, this.ids);
     if (!table.rows) {
       clear(this.root, h("section", {}, h("h2", {}, "Paths"), h("p", {}, "There are no paths: no message is known to have been taken."), notes(table.meta.notes)));
       return;
@@ -39,7 +40,7 @@ export class PathsPage {
     this.list = h("div");
     this.detail = h("div");
     clear(this.root, h("section", {}, h("h2", {}, count(table.rows, "path")),
-      h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. A flow is what came of one message at its start; its latency goes from the callback that sent it to the end of the callback at the end of the path."), this.list, notes(table.meta.notes), command(table.meta.command)), this.detail);
+      h("p", { className: "soft" }, "A path is a chain of nodes and topics that messages took. A flow is what came of one message at its start; its latency goes from the callback that sent it to the end of the callback at the end of the path. ".concat(PATH_HELP)), this.list, this.ids.some((_, other) => this.isDoubted(other)) && doubtHelp(), notes(table.meta.notes), command(table.meta.command)), this.detail);
     await this.choose(row, asked !== this.ids[row]);
   }
 
@@ -48,7 +49,7 @@ export class PathsPage {
     if (isNew) { replace({ page: "paths", path: this.ids[row] }); this.app.linksMoved(); }
     clear(this.list, dataTable(this.table, {
       columns: COLUMNS.filter((name) => !SELDOM.includes(name) || this.table[name].some((value) => value)), label: "paths", sort: { name: "p99_ns", down: true }, picked: (other) => other === this.row,
-      onPick: (other) => this.choose(other, true), data: (other) => ({ path: String(this.ids[other]) }),
+      doubted: this.isDoubted, onPick: (other) => this.choose(other, true), data: (other) => ({ path: String(this.ids[other]) }),
     }));
     clear(this.detail, waiting("counting flows …"));
     try {
@@ -71,7 +72,7 @@ export class PathsPage {
     const toFlow = (source, at) => address({ page: "timeline", path: null, from: null, to: null, source: begin,
       flow: Number.isNaN(source.take_id[at]) || source.take_id[at] === null ? `${source.root_kind[at]}:${source.root_id[at]}` : `take:${source.take_id[at]}` });
     return [
-      h("section", {}, h("h2", { className: "path-title" }, breakable(table.path[row])), this.fates(row)),
+      h("section", {}, h("h2", { className: "path-title" }, breakable(pathText(table.path[row]))), this.fates(row)),
       histogram.rows ? h("div", { className: "charts" },
         h("section", {}, h("h3", {}, "Latency over time"),
           h("p", { className: "soft" }, points.rows && points.count.some((n) => n > 1) ? `The slowest flow of each of ${points.rows} pieces of time, and the median of the piece. Click a point to see its flow.` : "Click a point to see its flow."),
@@ -111,7 +112,7 @@ export class PathsPage {
       swatch.style.background = color(shadeName);
       legend.append(h("span", { className: "legend-item" }, swatch, `${text}: ${number.toLocaleString("en-US")} (${percent(number / total)})`));
     }
-    return [h("p", {}, `${count(total, "flow")} began; ${duration(table.median_ns[row])} median, ${duration(table.p95_ns[row])} p95, ${duration(table.p99_ns[row])} p99, ${duration(table.max_ns[row])} at most.`),
+    return [h("p", {}, `${count(total, "flow")} began; ${duration(table.median_ns[row])} median, ${duration(table.p95_ns[row])} p95, ${duration(table.p99_ns[row])} p99, ${duration(table.max_ns[row])} at most`, this.isDoubted(row) && doubt(), "."),
       track, legend, table.lost_reasons[row] && h("p", { className: "soft" }, `Reasons: ${table.lost_reasons[row]}`)];
   }
 

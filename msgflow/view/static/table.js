@@ -2,12 +2,14 @@
 
 import { h, clear, breakable } from "./dom.js";
 import { cell, title, count } from "./words.js";
+import { doubt } from "./notice.js";
 
 const SHOWN = 100;
 const HIDDEN = new Set(["run_id"]);
 
 // Options: columns (names, in order), onPick(row), picked (row), sort, label, shown, order (compares
-// two rows before any column is chosen), once (a column that is left empty below an equal value).
+// two rows before any column is chosen), once (a column that is left empty below an equal value),
+// doubted (row): its durations are between clocks that are not synchronised.
 export function dataTable(table, options = {}) {
   const described = table.meta?.columns ?? {};
   const names = options.columns ?? table.columns.map((column) => column.name)
@@ -52,7 +54,9 @@ export function dataTable(table, options = {}) {
         const text = isAgain ? "" : cell(table[column.name][row], column);
         const inside = position === 0 && options.onPick && !isAgain
           ? h("button", { type: "button", className: "pick" }, text ? (isNumber ? text : breakable(text)) : "–") : isNumber ? text : breakable(text);
-        return h("td", { className: isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}` }, inside);
+        // On a phone a row is a card, where every value says what it is.
+        const shape = isNumber ? "number" : `text${String(text).length > 60 ? " long" : String(text).length > 18 ? " name" : ""}`;
+        return h("td", { data: { title: title(column.name) }, className: text === "" ? `${shape} empty` : shape }, inside, text !== "" && column.unit === "ns" && options.doubted?.(row) && doubt());
       });
       return h("tr", {
         className: options.onPick ? "can-pick" : "",
@@ -67,9 +71,19 @@ export function dataTable(table, options = {}) {
 
   fill();
   return h("div", { className: "table-frame" },
-    h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": options.label ?? "table" },
+    scrolls(options.label ?? "table",
       h("table", {}, h("thead", {}, h("tr", {}, heads)), body)),
     order.length === 0 && h("p", { className: "nothing" }, options.nothing ?? "nothing"), more);
+}
+
+// What is wider than its place scrolls, and its right edge says that there is more.
+export function scrolls(label, ...content) {
+  const inside = h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": label }, content);
+  const frame = h("div", { className: "table-edge" }, inside);
+  const look = () => frame.classList.toggle("has-more", inside.scrollLeft + inside.clientWidth < inside.scrollWidth - 2);
+  inside.addEventListener("scroll", look);
+  new ResizeObserver(look).observe(inside);
+  return frame;
 }
 
 export function besides(label, ...content) {

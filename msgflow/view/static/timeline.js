@@ -2,15 +2,17 @@
 
 import { h, clear } from "./dom.js";
 import { current, go, replace } from "./state.js";
-import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, wallClock, percent } from "./words.js";
+import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./words.js";
 import { Renderer, AXIS } from "./renderer.js";
 import { ROW_KINDS, indexBars, layout } from "./lanes.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
-import { besides } from "./table.js";
+import { besides, scrolls } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 
 const LEAST_SPAN = 20;
 const MARGIN = 0.5;
+// As many bars as a person can tell apart at once: a longer run opens on so many of it.
+const READABLE = 400;
 
 export class TimelinePage {
   constructor(app, root) {
@@ -42,6 +44,7 @@ export class TimelinePage {
       this.status, this.legend(), this.beside);
     this.listen();
     this.setView(number(asked.from, 0), number(asked.to, this.length), false);
+    this.isOpening = !asked.from && !asked.to && !asked.flow;
     this.state.query = asked.q ?? "";
     this.search.value = this.state.query;
     this.state.internal = asked.internal === "1";
@@ -201,6 +204,8 @@ export class TimelinePage {
       this.renderer.bars = indexBars(table);
       this.held = { from: table.meta.start, to: table.meta.end, bin: table.meta.bin, whole: table.meta.whole, count: table.meta.count, note: table.meta.note };
       this.renderer.links = null;
+      if (this.isOpening && this.openOn(table)) { this.isOpening = false; await this.load(); return; }
+      this.isOpening = false;
       this.redraw();
       this.say();
       if (!table.meta.bin) {
@@ -219,6 +224,22 @@ export class TimelinePage {
     }
   }
 
+  // A long run opens where its longest callback is. Tells whether the window is another one now.
+  openOn(table) {
+    const { count: bars, start, end } = table.meta;
+    if (bars <= 4 * READABLE) return false;
+    let longest = -1;
+    const weight = (row) => (table.count?.[row] > 1 ? table.busy[row] / table.count[row] : table.length[row]);
+    for (let row = 0; row < table.rows; row++) if (table.kind[row] === 0 && (longest < 0 || weight(row) > weight(longest))) longest = row;
+    if (longest < 0) return false;
+    const span = Math.max(((end - start) * READABLE) / bars, 2 * weight(longest));
+    const middle = table.start_at[longest] + table.length[longest] / 2;
+    if (span > (end - start) / 2) return false;
+    this.setView(Math.min(Math.max(middle - span / 2, start), end - span), Math.min(Math.max(middle + span / 2, start + span), end), false);
+    this.opened = { ...this.renderer.view };
+    return true;
+  }
+
   say(text) {
     if (text) { clear(this.status, text); return; }
     const parts = [];
@@ -234,7 +255,9 @@ export class TimelinePage {
     if (this.gapsCut) parts.push(`${count(this.gapsCut, "shorter gap")} of the recording not shaded.`);
     if (this.hiddenCount && !renderer.flow) parts.push(`${count(this.hiddenCount, "row")} hidden.`);
     if (held && !renderer.flow) parts.push("A click on a bar shows what led to it and what came of it; dragging moves, Ctrl and the wheel zoom.");
-    clear(this.status, parts.join(" "));
+    const isOpened = this.opened && this.opened.from === renderer.view.from && this.opened.to === renderer.view.to && !renderer.flow;
+    clear(this.status, isOpened && [`These ${duration(this.opened.to - this.opened.from)} of ${duration(this.length)} are around the longest callback. `,
+      h("button", { type: "button", className: "whole", on: { click: () => this.setView(0, this.length) } }, "show the whole run"), " "], parts.join(" "));
   }
 
   redraw() {
@@ -541,7 +564,7 @@ export class TimelinePage {
       h("td", { className: "number" }, duration(pieces.duration_ns[row]))));
     return [
       h("p", {}, `${duration(pieces.latency_ns[0])} from ${pieces.meta.from} to ${pieces.meta.to}, take ${pieces.meta.take_id}: the longest flow that ends with it, and what it waited for.`),
-      besides(count(pieces.rows, "piece"), h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": "pieces of the critical path" },
+      besides(count(pieces.rows, "piece"), scrolls("pieces of the critical path",
         h("table", { className: "steps-critical" }, h("thead", {}, h("tr", {}, ["at", "what", "took"].map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, rows))), command(pieces.meta.command), notes(pieces.meta.notes)),
     ];
   }
@@ -593,7 +616,7 @@ export class TimelinePage {
       h("p", {}, h("label", {}, gather, "only rows of the flow"), " ",
         h("label", {}, executors, "and their executors"), " ",
         h("button", { type: "button", on: { click: () => { const span = Math.max(to - from, 1000); this.setView(from - span * 0.08, to + span * 0.08); } } }, "show all of it")),
-      h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": "steps of the flow" },
+      scrolls("steps of the flow",
         h("table", { className: "steps" }, h("thead", {}, h("tr", {}, ["at", "what", "took"].map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, rows))),
       h("h3", { className: "critical-title" }, "Critical path"), this.critical);
     this.renderer.resize();
@@ -637,7 +660,7 @@ export class TimelinePage {
         const sources = new Map(Array.from({ length: paths.rows }, (_, row) => [paths.path_id[row], paths.topics[row][0]]));
         for (let row = 0; row < worst.rows; row++) {
           const value = Number.isNaN(worst.take_id[row]) ? `${worst.root_kind[row]}:${worst.root_id[row]}` : `take:${worst.take_id[row]}`;
-          this.worst.append(h("option", { value, data: { source: sources.get(worst.path_id[row]) ?? "" } }, `${duration(worst.latency[row])}  ${names.get(worst.path_id[row]) ?? ""}`));
+          this.worst.append(h("option", { value, data: { source: sources.get(worst.path_id[row]) ?? "" } }, `${duration(worst.latency[row])}  ${pathText(names.get(worst.path_id[row]))}`));
         }
         if (!worst.rows) this.worst.append(h("option", { disabled: true }, "no path has a flow that arrived"));
       } catch (error) {
@@ -671,7 +694,7 @@ export class TimelinePage {
             h("td", { className: "number" }, duration(table.length[at])), h("td", { className: "number" }, table.count?.[at] > 1 ? `${table.count[at]} together` : table.id[at] >= 0 ? table.id[at] : "")));
         }
       }
-      clear(list, h("div", { className: "table-scroll", tabIndex: 0, role: "region", "aria-label": "bars in the window" }, h("table", {},
+      clear(list, scrolls("bars in the window", h("table", {},
         h("thead", {}, h("tr", {}, ["begin", "what", "row", "node", "duration", "identity"].map((text) => h("th", { scope: "col" }, text)))), h("tbody", {}, rows))),
       more ? h("p", { className: "soft" }, `${count(more, "further bar")} in the window: zoom in.`) : null);
     };

@@ -48,6 +48,13 @@ export const PART_COLORS = {
   rcl: "publication", rmw: "publication", dds: "publication", intra: "publication", publish: "publication", take: "take",
 };
 
+// Nodes and topics take turns in a path: a topic with the name of its node is written once.
+export const PATH_HELP = "A topic with the name of the node that publishes it is written once.";
+export function pathText(path) {
+  return String(path ?? "").split(" → ").reduce((text, part, place, parts) =>
+    place % 2 && part === parts[place - 1] ? text : place ? `${text} → ${part}` : part, "");
+}
+
 export function title(name) {
   if (name in TITLES) return TITLES[name];
   return name.replace(/_(ns|hz|percent)$/, "").replace(/^p(\d\d)$/, "p$1").replaceAll("_", " ");
@@ -113,6 +120,7 @@ export function cell(value, column) {
   if (column.unit === "%") return `${trimmed(value, 2)} %`;
   if (column.name === "change_percent") return `${trimmed(value, 2)} %`;
   if (column.name === "part") return partTitle(value);
+  if (column.name === "path") return pathText(value);
   if (typeof value === "number") {
     if (/share$/.test(column.name)) return percent(value);
     return trimmed(value, 3);
