@@ -1,6 +1,7 @@
 -- name: finding.clocks_not_together
 -- title: The clocks of two hosts are not synchronised
--- description: Latencies between the two contain the difference of their clocks, which is not known.
+-- description: Latencies between the two contain the difference of their clocks, which is not
+--     known.
 -- cause: No correction was asked for, or messages go one way only.
 -- cure: Correct the clocks: msgflow clocks apply messages, or msgflow clocks apply FILE if messages
 --     go one way only. If the hosts were synchronised while recording, do nothing.
