@@ -43,9 +43,6 @@ _T = TypeVar("_T")
 
 DEFAULT_LIMIT = 10_000
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
-# Of flows: messages in a row, and vertices.
-DEFAULT_DEPTH = 32
-DEFAULT_VERTICES = 1_000
 # Where named paths are looked for.
 DEFAULT_PATHS = "paths.yaml"
 # Of reports, bytes: what mail servers take.
@@ -381,8 +378,8 @@ class Database:
         response_id: int | None = None,
         run: str | int | None = None,
         direction: str = "both",
-        depth: int = DEFAULT_DEPTH,
-        limit: int = DEFAULT_VERTICES,
+        depth: int = 32,
+        limit: int = 1_000,
         internal: bool = False,
     ) -> Flow:
         """Return what one message caused and was caused by; `print` draws it as a tree.
@@ -558,8 +555,8 @@ class Database:
                 run_a,
                 run_b,
                 what=what,
-                from_topic=from_,
-                to_topic=to,
+                from_=from_,
+                to=to,
                 case=case,
                 skip_first=skip_first,
                 confidence=confidence,

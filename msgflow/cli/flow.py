@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msgflow.cli.completion import complete
+from msgflow.cli.declared import declared
 from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
@@ -19,6 +20,7 @@ from msgflow.cli.options import (
     RunOption,
 )
 from msgflow.errors import UsageError
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     from msgflow.database import Database
@@ -33,12 +35,7 @@ class FlowFormat(StrEnum):
     JSON = "json"
 
 
-class Direction(StrEnum):
-    """Which way a flow is followed."""
-
-    FORWARD = "forward"
-    BACKWARD = "backward"
-    BOTH = "both"
+_DECLARED = {param.name: param for param in program().header("flow_steps").params}
 
 
 def command(
@@ -120,37 +117,9 @@ def command(
         ),
     ] = None,
     run: RunOption = None,
-    direction: Annotated[
-        Direction | None,
-        typer.Option(
-            "--direction",
-            help="Follow what it caused, what caused it, or both",
-            show_default="both; with --slowest backward",
-            rich_help_panel=SELECTION,
-        ),
-    ] = None,
-    depth: Annotated[
-        int,
-        typer.Option(
-            "--depth",
-            metavar="N",
-            min=0,
-            help="Maximum number of messages in a row, each way",
-            rich_help_panel=SELECTION,
-        ),
-    ] = 32,
-    limit: Annotated[
-        int,
-        typer.Option(
-            "--limit",
-            metavar="N",
-            min=1,
-            max=10_000,
-            help="Maximum number of publications, takes, callback instances, requests and"
-            " responses",
-            rich_help_panel=SELECTION,
-        ),
-    ] = 1_000,
+    direction: Annotated[str | None, declared(_DECLARED["direction"], SELECTION)] = None,
+    depth: Annotated[str | None, declared(_DECLARED["depth"], SELECTION)] = None,
+    limit: Annotated[str | None, declared(_DECLARED["limit"], SELECTION)] = None,
     internal: InternalOption = False,
     absolute: Annotated[
         bool,
@@ -214,17 +183,17 @@ def command(
         }
         found = [starts | {"run": run}]
         if slowest is not None:
-            if given := [name for name, value in starts.items() if value is not None]:
+            if named := [name for name, value in starts.items() if value is not None]:
                 raise UsageError(
-                    f"--slowest chooses the message itself — {given[0]}", "leave out one of them"
+                    f"--slowest chooses the message itself — {named[0]}", "leave out one of them"
                 )
             ends = _slowest_takes(opened, slowest, from_, to, run, internal)
             found = [{"take_id": number} for number in ends]
-        way = direction or (Direction.BOTH if slowest is None else Direction.BACKWARD)
-        flows = [
-            opened.flow(**start, direction=way.value, depth=depth, limit=limit, internal=internal)
-            for start in found
-        ]
+        if slowest is not None and direction is None:
+            direction = "backward"
+        given = {"direction": direction, "depth": depth, "limit": limit}
+        asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        flows = [opened.flow(**start, internal=internal, **asked) for start in found]
         size = None if html is None else opened.flow_page(flows[0], html)
     print_runs([flows[0].run])
     if size is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from msgflow.cli.completion import complete, is_completing
+from msgflow.cli.declared import escape, given_of, parameter
 from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
@@ -26,16 +26,12 @@ from msgflow.cli.options import (
 )
 from msgflow.cli.selecting import selecting_options
 from msgflow.errors import UsageError
-from msgflow.query.names import PLACE_PARAMETERS
 from msgflow.query.selection import KINDS
 from msgflow.query.show.present import MOST_ROWS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from msgflow.sql.header import Header
 
-    from msgflow.sql.header import Header, Param
-
-PARAMETERS = "Parameters"
 # Names that the command line gives to every query, so that no query may use them for itself. Via,
 # without and slowest it may: then it chooses by them before it adds up.
 COMMON_OPTIONS = frozenset(
@@ -62,7 +58,6 @@ COMMON_OPTIONS = frozenset(
         "wide",
     )
 )
-_OWN = "own_"
 # Of `Database.query`, by their options.
 _SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
 _ShowOption = Annotated[
@@ -97,11 +92,7 @@ def build_command(header: Header) -> Any:
     """Return the command that runs the query of `header`."""
 
     def command(**given: Any) -> None:
-        own = {
-            name.removeprefix(_OWN): ",".join(value) if isinstance(value, list) else value
-            for name, value in given.items()
-            if name.startswith(_OWN) and value is not None and value != []
-        }
+        own = given_of(given)
         if given["show"]:
             from msgflow.cli.output import print_lines
 
@@ -110,7 +101,7 @@ def build_command(header: Header) -> Any:
         _run(header, own, given)
 
     own_names = {param.name for param in header.params}
-    parameters = [_option(param) for param in header.params]
+    parameters = [parameter(param) for param in header.params]
     for name, annotation, default in (
         *(
             (name, annotation, None)
@@ -180,45 +171,6 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
     )
 
 
-def _option(param: Param) -> Parameter:
-    flag = f"--{param.name.replace('_', '-')}"
-    option = typer.Option(
-        f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
-        metavar=None if param.type == "BOOLEAN" else param.type,
-        help=_escape(_describe(param)),
-        show_default=False,
-        autocompletion=_completion(param),
-        rich_help_panel=PARAMETERS,
-    )
-    kind: Any = bool if param.type == "BOOLEAN" else str
-    if param.name in PLACE_PARAMETERS:
-        kind = list[str]
-    return Parameter(
-        f"{_OWN}{param.name}",
-        Parameter.KEYWORD_ONLY,
-        default=None if param.has_default else Parameter.empty,
-        annotation=Annotated[kind | None if param.has_default else kind, option],
-    )
-
-
-def _completion(param: Param) -> Callable[..., list[str]] | None:
-    if param.name in PLACE_PARAMETERS:
-        return complete("place")
-    return (lambda: list(param.choices)) if param.choices else None
-
-
-def _describe(param: Param) -> str:
-    text = param.description
-    if param.choices:
-        text += f" ({', '.join(param.choices)})"
-    if param.minimum is not None:
-        text += f" (at least {param.minimum})"
-    if param.has_default and param.default is not None:
-        default = param.default
-        text += f" [default: {str(default).lower() if isinstance(default, bool) else default}]"
-    return text
-
-
 def _command_class(header: Header) -> type[TyperCommand]:
     class QueryCommand(TyperCommand):
         """A command whose help ends with the columns of the result."""
@@ -233,15 +185,7 @@ def _command_class(header: Header) -> type[TyperCommand]:
 
 def _help(header: Header) -> str:
     grain = f"\n\n{header.grain[:1].upper()}{header.grain[1:]}." if header.grain else ""
-    return _escape(f"{header.title}.\n\n{header.description}{grain}")
-
-
-def _escape(text: str) -> str:
-    if is_completing():
-        return text
-    from rich.markup import escape
-
-    return escape(text)
+    return escape(f"{header.title}.\n\n{header.description}{grain}")
 
 
 def _print_columns(header: Header) -> None:

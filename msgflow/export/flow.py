@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from msgflow.export.flow_rows import FlowRows
 from msgflow.export.flow_tree import tree_text
 from msgflow.query.clocks import clock_notes
-from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
+from msgflow.query.flow import STEPS_PER_MESSAGE, flow_parameters, read_steps, require_start
 from msgflow.query.show.plain import plain
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from msgflow.export.flow_rows import Row
     from msgflow.query.flow import Start
+    from msgflow.sql.value import Value
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,34 +70,24 @@ class Flow(FlowRows):
         return f'<pre style="line-height: 1.2">{escape(str(self))}</pre>'
 
 
-def read_flow(
-    connection: duckdb.DuckDBPyConnection,
-    start: Start,
-    *,
-    direction: str = "both",
-    depth: int,
-    limit: int,
-    internal: bool = False,
-) -> Flow:
+def read_flow(connection: duckdb.DuckDBPyConnection, start: Start, **given: Value) -> Flow:
     """Return the flow that `start` is part of.
 
     Args:
         connection: to a database with the public views.
         start: where to begin.
-        direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
-        depth: most messages in a row, each way.
-        limit: most vertices.
-        internal: follow effects on ROS's own topics and services too.
+        given: direction, depth, limit and internal; see `program.flow_steps`.
 
     Raises:
         UsageError: what to start from does not exist, or an argument cannot be.
         QueryError: the database could not run it.
     """
     run = require_start(connection, start)
-    table = read_steps(
-        connection, start, run, direction=direction, depth=depth, limit=limit, internal=internal
+    asked = flow_parameters(start, run, given)
+    table = read_steps(connection, asked)
+    flow = Flow(
+        start, asked["direction"], asked["depth"], asked["limit"], run, table, list(start.notes)
     )
-    flow = Flow(start, direction, depth, limit, run, table, list(start.notes))
     flow.notes.extend(_notes(flow))
     if len({node["host"] for node in flow.nodes.values()}) > 1:
         flow.notes.extend(clock_notes(connection, [run]))

@@ -14,19 +14,20 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
 from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
-from msgflow.query.run import first_line, read_runs
+from msgflow.query.run import bind, first_line, read_runs
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.resources import resource_directory
 from msgflow.run.choice import Run, choose_one
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import is_of_the_file
 from msgflow.sql.header import Header, read
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
-THINGS = ("paths", "callbacks", "topics")
-CASES = ("first", "last", "newest", "every_pair")
+    from msgflow.sql.value import Value
+
 STATISTICS = ("median", "mean", "p95", "p99", "max")
 SHARE = "share"
 DEFAULT_RESAMPLES = 1_000
@@ -41,14 +42,6 @@ SELECT run_id, sum(discarded_event_count)::BIGINT
 FROM main.trace
 WHERE list_contains($runs, run_id)
 GROUP BY run_id
-"""
-_SQL = """
-FROM main.comparison(
-    $what, $run_a, $run_b, from_topic := $from_topic, to_topic := $to_topic,
-    wanted_case := $wanted_case, skip_ns := $skip_ns, confidence := $confidence,
-    resamples := $resamples, seed := $seed, internal := $internal,
-    max_depth := $max_depth, max_paths := $max_paths
-)
 """
 
 
@@ -208,65 +201,21 @@ def _ms(nanoseconds: float) -> str:
 
 
 def compare(
-    connection: duckdb.DuckDBPyConnection,
-    run_a: str | int,
-    run_b: str | int,
-    *,
-    what: str = "paths",
-    from_topic: str | None = None,
-    to_topic: str | None = None,
-    case: str = "first",
-    skip_first: float = 0.0,
-    confidence: float = 0.95,
-    resamples: int | None = None,
-    seed: int = 0,
-    internal: bool = False,
-    max_depth: int = 32,
-    max_paths: int = 1_000,
+    connection: duckdb.DuckDBPyConnection, run_a: str | int, run_b: str | int, **given: Value
 ) -> Comparison:
     """Compare two runs of a database; see `Database.compare`."""
-    _choose("what can be compared", what, THINGS)
-    _choose("which arrivals count", case, CASES)
-    if not 0 < confidence < 1:
-        raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")
-    needed = least_resamples(confidence)
-    if resamples is None:
-        resamples = max(DEFAULT_RESAMPLES, needed)
-    if resamples != 0 and resamples < needed:
-        raise UsageError(
-            f"the ends of an interval are not seen in so few resamples — {resamples}",
-            f"{needed} are needed for a confidence of {confidence:g}, or 0 for no intervals",
-        )
-    for name, limit in (("paths", max_paths), ("topics of a path", max_depth)):
-        if limit < 1:
-            raise UsageError(f"{name} are limited to one at least — {limit}")
-    if not 0 <= skip_first <= MAXIMUM_NS / 1_000_000_000:
-        raise UsageError(f"seconds to leave out are not negative — {skip_first}")
-    if what != "paths" and (from_topic is not None or to_topic is not None):
-        raise UsageError(f"only paths start and end at topics, not {what}", "leave out the topics")
     runs = read_runs(connection)
     first, second = (
         choose_one(runs, wanted, "each side of a comparison") for wanted in (run_a, run_b)
     )
+    both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
+    asked = bind(program().header("comparison"), given | both, "msgflow compare")
+    _require_sense(asked)
+    what = str(asked["what"])
     for run in (first, second):
-        require_places(connection, [run], {"from": from_topic, "to": to_topic})
-    parameters = {
-        "what": what,
-        "run_a": first.run_id,
-        "run_b": second.run_id,
-        "from_topic": from_topic,
-        "to_topic": to_topic,
-        "wanted_case": case,
-        "skip_ns": round(skip_first * 1_000_000_000),
-        "confidence": confidence,
-        "resamples": resamples,
-        "seed": seed,
-        "internal": internal,
-        "max_depth": max_depth,
-        "max_paths": max_paths,
-    }
+        require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     try:
-        table = connection.sql(_SQL, params=parameters).to_arrow_table()
+        table = program().run(connection, "comparison", asked).to_arrow_table()
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
@@ -284,9 +233,25 @@ def _header() -> Header:
     return read(resource_directory("schema") / "public" / "comparison.sql")
 
 
-def _choose(what: str, value: str, known: Sequence[str]) -> None:
-    if value not in known:
-        raise UsageError(f"{what}: no such choice — {value}", f"choose {' or '.join(known)}")
+def _require_sense(asked: dict[str, Any]) -> None:
+    """Refuse what no type refuses; set how many resamples there are where nobody has."""
+    confidence, resamples = asked["confidence"], asked["resamples"]
+    if not 0 < confidence < 1:
+        raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")
+    needed = least_resamples(confidence)
+    if resamples is None:
+        asked["resamples"] = max(DEFAULT_RESAMPLES, needed)
+    elif resamples != 0 and resamples < needed:
+        raise UsageError(
+            f"the ends of an interval are not seen in so few resamples — {resamples}",
+            f"{needed} are needed for a confidence of {confidence:g}, or 0 for no intervals",
+        )
+    if not 0 <= asked["skip_first"] <= MAXIMUM_NS / 1_000_000_000:
+        raise UsageError(f"seconds to leave out are not negative — {asked['skip_first']}")
+    if asked["what"] != "paths" and (asked["from"] is not None or asked["to"] is not None):
+        raise UsageError(
+            f"only paths start and end at topics, not {asked['what']}", "leave out the topics"
+        )
 
 
 def least_resamples(confidence: float) -> int:

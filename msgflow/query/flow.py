@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.names import require_names
-from msgflow.query.run import first_line, read_runs
+from msgflow.query.run import bind, first_line, read_runs
 from msgflow.run.choice import Run, choose_one
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
 from msgflow.sql.failure import is_of_the_file
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pyarrow as pa
 
-DIRECTIONS = ("forward", "backward", "both")
+    from msgflow.sql.value import Value
+
 KINDS = ("publication", "take", "callback_instance", "request", "response")
 STEPS_PER_MESSAGE = 3
 MOST_VERTICES = 10_000
@@ -111,51 +114,36 @@ def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
     return next(run for run in read_runs(connection) if run.run_id == found[0][0])
 
 
-def read_steps(
-    connection: duckdb.DuckDBPyConnection,
-    start: Start,
-    run: Run,
-    *,
-    direction: str,
-    depth: int,
-    limit: int,
-    internal: bool,
-) -> pa.Table:
+def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[str, Any]:
+    """Return the value of every parameter of `program.flow_steps`.
+
+    Args:
+        start: where to begin.
+        run: the run that it belongs to.
+        given: direction, depth, limit and internal, as far as they are not the usual ones.
+
+    Raises:
+        UsageError: a direction, depth or limit that cannot be.
+    """
+    place: dict[str, Value] = {"kind": start.kind, "id": start.id, "run_id": run.run_id}
+    asked: dict[str, Any] = bind(program().header("flow_steps"), {**given, **place}, "msgflow flow")
+    if asked["limit"] > MOST_VERTICES:
+        raise UsageError(f"--limit is at most {MOST_VERTICES} — {asked['limit']}", "1000 is usual")
+    return asked
+
+
+def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]) -> pa.Table:
     """Return the steps of a flow, nearest to the start first, with how long executors were busy.
 
     Args:
         connection: to a database with the public views.
-        start: where to begin.
-        run: the run that it belongs to.
-        direction: one of `DIRECTIONS`.
-        depth: most messages in a row, each way.
-        limit: most vertices.
-        internal: follow effects on ROS's own topics and services too.
+        asked: as `flow_parameters` returns them.
 
     Raises:
-        UsageError: a direction, depth or limit that cannot be.
         QueryError: the database could not run it.
     """
-    if direction not in DIRECTIONS:
-        raise UsageError(
-            f"there is no such direction — {direction}", f"choose {' or '.join(DIRECTIONS)}"
-        )
-    if depth < 0:
-        raise UsageError(f"the depth is at least 0 — {depth}", "32 messages in a row are usual")
-    if not 1 <= limit <= MOST_VERTICES:
-        raise UsageError(f"the limit is from 1 to {MOST_VERTICES} — {limit}", "1000 is usual")
-    bindings = {
-        "kind": start.kind,
-        "id": start.id,
-        "run_id": run.run_id,
-        "direction": direction,
-        # No flow within the limit has more steps.
-        "max_depth": min(depth * STEPS_PER_MESSAGE, MOST_VERTICES),
-        "limit": limit,
-        "internal": internal,
-    }
     try:
-        return program().run(connection, "flow_steps", bindings).to_arrow_table()
+        return program().run(connection, "flow_steps", asked).to_arrow_table()
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise

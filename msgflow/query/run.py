@@ -151,33 +151,38 @@ def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[st
     return [f"--{name} {shlex.quote(str(value))}" for name, value in given.items() if value]
 
 
-def bind(header: Header, given: Mapping[str, Value]) -> dict[str, Value]:
+def bind(
+    header: Header, given: Mapping[str, Value], command: str | None = None
+) -> dict[str, Value]:
     """Return the value of every parameter of `header`.
 
     Args:
         header: the query.
         given: values by name; a name that is a word of Python may end with an underscore (`from_`).
+        command: that has the parameters as options; `msgflow query` and the name when None.
 
     Raises:
         UsageError: unknown or missing parameter, or a value that does not fit.
     """
+    called = header.name if command is None else command
+    command = command or f"msgflow query {header.name}"
     names = [param.name for param in header.params]
     by_name: dict[str, Value] = {}
     for name, value in given.items():
         exact = name if name in names else name.removesuffix("_")
         if exact not in names:
-            raise UsageError(f"{header.name} has no such parameter — {name}", _parameters(header))
+            raise UsageError(f"{called} has no such parameter — {name}", _parameters(header))
         by_name[exact] = value
     bound: dict[str, Value] = {}
     for param in header.params:
         if param.name in by_name:
-            bound[param.name] = _fit(header, param, by_name[param.name])
+            bound[param.name] = _fit(command, param, by_name[param.name])
         elif param.has_default:
             bound[param.name] = param.default
         else:
             raise UsageError(
-                f"{header.name} needs a value for a parameter — {param.name}",
-                f"msgflow query {header.name} --{param.name.replace('_', '-')} {param.type}",
+                f"{called} needs a value for a parameter — {param.name}",
+                f"{command} --{param.name.replace('_', '-')} {param.type}",
             )
     return bound
 
@@ -189,7 +194,7 @@ def first_line(error: Exception) -> str:
     return (text if separator else line).rstrip(".!")
 
 
-def _fit(header: Header, param: Param, value: Value) -> Value:
+def _fit(command: str, param: Param, value: Value) -> Value:
     option = f"--{param.name.replace('_', '-')}"
     if param.name in PLACE_PARAMETERS and isinstance(value, list | tuple):
         value = ",".join(map(str, value))
@@ -199,7 +204,7 @@ def _fit(header: Header, param: Param, value: Value) -> Value:
         except ValueError:
             raise UsageError(
                 f"{option} takes {described_type(param.type)} — {value}",
-                f"msgflow query {header.name} --help",
+                f"{command} --help",
             ) from None
     if param.choices and value is not None and value not in param.choices:
         near = nearest(str(value), param.choices)
@@ -210,7 +215,7 @@ def _fit(header: Header, param: Param, value: Value) -> Value:
     if param.minimum is not None and isinstance(value, int) and value < param.minimum:
         raise UsageError(
             f"{option} is at least {param.minimum} — {value}",
-            f"msgflow query {header.name} {option} {param.minimum}",
+            f"{command} {option} {param.minimum}",
         )
     return value
 

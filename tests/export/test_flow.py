@@ -270,7 +270,7 @@ def test_what_cannot_be_started_from_is_named(small_database: Path) -> None:
             ({"publication_id": 1, "at": "1s"}, "an identity tells"),
             ({"topic": "/chatter", "run": "all"}, "a message is of one run"),
             ({"topic": "/chatter", "at": "noon"}, "cannot read the time of --at"),
-            ({"topic": "/chatter", "direction": "up"}, "no such direction"),
+            ({"topic": "/chatter", "direction": "up"}, "--direction has no such value"),
             ({"topic": "/chatter", "depth": -1}, "depth"),
             ({"topic": "/chatter", "limit": 0}, "limit"),
         ):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import duckdb
@@ -11,6 +12,7 @@ import pytest
 from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.query_command import COMMON_OPTIONS
+from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.query.run import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
@@ -156,10 +158,26 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     (statement,) = connection.extract_statements(program().text(name))
     assert {param.name for param in file.header.params} == statement.named_parameters
     values = {"run_id": 1, "runs": [1], "start_ns": 0, "end_ns": 1, "kind": "take", "id": 1}
-    values |= {"direction": "both", "max_depth": 1, "limit": 1, "internal": False}
     # Those without columns say of what they have the columns; changes reads what is made for it.
     if file.header.columns and name != "changes":
         assert described(program().run(connection, name, values)) == declared(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("comparison", Database.compare), ("flow_steps", Database.flow)]
+)
+def test_methods_have_the_defaults_that_are_declared(
+    name: str, method: Callable[..., object]
+) -> None:
+    declared = {
+        param.name: param.default for param in program().header(name).params if param.has_default
+    }
+    parameters = {
+        key.removesuffix("_"): parameter.default
+        for key, parameter in inspect.signature(method).parameters.items()
+    }
+    assert declared
+    assert declared == {name: parameters[name] for name in declared}
 
 
 @pytest.mark.parametrize("file", VIEWS, ids=str)

@@ -5,10 +5,12 @@
 -- grain: one row per vertex and link that leads to it
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
--- param: direction VARCHAR  'forward', 'backward' or 'both'
--- param: max_depth INTEGER  Most links in a row, each way
--- param: limit INTEGER  Most vertices
--- param: internal BOOLEAN  Follow effects on topics and services of ROS itself too
+-- param: direction VARCHAR {forward|backward|both} = 'both'  Follow what it caused, what caused it,
+--     or both
+-- param: depth INTEGER {0..} = 32  Maximum number of messages in a row, each way
+-- param: limit INTEGER {1..} = 1000  Maximum number of publications, takes, callback instances,
+--     requests and responses
+-- param: internal BOOLEAN = false  Follow effects on topics and services of ROS itself too
 -- param: run_id BIGINT  Its run
 -- needs: main.executor_wait, main.flow_step
 SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
@@ -17,7 +19,11 @@ SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.cand
     w.busy_min_ns, w.busy_max_ns
 FROM main.flow_step(
     $kind, $id,
-    direction := $direction, max_depth := $max_depth, max_vertices := $limit, internal := $internal
+    direction := $direction,
+    -- A message is three steps; no flow within the limit has more than it has vertices.
+    max_depth := least($depth::BIGINT * 3, 10000)::INTEGER,
+    max_vertices := $limit,
+    internal := $internal
 ) AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns

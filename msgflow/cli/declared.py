@@ -1,0 +1,83 @@
+"""Options from the parameters that the header of an SQL file declares."""
+
+from __future__ import annotations
+
+from inspect import Parameter
+from keyword import iskeyword
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from msgflow.cli.completion import complete, is_completing
+from msgflow.query.names import PLACE_PARAMETERS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from msgflow.sql.header import Param
+
+PARAMETERS = "Parameters"
+OWN = "own_"
+
+
+def declared(param: Param, panel: str = PARAMETERS) -> Any:
+    """Return the option for a parameter; without a value the header has the default."""
+    flag = f"--{param.name.replace('_', '-')}"
+    return typer.Option(
+        f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
+        metavar=None if param.type == "BOOLEAN" else param.type,
+        help=escape(_describe(param)),
+        show_default=False,
+        autocompletion=_completion(param),
+        rich_help_panel=panel,
+    )
+
+
+def parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
+    """Return the parameter of a command for a parameter of a header; its name begins with OWN."""
+    kind: Any = bool if param.type == "BOOLEAN" else str
+    if param.name in PLACE_PARAMETERS:
+        kind = list[str]
+    return Parameter(
+        f"{OWN}{param.name}",
+        Parameter.KEYWORD_ONLY,
+        default=None if param.has_default else Parameter.empty,
+        annotation=Annotated[kind | None if param.has_default else kind, declared(param, panel)],
+    )
+
+
+def _completion(param: Param) -> Callable[..., list[str]] | None:
+    if param.name in PLACE_PARAMETERS:
+        return complete("place")
+    return (lambda: list(param.choices)) if param.choices else None
+
+
+def _describe(param: Param) -> str:
+    text = param.description
+    if param.choices:
+        text += f" ({', '.join(param.choices)})"
+    if param.minimum is not None:
+        text += f" (at least {param.minimum})"
+    if param.has_default and param.default is not None:
+        default = param.default
+        text += f" [default: {str(default).lower() if isinstance(default, bool) else default}]"
+    return text
+
+
+def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters that have a value, by the names that Python can give them: `from_`."""
+    own = {name.removeprefix(OWN): value for name, value in words.items() if name.startswith(OWN)}
+    return {
+        name + "_" * iskeyword(name): ",".join(value) if isinstance(value, list) else value
+        for name, value in own.items()
+        if value is not None and value != []
+    }
+
+
+def escape(text: str) -> str:
+    """Return a text that Rich prints as it is."""
+    if is_completing():
+        return text
+    from rich import markup
+
+    return markup.escape(text)
