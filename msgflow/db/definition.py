@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.db import cache as cache_of_user
+from msgflow.db.create import write_new
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
@@ -108,8 +109,6 @@ def expected() -> Mapping[str, str]:
 
 
 def _made() -> Definitions:
-    from msgflow.db.create import write_new  # which needs this module
-
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
         path = Path(directory) / "new.duckdb"
         write_new(path)

@@ -11,15 +11,10 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.db import objects
-from msgflow.db.connection import (
-    is_empty,
-    open_file,
-    recorded_revision,
-    require_current,
-    require_known,
-)
+from msgflow.db.connection import is_empty, recorded_revision, require_current, require_known
 from msgflow.db.create import write_new
 from msgflow.db.definition import require_ours
+from msgflow.db.opening import open_file
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory

@@ -17,9 +17,10 @@ from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migrate
 from msgflow.db.check import run_checks
-from msgflow.db.connection import attach, open_memory, shut_in
+from msgflow.db.connection import attach
 from msgflow.db.derive import derivation_hash, derive
 from msgflow.db.memory import Memory
+from msgflow.db.opening import open_memory, shut_in
 from msgflow.db.runs import require_run_name
 from msgflow.db.spill import most_spilled
 from msgflow.db.store import delete, store

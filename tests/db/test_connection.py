@@ -7,7 +7,7 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from msgflow.db.connection import open_file
+from msgflow.db.opening import open_file
 
 
 def test_asof_joins_compare_in_order_however_few_rows_are_expected(tmp_path: Path) -> None:

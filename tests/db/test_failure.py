@@ -14,7 +14,7 @@ import pytest
 
 import msgflow
 from msgflow.db import migrate
-from msgflow.db.connection import open_file
+from msgflow.db.opening import open_file
 from msgflow.errors import DatabaseError, ExitCode
 from msgflow.ingest import ingest
 from msgflow.sim import simulate

@@ -13,7 +13,8 @@ import duckdb
 import pytest
 
 from msgflow.db import create, definition, derive, migrate, objects
-from msgflow.db.connection import connect, open_file, recorded_revision
+from msgflow.db.connection import connect, recorded_revision
+from msgflow.db.opening import open_file
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
 

@@ -9,8 +9,8 @@ from golden import SYSTEMS, fill
 from ros_system import RosSystem
 from staged_events import Analysis, Thread
 
-from msgflow.db.connection import open_memory
 from msgflow.db.derive import derive
+from msgflow.db.opening import open_memory
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
 

@@ -19,9 +19,10 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 
-from msgflow.db.connection import attach, open_memory
+from msgflow.db.connection import attach
 from msgflow.db.derive import derive
 from msgflow.db.memory import Memory
+from msgflow.db.opening import open_memory
 from msgflow.db.store import delete, store
 from msgflow.ingest import model, reconciled, staging
 from msgflow.ingest.catalogue import load
