@@ -60,10 +60,10 @@ def fresh_database(empty_database: Path, tmp_path: Path) -> Path:
 @pytest.fixture
 def small_database(fresh_database: Path) -> Path:
     """A database with two runs, a node, two topics of which one is internal, and a finding."""
-    from golden import fill
+    from golden import fill_case
 
     with duckdb.connect(str(fresh_database)) as connection:
-        fill(connection, ROOT / "tests" / "support" / "small_database")
+        fill_case(connection, ROOT / "tests" / "support" / "small_database.case")
     return fresh_database
 
 

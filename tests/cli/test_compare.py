@@ -8,7 +8,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill
+from golden import fill_case
 from typer.testing import Result
 
 Msgflow = Callable[..., Result]
@@ -19,7 +19,7 @@ CASES = Path(__file__).parents[1] / "schema" / "cases" / "main.comparison"
 def database(fresh_database: Path) -> Path:
     """Two runs: before (1) with latencies of 300 and 500 ns, after (2) with 300 and 400 ns."""
     with duckdb.connect(str(fresh_database)) as connection:
-        fill(connection, CASES / "paths" / "input")
+        fill_case(connection, CASES / "paths.case")
     return fresh_database
 
 

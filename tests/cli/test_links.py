@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import duckdb
-from golden import fill
+from golden import fill_case
 from typer.testing import Result
 
 from msgflow.db.derive import derive
@@ -59,7 +59,7 @@ def test_what_is_doubtful_of_suggestions_is_said(msgflow: Msgflow, fresh_databas
     case = "several_candidates_of_one_node"
     cases = Path(__file__).parents[1] / "query" / "cases" / "link-suggestions"
     with duckdb.connect(str(fresh_database)) as con:
-        fill(con, cases / case / "input")
+        fill_case(con, cases / f"{case}.case")
         derive(con, 1)
     result = msgflow("links", "suggest", "--db", fresh_database)
     assert result.exit_code == 0

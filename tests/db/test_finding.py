@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 import duckdb
-import golden
 import pytest
+from golden import fill
 
 from msgflow.db import objects
 from msgflow.db.derive import derive
@@ -266,20 +266,14 @@ def database(empty_database: Path, tmp_path: Path) -> duckdb.DuckDBPyConnection:
     return duckdb.connect(str(path))
 
 
-def fill(con: duckdb.DuckDBPyConnection, directory: Path, tables: Tables) -> None:
-    for name, text in tables.items():
-        (directory / f"{name}.csv").write_text(text)
-    golden.fill(con, directory)
-
-
 def test_every_finding_has_a_case() -> None:
     assert {header.name for header in objects.load("finding")} == {f"finding.{n}" for n in CASES}
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_finding(name: str, database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
+def test_finding(name: str, database: duckdb.DuckDBPyConnection) -> None:
     tables, expected = CASES[name]
-    fill(database, tmp_path, tables)
+    fill(database, tables)
     found = [f for f in find(database, [1]) if f.name == name]
     assert [(f.subject, f.count, f.detail) for f in found] == expected
     assert find(database, [2]) == []
@@ -293,10 +287,9 @@ def test_a_finding_says_what_it_means_and_what_to_do(header: objects.Header) -> 
     assert header.cure
 
 
-def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
+def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection) -> None:
     fill(
         database,
-        tmp_path,
         {
             "process": "process_id,pid,name,first_seen_ns,last_seen_ns\n1,1,ros,0,100000\n",
             "node": "node_id,full_name\n1,/node\n",
@@ -316,12 +309,11 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection, tmp_pat
 
 @pytest.mark.parametrize(("step_ms", "is_jump"), [(99, False), (101, True)])
 def test_a_jump_is_more_than_a_tenth_of_a_second(
-    database: duckdb.DuckDBPyConnection, tmp_path: Path, step_ms: int, *, is_jump: bool
+    database: duckdb.DuckDBPyConnection, step_ms: int, *, is_jump: bool
 ) -> None:
     stamp = 12_000_000_000 + step_ms * 1_000_000
     fill(
         database,
-        tmp_path,
         {
             **SOUND,
             "publication": PUBLISHED + "1,1,1,1000,1000,1000\n2,1,1,12000000000,12000000000,9\n",
@@ -334,13 +326,12 @@ def test_a_jump_is_more_than_a_tenth_of_a_second(
 
 @pytest.mark.parametrize(("early_ms", "is_early"), [(490, False), (510, True)])
 def test_a_stream_ends_early_that_ends_half_a_second_before_another(
-    database: duckdb.DuckDBPyConnection, tmp_path: Path, early_ms: int, *, is_early: bool
+    database: duckdb.DuckDBPyConnection, early_ms: int, *, is_early: bool
 ) -> None:
     """However long the recording is."""
     hour = 3_600 * 10**9
     fill(
         database,
-        tmp_path,
         {
             **SOUND,
             "packet": "cpu_id,stream_instance_id,begin_ns,end_ns\n"
@@ -350,13 +341,10 @@ def test_a_stream_ends_early_that_ends_half_a_second_before_another(
     assert [f.name for f in find(database, [1])] == ["stream_ends_early"] * is_early
 
 
-def test_the_chunks_of_a_recording_are_one(
-    database: duckdb.DuckDBPyConnection, tmp_path: Path
-) -> None:
+def test_the_chunks_of_a_recording_are_one(database: duckdb.DuckDBPyConnection) -> None:
     """A CPU was idle in one of them, another in the last: only the latter may lack events."""
     fill(
         database,
-        tmp_path,
         {
             **SOUND,
             "trace": "trace_id,uuid,path\n1,7e90b1e2-0000-4000-8000-000000000001,first\n"
@@ -373,11 +361,10 @@ def test_the_chunks_of_a_recording_are_one(
 
 
 def test_events_discarded_in_lost_packets_are_not_counted(
-    database: duckdb.DuckDBPyConnection, tmp_path: Path
+    database: duckdb.DuckDBPyConnection,
 ) -> None:
     fill(
         database,
-        tmp_path,
         {
             **SOUND,
             "loss_interval": "kind,cpu,start_ns,end_ns,event_count\nloss,0,0,1000000000,82\n"
@@ -397,11 +384,10 @@ def test_events_discarded_in_lost_packets_are_not_counted(
 
 @pytest.mark.parametrize(("count", "name"), [("", "damaged_trace"), ("7", "discarded_events")])
 def test_a_packet_that_was_cut_off_is_no_full_buffer(
-    database: duckdb.DuckDBPyConnection, tmp_path: Path, count: str, name: str
+    database: duckdb.DuckDBPyConnection, count: str, name: str
 ) -> None:
     fill(
         database,
-        tmp_path,
         {
             **SOUND,
             "loss_interval": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
@@ -413,18 +399,15 @@ def test_a_packet_that_was_cut_off_is_no_full_buffer(
     assert {f.name for f in find(database, [1])} == {"damaged_trace", name}
 
 
-def test_a_run_in_which_nothing_happened(
-    database: duckdb.DuckDBPyConnection, tmp_path: Path
-) -> None:
+def test_a_run_in_which_nothing_happened(database: duckdb.DuckDBPyConnection) -> None:
     """Not even what one part would call for of another."""
-    fill(database, tmp_path, {"node": "node_id\n1\n"})
+    fill(database, {"node": "node_id\n1\n"})
     assert [(f.name, f.subject) for f in find(database, [1])] == [("missing_layer", "everything")]
 
 
-def test_errors_come_first(database: duckdb.DuckDBPyConnection, tmp_path: Path) -> None:
+def test_errors_come_first(database: duckdb.DuckDBPyConnection) -> None:
     fill(
         database,
-        tmp_path,
         {
             **SOUND,
             "loss_interval": "kind,cpu,start_ns,end_ns,event_count\npause,,0,9,\nloss,0,20,29,5\n",

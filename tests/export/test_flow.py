@@ -10,7 +10,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill, insert
+from golden import fill_case, insert
 
 from msgflow import Database, UsageError
 from msgflow.export.flow_tree import tree_text
@@ -22,7 +22,7 @@ def database_of(case: str, empty_database: Path, directory: Path) -> Database:
     path = directory / f"{case}.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
-        fill(connection, CASES / case / "input")
+        fill_case(connection, CASES / f"{case}.case")
     return Database(path)
 
 
@@ -57,7 +57,7 @@ def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path
     path = tmp_path / "busy.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
-        fill(connection, CASES.parents[2] / "query/cases/path-breakdown/busy_executor/input")
+        fill_case(connection, CASES.parents[2] / "query/cases/path-breakdown/busy_executor.case")
     with Database(path) as database:
         lines = {}
         for topic in ("/a", "/b", "/c"):
@@ -296,7 +296,7 @@ def test_a_long_chain_is_read_as_far_as_the_limits_say(
     path = tmp_path / "pingpong.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
-        fill(connection, CASES / "ring" / "input")
+        fill_case(connection, CASES / "ring.case")
         for table in ("publication", "take", "callback_instance", "link_transport", "link_causal"):
             connection.execute(f"DELETE FROM store.{table}")
         connection.execute(CHAIN)

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import duckdb
 import pytest
-from golden import fill
+from golden import fill_case
 
 from msgflow import Database, UsageError
 from msgflow.export.graph import GraphFormat, graph_format
@@ -50,7 +50,7 @@ def database_of(case: str, empty_database: Path, directory: Path) -> Database:
     path = directory / f"{case}.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
-        fill(connection, CASES / case / "input")
+        fill_case(connection, CASES / f"{case}.case")
     return Database(path)
 
 

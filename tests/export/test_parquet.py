@@ -13,7 +13,7 @@ import polars
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from golden import fill
+from golden import fill_case
 
 from msgflow import Database, UsageError, __version__
 from msgflow.db.migrate import current_revision
@@ -28,7 +28,7 @@ def recorded(empty_database: Path, tmp_path: Path) -> Iterator[Database]:
     path = tmp_path / "recorded.duckdb"
     shutil.copyfile(empty_database, path)
     with duckdb.connect(str(path)) as connection:
-        fill(connection, CASES / "main.flow_step" / "forward_with_internal" / "input")
+        fill_case(connection, CASES / "main.flow_step" / "forward_with_internal.case")
         connection.execute(
             "UPDATE store.publisher SET gid = unhex('00ff10'), publisher_handle = $large "
             "WHERE publisher_id = 1",

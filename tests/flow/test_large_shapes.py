@@ -25,10 +25,10 @@ def limit(con: duckdb.DuckDBPyConnection, most: str) -> None:
     con.execute("SET threads = 2")
 
 
-def test_a_long_path(fresh_database: Path, tmp_path: Path) -> None:
+def test_a_long_path(fresh_database: Path) -> None:
     con = open_memory()
     con.execute(f"ATTACH '{fresh_database}' AS target; USE target")
-    fill(con, tmp_path / "nothing")
+    fill(con)
     con.execute((SYSTEMS / "long_line.sql").read_text())
     derive(con, 1)
     limit(con, "450MB")

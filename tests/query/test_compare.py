@@ -7,7 +7,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import BASE, fill, insert
+from golden import BASE, fill_case, insert
 
 import msgflow
 from msgflow.errors import UsageError
@@ -298,7 +298,7 @@ def test_percentages_of_what_is_not_positive(fresh_database: Path) -> None:
 
 def test_nothing_holds_of_paths_that_were_left_out(fresh_database: Path) -> None:
     with duckdb.connect(str(fresh_database)) as connection:
-        fill(connection, CASES / "many_paths" / "input")
+        fill_case(connection, CASES / "many_paths.case")
     with msgflow.open_db(fresh_database) as database:
         whole = database.compare(1, 2)
         cut = database.compare(1, 2, max_paths=1)

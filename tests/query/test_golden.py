@@ -29,22 +29,30 @@ def test_differences_are_named() -> None:
     assert golden.compare(rows, [["a"], ["1"]]) == "expected 2 rows, got 1"
 
 
-def make_case(folder: Path, derive: bool) -> Path:
-    """Write a case in which one message is published and taken."""
-    tables = {
-        "publisher": "publisher_id,topic_name\n1,/a\n",
-        "subscription": "subscription_id,topic_name\n1,/a\n",
-        "publication": "publication_id,publisher_id,start_ns,end_ns,source_timestamp_ns\n"
-        "1,1,10,11,10\n",
-        "take": "take_id,subscription_id,taken_ns,source_timestamp_ns,method\n1,1,20,10,rmw\n",
-    }
-    case = folder / "main.flow_forward" / "one_message"
-    (case / "input").mkdir(parents=True)
-    for table, text in tables.items():
-        (case / "input" / f"{table}.csv").write_text(text)
-    (case / "params.json").write_text('{"start_kind": "publication", "start_id": 1}')
-    if derive:
-        (case / "derive").touch()
+CASE = """\
+== params
+{"start_kind": "publication", "start_id": 1}
+== publisher
+publisher_id,topic_name
+1,/a
+== subscription
+subscription_id,topic_name
+1,/a
+== publication
+publication_id,publisher_id,start_ns,end_ns,source_timestamp_ns
+1,1,10,11,10
+== take
+take_id,subscription_id,taken_ns,source_timestamp_ns,method
+1,1,20,10,rmw
+== expected
+"""
+
+
+def make_case(folder: Path, text: str) -> Path:
+    """Write a case of what comes of a publication."""
+    case = folder / "main.flow_forward" / "one_message.case"
+    case.parent.mkdir(parents=True)
+    case.write_text(text)
     return case
 
 
@@ -52,15 +60,29 @@ def test_links_are_derived_where_the_case_says_so(
     pytestconfig: pytest.Config, tmp_path: Path
 ) -> None:
     empty = golden.template(pytestconfig)
-    with_links = golden.evaluate(make_case(tmp_path / "with", derive=True), empty)
-    without = golden.evaluate(make_case(tmp_path / "without", derive=False), empty)
+    with_links = golden.evaluate(make_case(tmp_path / "with", f"== derive\n{CASE}"), empty)
+    without = golden.evaluate(make_case(tmp_path / "without", CASE), empty)
     start = ["publication", "1"]
     assert golden.parse_csv(without)[1:] == [start]
     assert golden.parse_csv(with_links)[1:] == [start, ["take", "1"]]
 
 
 def test_a_column_that_does_not_exist_is_named(pytestconfig: pytest.Config, tmp_path: Path) -> None:
-    case = make_case(tmp_path, derive=False)
-    (case / "input" / "node.csv").write_text("node_id,colour\n1,red\n")
+    case = make_case(tmp_path, f"== node\nnode_id,colour\n1,red\n{CASE}")
     with pytest.raises(ValueError, match=r"store\.node has no column colour"):
         golden.evaluate(case, golden.template(pytestconfig))
+
+
+def test_a_case_has_what_its_system_has_unless_it_says_otherwise(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(golden, "SYSTEMS", tmp_path)
+    (tmp_path / "shared.case").write_text("== node\nnode_id\n1\n== take\ntake_id\n1\n")
+    case = golden.read_case(make_case(tmp_path, "== system shared\n== take\ntake_id\n2\n"))
+    assert case.tables == {"node": "node_id\n1\n", "take": "take_id\n2\n"}
+
+
+def test_an_expected_output_is_replaced() -> None:
+    text = golden.updated(CASE, "kind\ntake\n")
+    assert text == f"{CASE}kind\ntake\n"
+    assert golden.updated(text, "") == CASE

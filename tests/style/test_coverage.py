@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
+from golden import SYSTEMS, read_case
 from sql_files import SqlFile, sql_files
 
 from msgflow.db.table_view import table_views
@@ -40,7 +42,7 @@ def has_logic(file: SqlFile) -> bool:
 
 
 def cases(folder: Path) -> list[Path]:
-    return list(folder.glob("*/expected.csv"))
+    return list(folder.glob("*.case"))
 
 
 @pytest.mark.parametrize("file", QUERIES, ids=str)
@@ -71,5 +73,17 @@ def test_every_case_belongs_to_something_that_exists() -> None:
 
 
 def test_no_expected_output_is_empty() -> None:
-    for path in TESTS.glob("*/cases/*/*/expected.csv"):
-        assert path.stat().st_size, path
+    for path in TESTS.glob("*/cases/*/*.case"):
+        assert read_case(path).expected, path
+
+
+def test_every_system_belongs_to_several_cases() -> None:
+    used = Counter(read_case(path).system for path in TESTS.glob("*/cases/*/*.case"))
+    for path in SYSTEMS.glob("*.case"):
+        assert used[path.stem] > 1, path
+
+
+def test_every_system_that_a_case_names_exists() -> None:
+    for path in TESTS.glob("*/cases/*/*.case"):
+        name = read_case(path).system
+        assert name is None or list(SYSTEMS.glob(f"{name}.*")), path

@@ -1,23 +1,25 @@
-"""Golden cases: a folder with sparse input rows and the output that they have to give.
+"""Golden cases: a file with sparse input rows and the output that they have to give.
 
-    cases/<query or view>/<case>/
-        input/<table>.csv    rows of store.<table>; columns left out are NULL, or where the table
-                             forbids that 1 for a key, else 0, false or an empty text
-        system               name of a file in tests/support/systems that fills the store by SQL,
-                             beside the rows of BASE: what several cases have in common
-        derive               if this file is there, links are derived before
-        params.json          parameters of the query, and run, start, end, skip_first, internal;
-                             or arguments of the macro
-        scratch/<table>.csv  of page queries over what pages compute once per run: its rows
-        expected.csv         the output in order; create it empty for a new case, then let
+    cases/<query or view>/<case>.case has sections, each below a line that names it:
+
+        == system NAME       what several cases have in common, in tests/support/systems: the tables
+                             of NAME.case, each unless the case has it too; or SQL, NAME.sql, that
+                             fills the store beside the rows of BASE
+        == derive            if this section is there, links are derived before
+        == params            parameters of the query, and run, start, end, skip_first, internal; or
+                             arguments of the macro, as JSON
+        == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
+                             forbids NULL 1 for a key, else 0, false or an empty text
+        == scratch TABLE     of page queries over what pages compute once per run: its rows
+        == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
 A query is run as `Database.query` runs it; what the program asks for itself (program.<name>) of
-run 1, likewise over tables of scratch/; a page query (view.<name>) of run 1, with times from 0
+run 1, likewise over tables of scratch; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
 `main.node`) is read whole, a table macro called with its arguments, both sorted by all columns. An
-empty field is NULL, "" is an empty text. Lines of input that begin with # are comments. Tables of
-BASE for which there is no file have one row, of key 1.
+empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables of BASE of
+which a case says nothing have one row, of key 1.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ import io
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +64,65 @@ _PAGE_QUERY = "view."
 _PROGRAM = "program."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _TEMPLATE = pytest.StashKey[Path]()
+_SECTION = "== "
+_EXPECTED = "expected"
+
+
+@dataclass
+class Case:
+    """What the file of a case, or of a system, says.
+
+    Attributes:
+        system: name of the system it is about, if any.
+        derives: whether links are derived.
+        parameters: None where it gives none.
+        tables: CSV of the rows of each table.
+        scratch: CSV of the rows of each table that pages compute.
+        expected: CSV of the output.
+    """
+
+    system: str | None = None
+    derives: bool = False
+    parameters: dict[str, Any] | None = None
+    tables: dict[str, str] = field(default_factory=dict)
+    scratch: dict[str, str] = field(default_factory=dict)
+    expected: str = ""
+
+
+def read_case(path: Path) -> Case:
+    """Return what a file says; its tables include those of its system that it has not itself."""
+    case = Case()
+    for title, text in _sections(path.read_text()):
+        kind, _, name = title.partition(" ")
+        match kind:
+            case "system":
+                case.system = name
+            case "derive":
+                case.derives = True
+            case "params":
+                case.parameters = json.loads(text)
+            case "scratch":
+                case.scratch[name] = text
+            case "expected":
+                case.expected = text
+            case table:
+                case.tables[table] = text
+    if case.system and (shared := SYSTEMS / f"{case.system}.case").exists():
+        case.tables = read_case(shared).tables | case.tables
+    return case
+
+
+def _sections(text: str) -> Iterator[tuple[str, str]]:
+    title, lines = "", []
+    for line in text.splitlines(keepends=True):
+        if line.startswith(_SECTION):
+            if title:
+                yield title, "".join(lines)
+            title, lines = line.removeprefix(_SECTION).strip(), []
+        else:
+            lines.append(line)
+    if title:
+        yield title, "".join(lines)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -70,30 +132,36 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    if file_path.name != "expected.csv":
+    if file_path.suffix != ".case" or "cases" not in file_path.parts:
         return None
     return GoldenFile.from_parent(parent, path=file_path)
 
 
 class GoldenFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
-        folder = self.path.parent
-        yield GoldenCase.from_parent(self, name=f"{folder.parent.name}/{folder.name}")
+        yield GoldenCase.from_parent(self, name=f"{self.path.parent.name}/{self.path.stem}")
 
 
 class GoldenCase(pytest.Item):
     def runtest(self) -> None:
-        folder = self.path.parent
-        actual = evaluate(folder, template(self.config))
-        expected = folder / "expected.csv"
+        actual = evaluate(self.path, template(self.config))
+        expected = read_case(self.path).expected
         if self.config.getoption("--update-golden"):
-            expected.write_text(actual)
-        difference = compare(parse_csv(expected.read_text()), parse_csv(actual))
+            self.path.write_text(updated(self.path.read_text(), actual))
+            expected = actual
+        difference = compare(parse_csv(expected), parse_csv(actual))
         if difference:
             pytest.fail(f"{difference}\n\nactual output:\n{actual}", pytrace=False)
 
     def reportinfo(self) -> tuple[Path, None, str]:
         return self.path, None, self.name
+
+
+def updated(text: str, expected: str) -> str:
+    """Return the text of a case with another output, which is its last section."""
+    title = f"{_SECTION}{_EXPECTED}\n"
+    head, _, _ = text.partition(title)
+    return f"{head}{title}{expected}"
 
 
 def template(config: pytest.Config) -> Path:
@@ -107,23 +175,29 @@ def template(config: pytest.Config) -> Path:
     return config.stash[_TEMPLATE]
 
 
-def evaluate(folder: Path, empty: Path) -> str:
+def evaluate(path: Path, empty: Path) -> str:
     """Return the output of a case as CSV."""
     with tempfile.TemporaryDirectory(prefix="msgflow-case-") as directory:
-        path = Path(directory) / "case.duckdb"
-        shutil.copyfile(empty, path)
-        with duckdb.connect(str(path)) as connection:
-            fill(connection, folder / "input")
-            if (folder / "system").exists():
-                name = (folder / "system").read_text().strip()
-                connection.execute((SYSTEMS / f"{name}.sql").read_text())
-            if (folder / "derive").exists():
+        database = Path(directory) / "case.duckdb"
+        shutil.copyfile(empty, database)
+        with duckdb.connect(str(database)) as connection:
+            case = fill_case(connection, path)
+            if case.derives:
                 for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
                     derive(connection, run_id)
-            result = _result(connection, folder)
+            result = _result(connection, path.parent.name, case)
     stream = io.BytesIO()
     write_result(result, Format.CSV, stream)
     return stream.getvalue().decode()
+
+
+def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
+    """Insert the rows of a case and of its system, and the rows of BASE; return the case."""
+    case = read_case(path)
+    fill(connection, case.tables)
+    if case.system and (script := SYSTEMS / f"{case.system}.sql").exists():
+        connection.execute(script.read_text())
+    return case
 
 
 def compare(expected: Rows, actual: Rows) -> str | None:
@@ -175,13 +249,13 @@ def _after(text: str, wanted: str, position: int) -> int:
     return len(text) if found < 0 else found + 1
 
 
-def fill(connection: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Insert the rows of the CSV files in `directory`, and the rows of BASE."""
-    files = {path.stem: parse_csv(path.read_text()) for path in sorted(directory.glob("*.csv"))}
+def fill(connection: duckdb.DuckDBPyConnection, tables: Mapping[str, str] | None = None) -> None:
+    """Insert rows, CSV by the name of their table, and the rows of BASE."""
+    given = {table: parse_csv(text) for table, text in sorted((tables or {}).items())}
     base: dict[str, Rows] = {
-        table: [list(row), list(row.values())] for table, row in BASE.items() if table not in files
+        table: [list(row), list(row.values())] for table, row in BASE.items() if table not in given
     }
-    for table, (names, *rows) in (base | files).items():
+    for table, (names, *rows) in (base | given).items():
         insert(connection, table, names, rows)
 
 
@@ -220,17 +294,15 @@ def insert(
     connection.unregister("given")
 
 
-def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:
-    parameters = folder / "params.json"
-    given = json.loads(parameters.read_text()) if parameters.exists() else {}
-    name = folder.parent.name
+def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> QueryResult:
+    given = dict(case.parameters or {})
     if name.startswith(_PAGE_QUERY):
-        return QueryResult(_page_rows(connection, folder, name.removeprefix(_PAGE_QUERY), given))
+        return QueryResult(_page_rows(connection, case, name.removeprefix(_PAGE_QUERY), given))
     if name.startswith(_PROGRAM):
-        return QueryResult(_program_rows(connection, folder, name.removeprefix(_PROGRAM), given))
+        return QueryResult(_program_rows(connection, case, name.removeprefix(_PROGRAM), given))
     if "." in name:
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
-        source = f"{name}({arguments})" if parameters.exists() else name
+        source = name if case.parameters is None else f"{name}({arguments})"
         relation = connection.sql(f"SELECT * FROM {source} ORDER BY ALL", params=given)
         return QueryResult(relation.to_arrow_table())
     selection = {key: given.pop(key) for key in _SELECTION if key in given}
@@ -238,28 +310,30 @@ def _result(connection: duckdb.DuckDBPyConnection, folder: Path) -> QueryResult:
 
 
 def _program_rows(
-    connection: duckdb.DuckDBPyConnection, folder: Path, name: str, given: dict[str, Any]
+    connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
-    for path in (folder / "scratch").glob("*.csv"):
-        connection.execute(f"CREATE TEMP TABLE {path.stem} AS FROM read_csv(?)", [str(path)])
+    for table, text in case.scratch.items():
+        with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+            file.write(text)
+            file.flush()
+            connection.execute(f"CREATE TEMP TABLE {table} AS FROM read_csv(?)", [file.name])
     return program().run(connection, name, _FRAME | given).to_arrow_table()
 
 
 def _page_rows(
-    connection: duckdb.DuckDBPyConnection, folder: Path, name: str, given: dict[str, Any]
+    connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     values = _FRAME | given
     (recorded,) = run_page_query(connection, "recorded_window", values).to_pylist()
     values = recorded | values
-    files = sorted((folder / "scratch").glob("*.csv"))
-    if not files:
+    if not case.scratch:
         return run_page_query(connection, name, values)
     scratch = Scratch()
-    for path in files:
-        names, *rows = parse_csv(path.read_text())
+    for table_name, text in sorted(case.scratch.items()):
+        names, *rows = parse_csv(text)
         columns = [list(column) for column in zip(*rows, strict=True)]
         table = pa.table(columns, names=[str(name) for name in names])
-        scratch.fill(path.stem, _FRAME["run"], lambda table=table: table)
+        scratch.fill(table_name, _FRAME["run"], lambda table=table: table)
     try:
         return scratch.ask(name, values)
     finally:

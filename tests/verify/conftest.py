@@ -15,9 +15,9 @@ from msgflow.verify import Verification
 
 
 @pytest.fixture
-def system(fresh_database: Path, tmp_path: Path) -> Path:
+def system(fresh_database: Path) -> Path:
     with duckdb.connect(str(fresh_database)) as connection:
-        fill(connection, tmp_path / "no_input")
+        fill(connection)
         connection.execute((SYSTEMS / "many_messages.sql").read_text())
         derive(connection, 1)
     return fresh_database
