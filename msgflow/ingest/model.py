@@ -44,7 +44,7 @@ def build(
     headers = objects.load("model")
     dropped: set[str] = set()
     for position, header in enumerate(headers):
-        memory.run(functools.partial(con.execute, _statement(header)))
+        memory.run(functools.partial(con.execute, statement(header)))
         if not keep:
             for name in _finished(headers, position) - dropped:
                 con.execute(f"DROP TABLE {name}")
@@ -53,7 +53,8 @@ def build(
             built(header.name)
 
 
-def _statement(header: Header) -> str:
+def statement(header: Header) -> str:
+    """Return the statement that creates an object of the model."""
     if header.kind == "macro":
         return header.body
     kind = "VIEW" if header.kind == "inline" else "TABLE"

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from staged_events import Analysis
+from analysis import Analysis
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from analysis import Analysis
 from ros_system import RosSystem
-from staged_events import Analysis, Thread
+from staged_events import Thread
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import duckdb
+from analysis import Analysis
 from golden import SYSTEMS, fill
 from ros_system import RosSystem
-from staged_events import Analysis, Thread
+from staged_events import Thread
 
 from msgflow.db.derive import derive
 from msgflow.db.opening import open_memory

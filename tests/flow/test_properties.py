@@ -5,11 +5,11 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
+from analysis import Analysis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from random_system import random_system
 from ros_system import RosSystem
-from staged_events import Analysis
 
 from msgflow.db.tables import metadata
 from msgflow.ingest.catalogue import load

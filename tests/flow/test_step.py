@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from analysis import Analysis
 from random_system import random_system
-from staged_events import Analysis
 
 MACROS = {"forward": "flow_forward", "backward": "flow_backward", "both": "flow_both"}
 STARTS = """

@@ -8,9 +8,9 @@ from typing import Any
 
 import duckdb
 import pytest
+from analysis import Analysis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from staged_events import Analysis
 
 from msgflow.db import objects
 

@@ -5,8 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from analysis import Analysis
 from ros_system import RosSystem
-from staged_events import Analysis, Thread
+from staged_events import Thread
 
 from msgflow import Database
 

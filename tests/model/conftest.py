@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from analysis import Analyse, Analysis
 from ros_system import RosSystem
-from staged_events import Analyse, Analysis
 
 
 @pytest.fixture

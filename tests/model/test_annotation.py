@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from analysis import Analyse, Analysis
 from ros_system import RosSystem
-from staged_events import Analyse, Analysis, Thread
+from staged_events import Thread
 
 MAIN = Thread(100)
 

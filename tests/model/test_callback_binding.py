@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from analysis import Analyse
 from ros_system import RosSystem
-from staged_events import Analyse, Thread
+from staged_events import Thread
 
 MAIN = Thread(100)
 STAMPS = (

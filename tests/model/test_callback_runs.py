@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from analysis import Analyse
 from ros_system import RosSystem
-from staged_events import Analyse, Thread
+from staged_events import Thread
 
 MAIN = Thread(100)
 RUNS = "SELECT start_ns, end_ns, depth, parent_id FROM callback_instance ORDER BY 1"

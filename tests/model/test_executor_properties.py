@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
+from analysis import Analyse, Analysis
 from random_executor import random_executor
-from staged_events import Analyse, Analysis
 
 KINDS = [(threads, with_events) for threads in (1, 2, 3) for with_events in (True, False)]
 SEEDS = range(3)

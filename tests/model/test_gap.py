@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from analysis import Analyse
 from ros_system import RosSystem
-from staged_events import Analyse, Thread
+from staged_events import Thread
 
 HERE, THERE = Thread(100, cpu=0), Thread(100, cpu=1)
 RUNS = "SELECT start_ns, end_ns, is_loss_affected FROM callback_instance ORDER BY start_ns"

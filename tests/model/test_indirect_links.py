@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from random import Random
 
+from analysis import Analysis
 from annotated_history import History, Publication, Run, reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_system import RosSystem
-from staged_events import Analysis, Thread
+from staged_events import Thread
 
 SUBSCRIPTIONS = (0x11, 0x12, 0x13)
 PUBLISHERS = (0x21, 0x22)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 from random import Random
 
 import pytest
+from analysis import Analyse
 from ros_system import RosSystem
-from staged_events import Analyse, Thread
+from staged_events import Thread
 
 TALKER = Thread(100)
 LISTENER = Thread(200)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from analysis import Analyse
 from ros_system import WRITER, RosSystem
-from staged_events import STEP_NS, Analyse, Thread
+from staged_events import STEP_NS, Thread
 
 MAIN = Thread(100)
 MIDDLEWARE = Thread(100, 109, "dds.udp")

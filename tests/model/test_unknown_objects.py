@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from analysis import Analyse, Analysis
 from ros_system import RosSystem
-from staged_events import Analyse, Analysis, Thread
+from staged_events import Thread
 
 from msgflow.db.check import run_checks
 

@@ -3,28 +3,21 @@
     events = StagedEvents()
     events.add("ros2:rcl_publish", Thread(100), publisher_handle=0x10, message=0xA)
 
-`write` fills the tables of `raw` and `staging` that the model is built from; `Analysis` runs the
+`write` fills the tables of `raw` and `staging` that the model is built from; analysis.py runs the
 rest of an ingest on them.
 """
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import duckdb
 import pyarrow as pa
 
-from msgflow.db.connection import attach
-from msgflow.db.derive import derive
-from msgflow.db.memory import Memory
-from msgflow.db.opening import open_memory
-from msgflow.db.store import delete, store
-from msgflow.ingest import model, reconciled, staging
+from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
@@ -231,86 +224,3 @@ def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: pa.RecordBatch) ->
     con.register("staged_rows", rows)
     con.execute(f"INSERT INTO {table} SELECT * FROM staged_rows")
     con.unregister("staged_rows")
-
-
-class Analysis:
-    """What an ingest makes of staged events: run 1 of a database with nothing else.
-
-    One connection serves many tests, as opening and attaching takes as long as the rest: `build`
-    replaces what was built before.
-    """
-
-    def __init__(self, empty_database: Path, directory: Path) -> None:
-        path = directory / "analysis.duckdb"
-        shutil.copyfile(empty_database, path)
-        self.connection = open_memory()
-        self.connection.execute("SET threads = 1")
-        attach(self.connection, path)
-        staging.attach(self.connection, Path(":memory:"))
-        self._tables = self._tables_of("raw"), self._tables_of("staging")
-        self._views = self._views_of_staging()
-
-    def build(self, events: StagedEvents) -> Analysis:
-        """Build the model of these events and derive its links."""
-        self._clear()
-        events.write(self.connection)
-        model.build(self.connection, Memory(self.connection, None), keep=True)
-        self.connection.begin()
-        store(self.connection, 1)
-        self.connection.execute(
-            "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
-            "VALUES (1, 'case', TIMESTAMP '1970-01-01', '', '')"
-        )
-        derive(self.connection, 1)
-        self.connection.commit()
-        return self
-
-    def rows(self, sql: str) -> list[tuple[Any, ...]]:
-        """Return the rows of a query."""
-        return self.connection.execute(sql).fetchall()
-
-    def value(self, sql: str) -> Any:
-        """Return the only value of a query that gives one row of one column."""
-        ((value,),) = self.rows(sql)
-        return value
-
-    def column(self, sql: str) -> list[Any]:
-        """Return the values of a query that gives one column."""
-        return [value for (value,) in self.rows(sql)]
-
-    def close(self) -> None:
-        self.connection.close()
-
-    def _tables_of(self, database: str) -> set[str]:
-        return set(
-            self.column(
-                "SELECT table_name FROM duckdb_tables() "
-                f"WHERE database_name = '{database}' AND schema_name = 'main'"
-            )
-        )
-
-    def _views_of_staging(self) -> set[str]:
-        return set(
-            self.column(
-                "SELECT view_name FROM duckdb_views() "
-                "WHERE database_name = 'staging' AND schema_name = 'main'"
-            )
-        )
-
-    def _clear(self) -> None:
-        raw, given = self._tables
-        for table in self._tables_of("staging") - given:
-            self.connection.execute(f"DROP TABLE staging.{table}")
-        for view in self._views_of_staging() - self._views:
-            self.connection.execute(f"DROP VIEW staging.{view}")
-        for database, tables in (("raw", raw), ("staging", given)):
-            self.connection.begin()
-            for table in tables:
-                self.connection.execute(f"DELETE FROM {database}.{table}")
-            self.connection.commit()
-        self.connection.begin()
-        delete(self.connection, [1])
-        self.connection.commit()
-
-
-Analyse = Callable[[StagedEvents], Analysis]

@@ -1,0 +1,209 @@
+"""The rest of an ingest on staged events: as much of it as a test asks for."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import duckdb
+from staged_events import StagedEvents
+
+from msgflow.db import objects
+from msgflow.db.connection import attach
+from msgflow.db.derive import DERIVED, DERIVED_FROM_LINKS, derive
+from msgflow.db.opening import open_memory
+from msgflow.db.store import delete, store
+from msgflow.ingest import model, staging
+from msgflow.ingest.reported import restore
+
+_NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
+# What is stored of links and of what is missing comes of whole derivations.
+_DERIVED = {f"store.{name}" for name in (*DERIVED, *DERIVED_FROM_LINKS)}
+# The audits read what they like.
+_EVERYTHING = "the whole model"
+
+
+class Analysis:
+    """What an ingest makes of staged events: run 1 of a database with nothing else.
+
+    One connection serves many tests, as opening and attaching takes as long as the rest: `build`
+    replaces what was built before. A test mostly reads one view; only what that view needs, by the
+    headers of the SQL files, is built: every statement of the model takes as long to plan as to run
+    on a few rows. Whoever takes `connection` gets all of it.
+    """
+
+    def __init__(self, empty_database: Path, directory: Path) -> None:
+        path = directory / "analysis.duckdb"
+        shutil.copyfile(empty_database, path)
+        self._connection = open_memory()
+        self._connection.execute("SET threads = 1")
+        attach(self._connection, path)
+        staging.attach(self._connection, Path(":memory:"))
+        self._tables = self._tables_of("raw"), self._tables_of("staging")
+        self._views = self._views_of_staging()
+        self._built: set[str] | None = None
+        self._is_derived = False
+
+    @property
+    def connection(self) -> duckdb.DuckDBPyConnection:
+        """The database with the whole model of the events, and its links."""
+        self._provide(_EVERYTHING)
+        return self._connection
+
+    def build(self, events: StagedEvents) -> Analysis:
+        """Take these events in place of those before."""
+        self._clear()
+        events.write(self._connection)
+        restore(self._connection)
+        self._built = set()
+        self._is_derived = False
+        return self
+
+    def rows(self, sql: str) -> list[tuple[Any, ...]]:
+        """Return the rows of a query."""
+        self._provide(sql)
+        return self._read(sql)
+
+    def value(self, sql: str) -> Any:
+        """Return the only value of a query that gives one row of one column."""
+        ((value,),) = self.rows(sql)
+        return value
+
+    def column(self, sql: str) -> list[Any]:
+        """Return the values of a query that gives one column."""
+        return [value for (value,) in self.rows(sql)]
+
+    def close(self) -> None:
+        self._provide(_EVERYTHING)
+        self._connection.close()
+
+    def _provide(self, sql: str) -> None:
+        """Build what a query reads and is not there yet."""
+        if self._built is None:
+            return
+        needed = _everything() if sql == _EVERYTHING else _needed(sql)
+        links = not needed.isdisjoint(_DERIVED)
+        missing = {name for name in needed if name.startswith("staging.")} - self._built
+        if missing:
+            self._model(missing)
+        if (links or self._has_topics_to_learn()) and not self._is_derived:
+            missing = _model_of_links() - self._built
+            if missing:
+                self._model(missing)
+            self._connection.begin()
+            derive(self._connection, 1)
+            self._connection.commit()
+            self._is_derived = True
+
+    def _model(self, names: set[str]) -> None:
+        """Build these objects of the model and store all that there are."""
+        assert self._built is not None
+        for header in objects.load("model"):
+            if header.name in names:
+                self._connection.execute(model.statement(header))
+        self._built |= names
+        self._connection.begin()
+        delete(self._connection, [1])
+        store(self._connection, 1)
+        self._connection.execute(
+            "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
+            "VALUES (1, 'case', TIMESTAMP '1970-01-01', '', '')"
+        )
+        self._connection.commit()
+        self._is_derived = False
+
+    def _has_topics_to_learn(self) -> bool:
+        (row,) = self._read(
+            "SELECT EXISTS (FROM store.publisher WHERE topic_name IS NULL) "
+            "OR EXISTS (FROM store.subscription WHERE topic_name IS NULL)"
+        )
+        return bool(row[0])
+
+    def _read(self, sql: str) -> list[tuple[Any, ...]]:
+        return self._connection.execute(sql).fetchall()
+
+    def _tables_of(self, database: str) -> set[str]:
+        return {
+            name
+            for (name,) in self._read(
+                "SELECT table_name FROM duckdb_tables() "
+                f"WHERE database_name = '{database}' AND schema_name = 'main'"
+            )
+        }
+
+    def _views_of_staging(self) -> set[str]:
+        return {
+            name
+            for (name,) in self._read(
+                "SELECT view_name FROM duckdb_views() "
+                "WHERE database_name = 'staging' AND schema_name = 'main'"
+            )
+        }
+
+    def _clear(self) -> None:
+        con = self._connection
+        raw, given = self._tables
+        for table in self._tables_of("staging") - given:
+            con.execute(f"DROP TABLE staging.{table}")
+        for view in self._views_of_staging() - self._views:
+            con.execute(f"DROP VIEW staging.{view}")
+        for database, tables in (("raw", raw), ("staging", given)):
+            con.begin()
+            for table in tables:
+                con.execute(f"DELETE FROM {database}.{table}")
+            con.commit()
+        con.begin()
+        delete(con, [1])
+        con.commit()
+
+
+Analyse = Callable[[StagedEvents], Analysis]
+
+
+@cache
+def _needs() -> dict[str, frozenset[str]]:
+    """Return what every object of the model and of the database needs, tables of it included."""
+    needs = {header.name: frozenset(header.needs) for header in objects.load("model")}
+    for name in list(needs):
+        needs[name.replace("staging.", "store.")] = frozenset({name})
+    for header in objects.views():
+        needs[header.name] = frozenset(header.needs)
+        needs.setdefault(f"main.{header.name.partition('.')[2]}", frozenset())
+    return needs
+
+
+@cache
+def _needed(sql: str) -> frozenset[str]:
+    """Return all that a query needs; a name without its schema is that of a public view."""
+    found = [
+        f"{schema or 'main'}.{name}"
+        for schema, name in _NAME.findall(sql)
+        if schema or f"main.{name}" in _needs()
+    ]
+    return frozenset(_closure(found))
+
+
+def _closure(names: Iterator[str] | list[str] | frozenset[str]) -> set[str]:
+    waiting, found = list(names), set()
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += _needs().get(name, ())
+    return found
+
+
+@cache
+def _everything() -> frozenset[str]:
+    return frozenset(_closure([header.name for header in objects.load("model")]) | _DERIVED)
+
+
+@cache
+def _model_of_links() -> set[str]:
+    """Return what derivations read of the model, whatever the events."""
+    derived = [name.replace("store.", "derive.") for name in _DERIVED]
+    return {name for name in _closure([*derived, "derive.topic_learned"]) if "staging." in name}
