@@ -1,0 +1,31 @@
+"""CONTRIBUTING.md names what there is: every room, and files where they lie."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+NAMED = re.findall(r"`([\w./-]+)`", TEXT)
+PLACES = ("msgflow", "schema", "tests", "docs", "benchmarks", "queries")
+ROOMS = [
+    folder
+    for parent in ("msgflow", "schema", "schema/model", "schema/link", "schema/stat")
+    for folder in sorted((ROOT / parent).iterdir())
+    if folder.is_dir() and folder.name not in ("__pycache__", "_data")
+]
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in NAMED if "/" in n and n.split("/")[0] in PLACES and n == n.lower()]
+)
+def test_every_place_exists(name: str) -> None:
+    assert (ROOT / name).exists()
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: str(room.relative_to(ROOT)))
+def test_every_room_is_named(room: Path) -> None:
+    assert any(room.name in name.split("/") for name in NAMED)
