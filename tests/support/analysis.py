@@ -14,7 +14,7 @@ from staged_events import StagedEvents
 
 from msgflow.db import objects
 from msgflow.db.connection import attach
-from msgflow.db.derive import DERIVED, DERIVED_FROM_LINKS, derive
+from msgflow.db.derive import derive, derived_tables
 from msgflow.db.opening import open_memory
 from msgflow.db.store import delete, store
 from msgflow.ingest import model, staging
@@ -22,7 +22,7 @@ from msgflow.ingest.reported import restore
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 # What is stored of links and of what is missing comes of whole derivations.
-_DERIVED = {f"store.{name}" for name in (*DERIVED, *DERIVED_FROM_LINKS)}
+_DERIVED = {f"store.{name}" for name in derived_tables()}
 # The audits read what they like.
 _EVERYTHING = "the whole model"
 
