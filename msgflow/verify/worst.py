@@ -6,6 +6,8 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from msgflow.sql.statement import program
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -27,8 +29,8 @@ class Worst:
     command: str
 
 
-# By what a row of the query that measures is known, and SQL that gives duration, begin and identity
-# of its worst case, with what that is.
+# By what a row of the query that measures is known. Duration, begin and identity of its worst case,
+# and what that is, come from the statement `worst_…`, of flows from the query's own.
 KEYS = {
     "flow": "path",
     "lost_flow": "path",
@@ -49,36 +51,6 @@ FROM ({}) WHERE path = $subject AND status = 'lost'
 ORDER BY root_ns, root_id LIMIT 1
 """,
 }
-_SQL = {
-    "callback": """
-SELECT end_ns - start_ns AS worst_ns, start_ns, callback_instance_id, 'callback_instance'
-FROM main.callback_instance
-WHERE callback_id = $key AND end_ns IS NOT NULL AND start_ns >= $start_ns AND start_ns < $end_ns
-ORDER BY worst_ns DESC, start_ns, callback_instance_id LIMIT 1
-""",
-    "late_call": """
-SELECT wait_ns, start_ns, callback_instance_id, 'callback_instance'
-FROM main.executor_wait
-WHERE callback_id = $key AND since = 'timer' AND NOT is_loss_affected
-    AND start_ns >= $start_ns AND start_ns < $end_ns
-ORDER BY wait_ns DESC, start_ns, callback_instance_id LIMIT 1
-""",
-    "message": """
-SELECT l.latency_ns, t.taken_ns, t.take_id, 'take'
-FROM main.link_transport AS l
-JOIN main.take AS t ON l.take_id = t.take_id
-WHERE t.subscription_id = $key AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns
-ORDER BY l.latency_ns DESC, t.taken_ns, t.take_id LIMIT 1
-""",
-    "request": """
-SELECT p.taken_ns - q.sent_ns AS worst_ns, q.sent_ns, q.request_id, 'request'
-FROM main.request AS q
-JOIN main.response AS p ON q.request_id = p.request_id
-WHERE [q.service_id, q.client_id] = $key AND q.sent_ns >= $start_ns AND q.sent_ns < $end_ns
-    AND p.taken_ns IS NOT NULL
-ORDER BY worst_ns DESC, q.sent_ns, q.request_id LIMIT 1
-""",
-}
 
 
 def find_worst(
@@ -92,14 +64,13 @@ def find_worst(
         key: of the row that failed.
         window: begin and end, epoch ns.
     """
-    row = connection.execute(
-        _SQL[kind], {"key": key, "start_ns": window[0], "end_ns": window[1]}
-    ).fetchone()
-    return None if row is None else worst_of(row)
+    asked = {"key": key, "start_ns": window[0], "end_ns": window[1]}
+    rows = program().run(connection, f"worst_{kind}", asked).fetchall()
+    return worst_of(rows[0]) if rows else None
 
 
 def worst_of(row: Sequence[Any]) -> Worst:
-    """Return the worst case that a row of the SQL above tells."""
+    """Return the worst case that a row of such a statement tells."""
     duration, at_ns, identity, kind = row
     words = ["msgflow", "flow", f"--{kind.replace('_', '-')}", str(identity)]
     return Worst(duration, at_ns, shlex.join(words))
