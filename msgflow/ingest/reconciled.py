@@ -10,12 +10,15 @@ process is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 
 from msgflow.ingest.catalogue import load
+from msgflow.resources import resource_directory
+from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,118 +29,8 @@ if TYPE_CHECKING:
 # By how much the two records of one event may be apart [ns], at the ends of a recording.
 _SLACK_NS = 100_000
 
-_SOURCES = """
-CREATE OR REPLACE TEMP TABLE session_trace AS
-SELECT
-    trace_index,
-    dense_rank() OVER (ORDER BY clock_key, hostname) AS host,
-    dense_rank() OVER (ORDER BY clock_key, hostname, coalesce(uuid, '')) AS session
-FROM staging.source
-"""
-
-# Processes whose PID namespace only some traces tell, and always the same one.
-_NAMESPACES = """
-CREATE OR REPLACE TEMP TABLE told_namespace AS
-SELECT s.host, r.vpid, any_value(r.pid_ns) AS pid_ns
-FROM raw.thread AS r
-JOIN session_trace AS s ON r.trace_index = s.trace_index
-WHERE r.vpid >= 0
-GROUP BY s.host, r.vpid
-HAVING count(DISTINCT r.pid_ns) = 1 AND count(*) > count(r.pid_ns)
-"""
-
-# From when to when a session recorded on each CPU.
-_COVERAGE = """
-CREATE OR REPLACE TEMP TABLE coverage AS
-SELECT
-    s.host,
-    s.session,
-    p.cpu_id,
-    min(coalesce(p.begin_ns, o.begin_ns, p.last_event_ns)) AS begin_ns,
-    max(greatest(p.end_ns, p.last_event_ns, p.begin_ns)) AS end_ns
-FROM raw.packet AS p
-JOIN session_trace AS s ON p.trace_index = s.trace_index
-JOIN staging.source AS o ON p.trace_index = o.trace_index
-WHERE o.domain IS DISTINCT FROM 'kernel'
-GROUP BY s.host, s.session, p.cpu_id
-"""
-
-_OVERLAPS = """
-CREATE OR REPLACE TEMP TABLE overlap AS
-SELECT
-    a.session AS left_session,
-    b.session AS used_session,
-    a.cpu_id,
-    b.begin_ns - {slack} AS begin_ns,
-    b.end_ns + {slack} AS end_ns
-FROM coverage AS a
-JOIN coverage AS b
-    ON a.host = b.host
-    AND a.session <> b.session
-    AND a.cpu_id IS NOT DISTINCT FROM b.cpu_id
-    AND a.begin_ns <= b.end_ns
-    AND b.begin_ns <= a.end_ns
-"""
-
-# Of the sessions that recorded a tracepoint on a thread that with most events of the thread is
-# used, and of the others what it does not have.
-_LEFT_OUT = """
-CREATE OR REPLACE TEMP TABLE left_out AS
-WITH event AS (
-    {events}
-),
-thread AS (
-    SELECT
-        r.thread_index,
-        min(r.thread_index) OVER (
-            PARTITION BY s.host, coalesce(r.pid_ns, n.pid_ns), r.vpid, r.vtid
-        ) AS thread
-    FROM raw.thread AS r
-    JOIN session_trace AS s ON r.trace_index = s.trace_index
-    LEFT JOIN told_namespace AS n ON s.host = n.host AND r.vpid = n.vpid
-),
-placed AS (
-    SELECT e.event_id, e.tracepoint, e.ts_ns, e.cpu_id, e.trace_index, s.session, t.thread
-    FROM event AS e
-    JOIN session_trace AS s ON e.trace_index = s.trace_index
-    JOIN thread AS t ON e.thread_index = t.thread_index
-    WHERE s.session IN (SELECT left_session FROM overlap)
-),
-recorded AS (
-    SELECT
-        thread, tracepoint, session,
-        sum(count(*)) OVER (PARTITION BY thread, session) AS event_count,
-        min(min(trace_index)) OVER (PARTITION BY session) AS first_index
-    FROM placed
-    GROUP BY thread, tracepoint, session
-),
-preferred AS (
-    SELECT
-        l.thread, l.tracepoint, l.session AS left_session, u.session AS used_session,
-        u.first_index AS used_index
-    FROM recorded AS l
-    JOIN recorded AS u
-        ON l.thread = u.thread
-        AND l.tracepoint = u.tracepoint
-        AND (-u.event_count, u.first_index) < (-l.event_count, l.first_index)
-)
-SELECT
-    p.event_id,
-    any_value(p.trace_index) AS trace_index,
-    min(f.used_index) AS used_index,
-    any_value(p.thread) AS thread,
-    any_value(p.ts_ns) AS ts_ns
-FROM placed AS p
-JOIN preferred AS f
-    ON p.thread = f.thread AND p.tracepoint = f.tracepoint AND p.session = f.left_session
-JOIN overlap AS o
-    ON f.left_session = o.left_session
-    AND f.used_session = o.used_session
-    AND p.cpu_id IS NOT DISTINCT FROM o.cpu_id
-    AND p.ts_ns >= o.begin_ns
-    AND p.ts_ns <= o.end_ns
-GROUP BY p.event_id
-"""
+# Tables that are made of each other, in this order, and gone in the end.
+_TABLES = ("session_trace", "told_namespace", "coverage", "overlap")
 
 _REPORT = """
 INSERT INTO staging.left_out
@@ -197,11 +90,13 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
     Args:
         con: connection with `raw` and `staging` attached and filled; `staging.left_out` is filled.
     """
-    for statement in (_SOURCES, _NAMESPACES, _COVERAGE, _OVERLAPS.format(slack=_SLACK_NS)):
-        con.execute(statement)
+    for table in _TABLES:
+        _make(con, table)
     left_out = np.empty(0, np.int64)
     if con.execute("SELECT 1 FROM overlap LIMIT 1").fetchall():
-        con.execute(_LEFT_OUT.format(events=_events()))
+        con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
+        _make(con, "left_out")
+        con.execute("DROP VIEW thread_event")
         con.execute(_REPORT)
         left_out = con.execute("SELECT event_id FROM left_out ORDER BY ALL").fetchnumpy()[
             "event_id"
@@ -209,7 +104,7 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
         con.execute("DROP TABLE left_out")
     told = con.execute("SELECT host, vpid, pid_ns FROM told_namespace").fetchnumpy()
     hosts = con.execute("SELECT host FROM session_trace ORDER BY trace_index").fetchnumpy()["host"]
-    for table in ("session_trace", "told_namespace", "coverage", "overlap"):
+    for table in _TABLES:
         con.execute(f"DROP TABLE {table}")
     processes = _process(told["host"], told["vpid"])
     order = np.argsort(processes)
@@ -221,8 +116,20 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
     )
 
 
+def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:
+    """Make a temporary table as `schema/reconcile` has it."""
+    header = _statements().header(table)
+    values = {"slack_ns": _SLACK_NS} if header.params else {}
+    con.execute(f"CREATE OR REPLACE TEMP TABLE {table} AS\n{header.body}", values)
+
+
+@cache
+def _statements() -> Statements:
+    return Statements("reconcile", resource_directory("schema") / "reconcile")
+
+
 def _events() -> str:
-    return "\n    UNION ALL\n    ".join(
+    return " UNION ALL ".join(
         f"SELECT event_id, ts_ns, trace_index, cpu_id, thread_index, {number} AS tracepoint "
         f"FROM raw.{tracepoint.table}"
         for number, tracepoint in enumerate(load().of_threads)

@@ -12,12 +12,13 @@ from msgflow.sql.header import Header, read
 
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
-    "model", "store", "link", "clock", "delivery", "flow", "stat", "public",
+    "model", "reconcile", "store", "link", "clock", "delivery", "flow", "stat", "public",
     "check", "finding", "queries", "program",
 )  # fmt: skip
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
     "model": "staging",
+    "reconcile": "reconcile",
     "link": "derive",
     "clock": "derive",
     "delivery": "derive",

@@ -1,0 +1,10 @@
+-- name: reconcile.session_trace
+-- description: Which host each trace is of, and which session of that host. A session is all traces
+--     of one uuid.
+-- grain: one row per trace
+-- needs: staging.source
+SELECT
+    trace_index,
+    dense_rank() OVER (ORDER BY clock_key, hostname) AS host,
+    dense_rank() OVER (ORDER BY clock_key, hostname, coalesce(uuid, '')) AS session
+FROM staging.source

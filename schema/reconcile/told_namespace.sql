@@ -1,0 +1,10 @@
+-- name: reconcile.told_namespace
+-- description: Processes whose PID namespace only some traces tell, and always the same one.
+-- grain: one row per process
+-- needs: reconcile.session_trace
+SELECT s.host, r.vpid, any_value(r.pid_ns) AS pid_ns
+FROM raw.thread AS r
+JOIN session_trace AS s ON r.trace_index = s.trace_index
+WHERE r.vpid >= 0
+GROUP BY s.host, r.vpid
+HAVING count(DISTINCT r.pid_ns) = 1 AND count(*) > count(r.pid_ns)
