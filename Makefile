@@ -17,15 +17,16 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test bench truth fuzz babeltrace chromium clean
+.PHONY: help demo test bench truth fuzz mutants babeltrace chromium clean
 
 help:
-	@echo 'make demo   simulate a robot, ingest its trace, print end-to-end latency'
-	@echo 'make test   style, types, import contracts, tests'
-	@echo 'make bench  speed and memory of reading and ingesting, beside Babeltrace 2'
-	@echo 'make truth  precision and recall on systems of which everything is known, minutes'
-	@echo 'make fuzz   damaged traces, archives, databases and files through all of msgflow'
-	@echo 'make clean  remove what these made'
+	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
+	@echo 'make test    style, types, import contracts, tests'
+	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
+	@echo 'make truth   precision and recall on systems of which everything is known, minutes'
+	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
+	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
+	@echo 'make clean   remove what these made'
 
 demo: $(VENV)/.installed
 	rm -rf $(DEMO)
@@ -56,6 +57,9 @@ truth: $(VENV)/.installed
 
 fuzz: $(VENV)/.installed
 	$(BIN)/python benchmarks/fuzz.py
+
+mutants: $(VENV)/.developed
+	$(BIN)/python benchmarks/mutants.py
 
 $(VENV)/.made:
 	@! command -v $(PYTHON) >/dev/null 2>&1 \

@@ -1,10 +1,11 @@
 """Which changes of the numbers and comparisons of SQL files no test notices.
 
-    python benchmarks/mutants.py FILE… --tests SELECTION… [--line N]… [--replace OLD NEW]…
+    python benchmarks/mutants.py [FILE… --tests SELECTION…] [--line N]… [--replace OLD NEW]…
         [--timeout 300]
 
 Collects the tests once, then for each number of the files (doubled, halved) and each comparison
 (turned round), or each place of OLD, runs them in a child that reads the file with that one change.
+Without files: the rules of `RULES`, each with the tests that are about it (`make mutants`).
 No file is written. Prints a line for each change: the test that failed first, or `SURVIVED`.
 Numbers 0 and 1 and those in comments and quotes are left alone. The exit code is 1 if a change
 survived.
@@ -16,6 +17,7 @@ import argparse
 import os
 import re
 import signal
+import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from msgflow.db import objects
+from msgflow.db import derive, objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,6 +38,19 @@ TOKEN = re.compile(
 )
 TURNED = {"<=": ">", ">=": "<", "<": ">=", ">": "<=", "<>": "="}
 TRIVIAL = {"0", "1"}
+# Rules with numbers of their own, and the tests that have to notice when one changes.
+RULES = (
+    (
+        "link/nearest",
+        ("test_nearest_rules", "test_pair_rules", "test_clock_rules", "test_stamp_clock"),
+    ),
+    ("delivery/delivery_limit.sql", ("test_delivery_rules", "test_orphan_rules")),
+    ("delivery/undelivered.sql", ("test_delivery_rules",)),
+    ("delivery/orphan_take.sql", ("test_orphan_rules", "test_delivery_rules")),
+    ("clock/clock_hull.sql", ("test_clock_hull", "test_clock_pair")),
+    ("clock/clock_pair.sql", ("test_clock_pair", "test_clock_hull")),
+    ("clock/clock_sync.sql", ("test_clock_chain", "test_clock_pair")),
+)
 
 
 @dataclass(frozen=True)
@@ -147,8 +162,20 @@ def _change(mutant: Mutant) -> None:
 
     Path.read_text = changed  # type: ignore[assignment, method-assign]
     # What collecting the tests has read.
-    for cached in (objects.load, objects.definition_hash, objects.derivation_hash):
+    for cached in (objects.load, objects.views, objects.definition_hash, derive.derivation_hash):
         cached.cache_clear()
+
+
+def every_rule(options: Sequence[str]) -> int:
+    """Try every change of `RULES`, each in a process of its own; return the exit code."""
+    codes = []
+    for place, tests in RULES:
+        found = ROOT / "schema" / place
+        files = sorted(found.glob("*.sql")) if found.is_dir() else [found]
+        command = [sys.executable, __file__, *(str(file.relative_to(ROOT)) for file in files)]
+        command += ["--tests", *(f"tests/schema/{test}.py" for test in tests), *options]
+        codes.append(subprocess.run(command, cwd=ROOT, check=False).returncode)
+    return max(codes)
 
 
 def main() -> None:
@@ -156,12 +183,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="from the root")
-    parser.add_argument("--tests", nargs="+", required=True, help="what pytest is to run")
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="from the root")
+    parser.add_argument("--tests", nargs="+", help="what pytest is to run")
     parser.add_argument("--line", action="append", type=int, help="only changes of this line")
     parser.add_argument("--replace", action="append", nargs=2, default=[], metavar=("OLD", "NEW"))
     parser.add_argument("--timeout", type=int, default=300, help="seconds for the tests")
     arguments = parser.parse_args()
+    if not arguments.files:
+        sys.exit(every_rule(sys.argv[1:]))
+    if not arguments.tests:
+        parser.error("which tests? give --tests")
     loop = Loop(
         [
             mutant

@@ -46,6 +46,16 @@ class Memory:
         yield
         self._con.execute("SET memory_limit = ?", [self._limit])
 
+    @contextlib.contextmanager
+    def one_thread(self) -> Iterator[None]:
+        """Let one thread do all work of the database."""
+        ((usual,),) = self._con.execute("SELECT current_setting('threads')").fetchall()
+        self._con.execute("SET threads = 1")
+        try:
+            yield
+        finally:
+            self._con.execute(f"SET threads = {usual}")
+
     def run(self, work: Callable[[], _T]) -> _T:
         """Return what `work` returns; it is run again with twice the memory where that was short.
 

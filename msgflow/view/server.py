@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
 # Enough for most of what pages ask of ten million events. What needs more gets it, alone.
-USUAL_MEMORY = "250MB"
-_GROWTH = 2.5
+USUAL_MEMORY = "180MB"
+_GROWTH = 1.3
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1
@@ -82,7 +82,8 @@ class Identity:
 class Turns:
     """Lets questions run together; one that then has too little memory is asked again, alone.
 
-    Then the memory limit grows for it, as far as it may.
+    Then one thread works for it, which needs less: each thread keeps partitions of its own. Where
+    that does not suffice, the memory limit grows, as far as it may.
     """
 
     def __init__(self, memory: Memory) -> None:
@@ -101,10 +102,9 @@ class Turns:
             answer = _if_memory_suffices(question)
         if answer is not None:
             return answer
-        with self._turn(alone=True):
+        with self._turn(alone=True), self._memory.one_thread():
             try:
-                # In large steps: what fails on the way has worked nearly to its end.
-                self._memory.grow(_GROWTH)
+                # In small steps: how much is taken decides how large the server gets.
                 while (answer := _if_memory_suffices(question)) is None:
                     if not self._memory.grow(_GROWTH):
                         raise QueryError(
