@@ -21,7 +21,7 @@ bound AS (
         coalesce(c.reference_clock_id, -c.clock_id) AS together,
         coalesce(k.greatest_ns, c.uncertainty_ns) AS bound_ns
     FROM main.clock AS c
-    JOIN clock_host AS n ON c.clock_id = n.clock_id
+    LEFT JOIN clock_host AS n ON c.clock_id = n.clock_id
     LEFT JOIN known AS k ON c.clock_id = k.clock_id
     WHERE list_contains($runs, c.run_id)
 )
