@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from inspect import Parameter, Signature
+from keyword import iskeyword
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -83,7 +84,8 @@ def command(
 
     parse_conditions(fail_on or [])
     with Database(database) as opened:
-        comparison = opened.compare(run_a, run_b, internal=internal, **given_of(own))
+        given = {name + "_" * iskeyword(name): value for name, value in given_of(own).items()}
+        comparison = opened.compare(run_a, run_b, internal=internal, **given)
     result = comparison.result
     is_table = form in (None, Format.TABLE) and output is None
     if only_different is not None or (is_table and not wide and is_screen()):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from inspect import Parameter
-from keyword import iskeyword
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -65,10 +64,10 @@ def _describe(param: Param) -> str:
 
 
 def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters that have a value, by the names that Python can give them: `from_`."""
+    """Return the parameters that have a value, by the names that the header has."""
     own = {name.removeprefix(OWN): value for name, value in words.items() if name.startswith(OWN)}
     return {
-        name + "_" * iskeyword(name): ",".join(value) if isinstance(value, list) else value
+        name: ",".join(value) if isinstance(value, list) else value
         for name, value in own.items()
         if value is not None and value != []
     }
