@@ -31,6 +31,20 @@ users read. Times are `BIGINT` nanoseconds since the epoch on the common time ax
 for filtering. Handles are addresses: they mean something only within a process, and only until they
 are used again. `msgflow db schema` prints the same list from a database.
 
+A *gap* is a stretch of a trace in which events may be missing: see [messages.md](messages.md#gaps).
+All that is named after gaps, also where users do not see it:
+
+| name | what it has |
+| --- | --- |
+| `gap` | the gaps of the traces, each with its CPU and kind |
+| `thread_break` | the first event of each thread behind a gap |
+| `recording_gap` | gaps of all traces of one recording, as lookups by time need them |
+| `process_gap` | when each process may have done something that is not in its traces |
+| `near_gap` | events with a gap before them, since the event of their thread, or kind, before |
+| `behind_gap` | those of them that are not paired with the event before |
+| `beside_gap` | events of calls with a gap right before or right after them |
+| `callback_gap` | events of calls behind a gap, numbered on each thread |
+
 """
 
 _QUERIES = """\

@@ -17,7 +17,7 @@
 -- column: is_internal BOOLEAN    ROS uses the topic for itself
 -- brief: scope, subject, measure, affected, total, affected_percent
 -- answer: affected
--- needs: main.trace, main.loss_interval, main.process, main.host, main.callback_instance,
+-- needs: main.trace, main.gap, main.process, main.host, main.callback_instance,
 --     main.node, main.publisher, main.subscription, main.callback, main.take, main.stat_orphan,
 --     main.stat_delivery, main.link_transport, main.link_causal, main.run
 WITH gap_edge AS (
@@ -27,7 +27,7 @@ WITH gap_edge AS (
             PARTITION BY run_id, trace_id ORDER BY start_ns, end_ns
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
         ) AS covered_until_ns
-    FROM main.loss_interval
+    FROM main.gap
 ),
 gap AS (
     SELECT

@@ -256,8 +256,8 @@ packet = _table(
     _count("lost_packet_count", "Packets missing right before it"),
 )
 
-loss_interval = _table(
-    "loss_interval",
+gap = _table(
+    "gap",
     "One row per gap in a trace",
     "Gaps in the traces: no two events are paired across one.",
     _run(),

@@ -2,11 +2,11 @@
 -- description: Kinds, methods, states and severities are words of the vocabulary.
 -- grain: one row per word that is not
 -- severity: error
--- needs: store.loss_interval, store.clock, store.callback, store.annotation, store.take,
+-- needs: store.gap, store.clock, store.callback, store.annotation, store.take,
 --     store.executor_state, store.ring_buffer_event, store.link_transport, store.link_causal,
 --     store.undelivered, store.orphan_take, store.diagnostic
-SELECT DISTINCT run_id, 'loss_interval.kind' AS place, kind AS word
-FROM store.loss_interval
+SELECT DISTINCT run_id, 'gap.kind' AS place, kind AS word
+FROM store.gap
 WHERE kind NOT IN ('loss', 'packets', 'pause')
 UNION ALL
 SELECT DISTINCT run_id, 'clock.method', method

@@ -2,10 +2,10 @@
 -- description: Processes of which events may have been lost while they were created: a gap other
 --     than a pause lies before the first callback instance, or before the process was seen at all.
 -- grain: one row per process
--- needs: derive.process_presence, derive.recording, store.callback_instance, store.loss_interval
+-- needs: derive.process_presence, derive.recording, store.callback_instance, store.gap
 WITH loss AS (
     SELECT r.recording_id, min(l.start_ns) AS start_ns
-    FROM store.loss_interval AS l
+    FROM store.gap AS l
     JOIN derive.recording AS r ON l.trace_id = r.trace_id
     WHERE l.kind <> 'pause'
     GROUP BY r.recording_id

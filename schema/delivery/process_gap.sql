@@ -6,7 +6,7 @@
 --     to stop and to go on. So for a process, a pause lasts from its last event before the pause
 --     to its first one after it.
 -- grain: one row per process and gap
--- needs: derive.process_presence, derive.recording, store.loss_interval, store.publication,
+-- needs: derive.process_presence, derive.recording, store.gap, store.publication,
 --     store.take, store.callback_instance, store.executor_state, store.thread
 CREATE OR REPLACE MACRO derive.process_gap(only_run) AS TABLE
 WITH presence AS MATERIALIZED (
@@ -16,7 +16,7 @@ WITH presence AS MATERIALIZED (
 ),
 interval_of_process AS MATERIALIZED (
     SELECT p.run_id, p.process_id, l.kind, l.start_ns, l.end_ns
-    FROM store.loss_interval AS l
+    FROM store.gap AS l
     JOIN derive.recording AS r ON l.trace_id = r.trace_id
     JOIN presence AS p ON r.recording_id = p.recording_id
 ),

@@ -6,7 +6,7 @@
 --     counts from the begin of the recording.
 -- grain: one row per process and recording (the chunks of one trace) that it did something in
 -- needs: derive.recording, store.trace, store.process, store.publication, store.take,
---     store.callback_instance, store.node, store.publisher, store.subscription, store.loss_interval
+--     store.callback_instance, store.node, store.publisher, store.subscription, store.gap
 WITH recording AS (
     SELECT
         r.run_id,
@@ -21,7 +21,7 @@ WITH recording AS (
 ),
 lossy AS (
     SELECT r.run_id, r.recording_id, min(l.start_ns) AS start_ns
-    FROM store.loss_interval AS l
+    FROM store.gap AS l
     JOIN recording AS r ON l.trace_id = r.trace_id
     WHERE l.kind <> 'pause'
     GROUP BY r.run_id, r.recording_id

@@ -12,7 +12,7 @@
 --     the size given above; or enable fewer events, or write to a faster disk.
 -- grain: one row per trace
 -- severity: error
--- needs: main.loss_interval, main.trace, store.packet, store.diagnostic, derive.counted
+-- needs: main.gap, main.trace, store.packet, store.diagnostic, derive.counted
 WITH damaged AS (
     SELECT DISTINCT trace_id FROM store.diagnostic WHERE name = 'damaged_trace'
 ),
@@ -24,7 +24,7 @@ loss AS (
             THEN least(sum(g.event_count), 9007199254740992)::BIGINT END AS events,
         max(g.event_count) AS largest,
         sum(g.end_ns - g.start_ns) AS length_ns
-    FROM main.loss_interval AS g
+    FROM main.gap AS g
     LEFT JOIN damaged AS d ON g.trace_id = d.trace_id
     WHERE g.kind = 'loss' AND (g.event_count IS NOT NULL OR d.trace_id IS NULL)
     GROUP BY g.trace_id

@@ -11,7 +11,7 @@
 --     recording together.
 -- grain: one row per trace
 -- severity: error
--- needs: main.loss_interval, main.trace, derive.counted
+-- needs: main.gap, main.trace, derive.counted
 SELECT
     t.run_id,
     t.path AS subject,
@@ -22,7 +22,7 @@ SELECT
         derive.counted(count(DISTINCT g.cpu), 'CPU'),
         sum(g.end_ns - g.start_ns) / 1e9
     ) AS detail
-FROM main.loss_interval AS g
+FROM main.gap AS g
 JOIN main.trace AS t ON g.trace_id = t.trace_id
 WHERE g.kind = 'packets'
 GROUP BY t.run_id, t.trace_id, t.path

@@ -7,7 +7,7 @@
 --     pauses out with --start and --end.
 -- grain: one row per trace
 -- severity: warning
--- needs: main.loss_interval, main.trace, derive.counted
+-- needs: main.gap, main.trace, derive.counted
 SELECT
     t.run_id,
     t.path AS subject,
@@ -17,7 +17,7 @@ SELECT
         derive.counted(count(*), 'pause'), sum(g.end_ns - g.start_ns) / 1e9,
         max(g.end_ns - g.start_ns) / 1e9
     ) AS detail
-FROM main.loss_interval AS g
+FROM main.gap AS g
 JOIN main.trace AS t ON g.trace_id = t.trace_id
 WHERE g.kind = 'pause'
 GROUP BY t.run_id, t.trace_id, t.path

@@ -1,7 +1,7 @@
 -- name: staging.diagnostic
 -- description: What was found in the input while the model was built.
 -- grain: one row per finding
--- needs: staging.event_count, staging.damage, staging.loss_interval, staging.process,
+-- needs: staging.event_count, staging.damage, staging.gap, staging.process,
 --     staging.callback_instance, staging.callback_left_over,
 --     staging.node, staging.publisher, staging.subscription, staging.callback, staging.host,
 --     staging.left_out, staging.source, staging.publisher_known, staging.subscription_known,
@@ -142,7 +142,7 @@ SELECT
             'times at which tracing was paused, %.3f s in all', sum(end_ns - start_ns) / 1e9
         )
     END
-FROM staging.loss_interval
+FROM staging.gap
 -- Events that are missing from a packet that was cut off are reported as damaged_trace.
 WHERE kind <> 'loss'
     OR event_count IS NOT NULL

@@ -40,7 +40,7 @@
 --     if it did not arrive, as long as the longest flow of the path took
 -- needs: derive.known_word, derive.flow_chain, derive.flow_root, derive.flow_transport,
 --     derive.flow_continuation,
---     main.publication, main.callback_instance, main.take, main.loss_interval, store.undelivered
+--     main.publication, main.callback_instance, main.take, main.gap, store.undelivered
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,
@@ -320,7 +320,7 @@ gap AS (
         max(end_ns) OVER (
             PARTITION BY run_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
         ) AS covered_until_ns
-    FROM main.loss_interval
+    FROM main.gap
     WHERE list_contains(runs, run_id)
 )
 SELECT

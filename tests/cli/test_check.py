@@ -58,7 +58,7 @@ def test_nothing_is_wrong(msgflow: Msgflow, database: Path) -> None:
 
 
 def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> None:
-    add(database, "loss_interval", pause())
+    add(database, "gap", pause())
     result = msgflow("check", "--db", database)
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
@@ -73,7 +73,7 @@ def test_warnings_leave_the_exit_code_at_0(msgflow: Msgflow, database: Path) -> 
 
 
 def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> None:
-    add(database, "loss_interval", pause(), loss(5))
+    add(database, "gap", pause(), loss(5))
     add(database, "packet", {"event_count": "900"})
     result = msgflow("check", "--db", database)
     assert result.exit_code == 1
@@ -90,7 +90,7 @@ def test_json_has_every_place_under_the_number_of_its_finding(
     msgflow: Msgflow, database: Path
 ) -> None:
     add(database, "process", *({"process_id": str(n), "pid": str(n)} for n in range(2, 14)))
-    add(database, "loss_interval", pause())
+    add(database, "gap", pause())
     result = msgflow("check", "--format", "json", "--db", database)
     rows = json.loads(result.stdout)
     assert [row["number"] for row in rows] == [1] * 12 + [2]
@@ -110,7 +110,7 @@ def test_a_run_that_does_not_exist(msgflow: Msgflow, database: Path) -> None:
 
 def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) -> None:
     add(database, "run", {"run_id": "2", "name": "other"})
-    add(database, "loss_interval", pause())
+    add(database, "gap", pause())
     alone = msgflow("check", "--run", "case", "--db", database).stdout
     assert "   trace — 1 pause, " in alone
     every = msgflow("check", "--run", "all", "--db", database).stdout

@@ -118,7 +118,7 @@ def test_what_is_known_of_ros_does_not_change(make: Make, ingest: Ingest) -> Non
     def known() -> dict[str, list[tuple[Any, ...]]]:
         found = {
             table: rows(database, f"SELECT * EXCLUDE (trace_id) FROM {table} ORDER BY ALL")
-            for table in ("publication", "take", "callback_instance", "loss_interval")
+            for table in ("publication", "take", "callback_instance", "gap")
         }
         found |= {
             table: rows(database, f"FROM {table} ORDER BY ALL") for table in ("process", "thread")

@@ -36,7 +36,7 @@ TWO_HOSTS: Tables = {
 CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
     "discarded_events": (
         {
-            "loss_interval": "kind,cpu,start_ns,end_ns,event_count\n"
+            "gap": "kind,cpu,start_ns,end_ns,event_count\n"
             "loss,0,1000000000,1250000000,20000\nloss,1,3000000000,3250000000,5000\n"
             "pause,,5,6,\n",
             "packet": "cpu_id,event_count,discarded_event_count\n0,10000,0\n1,900,25000\n",
@@ -51,14 +51,11 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
         ],
     ),
     "lost_packets": (
-        {"loss_interval": "kind,cpu,start_ns,end_ns\npackets,0,0,2000000000\nloss,0,5,6\n"},
+        {"gap": "kind,cpu,start_ns,end_ns\npackets,0,0,2000000000\nloss,0,5,6\n"},
         [("trace", 1, "1 place on 1 CPU, 2.000 s in all")],
     ),
     "tracing_paused": (
-        {
-            "loss_interval": "kind,start_ns,end_ns\n"
-            "pause,0,1000000000\npause,5000000000,5500000000\n"
-        },
+        {"gap": "kind,start_ns,end_ns\npause,0,1000000000\npause,5000000000,5500000000\n"},
         [("trace", 2, "2 pauses, 1.500 s in all, the longest 1.000 s")],
     ),
     "damaged_trace": (
@@ -115,7 +112,7 @@ CASES: dict[str, tuple[Tables, list[tuple[str, int, str]]]] = {
             "publisher": "publisher_id,process_id,is_inferred,is_internal\n"
             "1,1,true,false\n2,2,true,false\n3,3,true,false\n",
             "node": "node_id,process_id,is_inferred\n1,1,false\n2,2,false\n3,3,false\n",
-            "loss_interval": "trace_id,kind,cpu,start_ns,end_ns\n1,loss,0,5,6\n",
+            "gap": "trace_id,kind,cpu,start_ns,end_ns\n1,loss,0,5,6\n",
             "callback_instance": "callback_instance_id,process_id,trace_id,start_ns,end_ns\n"
             "1,1,1,20,30\n2,2,1,3,4\n3,3,2,20,30\n",
         },
@@ -367,7 +364,7 @@ def test_events_discarded_in_lost_packets_are_not_counted(
         database,
         {
             **SOUND,
-            "loss_interval": "kind,cpu,start_ns,end_ns,event_count\nloss,0,0,1000000000,82\n"
+            "gap": "kind,cpu,start_ns,end_ns,event_count\nloss,0,0,1000000000,82\n"
             "loss,0,2000000000,2500000000,\n",
             "packet": "event_count,discarded_event_count\n400,82\n400,\n",
         },
@@ -390,7 +387,7 @@ def test_a_packet_that_was_cut_off_is_no_full_buffer(
         database,
         {
             **SOUND,
-            "loss_interval": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
+            "gap": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
             "packet": "event_count\n100\n",
             "diagnostic": "trace_id,name,severity,count,detail\n"
             "1,damaged_trace,data_loss,1,cut off\n",
@@ -410,7 +407,7 @@ def test_errors_come_first(database: duckdb.DuckDBPyConnection) -> None:
         database,
         {
             **SOUND,
-            "loss_interval": "kind,cpu,start_ns,end_ns,event_count\npause,,0,9,\nloss,0,20,29,5\n",
+            "gap": "kind,cpu,start_ns,end_ns,event_count\npause,,0,9,\nloss,0,20,29,5\n",
             "packet": "event_count\n100\n",
         },
     )

@@ -286,7 +286,7 @@ def test_gaps_are_slices_of_their_host(tmp_path: Path) -> None:
             " CROSS JOIN run AS r ORDER BY trace_id LIMIT 1"
         ).fetchall()
         connection.executemany(
-            "INSERT INTO store.loss_interval BY NAME SELECT 1 AS run_id, ? AS trace_id, ? AS cpu,"
+            "INSERT INTO store.gap BY NAME SELECT 1 AS run_id, ? AS trace_id, ? AS cpu,"
             " ? AS kind, ? AS start_ns, ? AS end_ns, ? AS event_count",
             [
                 (trace, cpu, kind, begin + start, begin + end, count)

@@ -23,6 +23,6 @@ def test_a_cut_packet_is_not_blamed_on_buffers(
     assert "damaged_trace" in names
     assert "discarded_events" not in names
     with connect(new_database, read_only=True) as connection:
-        gaps = connection.execute("SELECT kind, event_count FROM loss_interval").fetchall()
+        gaps = connection.execute("SELECT kind, event_count FROM gap").fetchall()
         assert ("loss", None) in gaps
         assert "discarded_events" not in {finding.name for finding in find(connection, [1])}

@@ -15,7 +15,7 @@ from msgflow.trace import open as open_traces
 
 OTHER = UUID(int=0x2A)
 # What says which trace something comes from, and ids that follow from the number of events.
-PER_TRACE = {"trace", "packet", "run", "diagnostic", "loss_interval", "stamp_clock"}
+PER_TRACE = {"trace", "packet", "run", "diagnostic", "gap", "stamp_clock"}
 
 
 @pytest.fixture

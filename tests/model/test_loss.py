@@ -10,7 +10,7 @@ from staged_events import Thread
 from msgflow.db.finding import find
 
 MS = 1_000_000
-GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM loss_interval ORDER BY start_ns, cpu"
+GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM gap ORDER BY start_ns, cpu"
 
 
 def test_continuous_packets_have_no_gap(system: RosSystem, analyse: Analyse) -> None:
@@ -133,7 +133,7 @@ def test_traces_pause_apart(system: RosSystem, analyse: Analyse) -> None:
     system.add_packet(0, 60 * MS, trace=0)
     system.add_packet(0, 10 * MS, trace=1)
     system.add_packet(50 * MS, 60 * MS, trace=1)
-    assert analyse(system).rows("SELECT trace_id, kind, start_ns, end_ns FROM loss_interval") == [
+    assert analyse(system).rows("SELECT trace_id, kind, start_ns, end_ns FROM gap") == [
         (2, "pause", 10 * MS, 50 * MS)
     ]
 
@@ -307,7 +307,7 @@ def test_buffers_that_wrapped_are_a_snapshot(
 ) -> None:
     """As packets before the first one are missing, or, without numbers, may be."""
     silent_at(system, 2_050 * MS, lost_packets=lost)
-    assert analyse(system).rows("SELECT * FROM loss_interval WHERE kind = 'pause'") == []
+    assert analyse(system).rows("SELECT * FROM gap WHERE kind = 'pause'") == []
 
 
 def test_a_rotation_ends_packets_too(system: RosSystem, analyse: Analyse) -> None:

@@ -25,7 +25,7 @@ CREATE TABLE store.callback_instance (run_id BIGINT DEFAULT 1, process_id BIGINT
 CREATE TABLE store.node (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1, created_ns BIGINT);
 CREATE TABLE store.publisher AS FROM store.node;
 CREATE TABLE store.subscription AS FROM store.node;
-CREATE TABLE store.loss_interval (trace_id BIGINT DEFAULT 1, kind VARCHAR, start_ns BIGINT,
+CREATE TABLE store.gap (trace_id BIGINT DEFAULT 1, kind VARCHAR, start_ns BIGINT,
     end_ns BIGINT);
 CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT, start_ns BIGINT);
 CREATE TABLE store.thread (thread_id BIGINT, process_id BIGINT DEFAULT 1);
@@ -35,7 +35,7 @@ INSERT INTO store.trace (trace_id) VALUES (1);
 RULES = ("process_presence", "process_gap", "lossy_start")
 CREATED = "INSERT INTO store.{} (run_id, process_id, created_ns) VALUES (1, 1, {})"
 # A gap of this kind.
-GAP = "INSERT INTO store.loss_interval (kind, start_ns, end_ns) VALUES ('{}', {}, {})"
+GAP = "INSERT INTO store.gap (kind, start_ns, end_ns) VALUES ('{}', {}, {})"
 SEEN = "INSERT INTO store.process (first_seen_ns) VALUES ({})"
 CALLED = "INSERT INTO store.callback_instance (start_ns, end_ns) VALUES ({}, {})"
 # Trace 2 is another recording of the process; or a chunk of the same one.

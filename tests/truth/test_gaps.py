@@ -52,7 +52,7 @@ def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
     if is_complete:
         assert {kind for kind, score in found.items() if score.missing} == set()
     with duckdb.connect(str(database), read_only=True) as connection:
-        rows = connection.execute("SELECT DISTINCT kind FROM loss_interval").fetchall()
+        rows = connection.execute("SELECT DISTINCT kind FROM gap").fetchall()
     assert {kind for (kind,) in rows} == gaps
 
 
@@ -86,7 +86,7 @@ def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -
     with duckdb.connect(str(database), read_only=True) as connection:
         rows = connection.execute(
             "SELECT kind, round((l.start_ns - r.start_ns) / 1e6)::BIGINT "
-            "FROM loss_interval AS l CROSS JOIN run AS r WHERE kind = 'pause'"
+            "FROM gap AS l CROSS JOIN run AS r WHERE kind = 'pause'"
         ).fetchall()
     assert rows == [("pause", at) for at in pauses]
     scores, drops = compare_simulated(database, simulation.truth)

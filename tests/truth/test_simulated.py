@@ -252,7 +252,7 @@ def test_nothing_is_guessed_and_nothing_was_lost(complete: Ingested) -> None:
         assert complete.rows(f"SELECT * FROM {view} WHERE is_inferred") == []
     assert complete.rows("SELECT * FROM take WHERE method <> 'rmw'") == []
     assert complete.rows("SELECT * FROM callback WHERE kind = 'unknown'") == []
-    assert complete.rows("SELECT * FROM loss_interval") == []
+    assert complete.rows("SELECT * FROM gap") == []
 
 
 def test_a_take_without_publication_is_none_of_a_traced_publisher(simulated: Ingested) -> None:

@@ -256,5 +256,5 @@ def test_executors(trace: Ingested) -> None:
 
 
 def test_nothing_is_wrong_with_the_input(trace: Ingested) -> None:
-    assert trace.rows("SELECT * FROM loss_interval") == []
+    assert trace.rows("SELECT * FROM gap") == []
     assert trace.rows("SELECT * FROM diagnostic WHERE severity IN ('data_loss', 'error')") == []

@@ -165,7 +165,7 @@ def test_a_long_gap_is_shaded(way: str, demo: Path, tmp_path: Path, page: Page) 
                 )
         connection.execute(f"UPDATE store.run SET end_ns = end_ns + {later}")
         connection.execute(
-            "INSERT INTO store.loss_interval SELECT 1, min(trace_id), NULL, 'pause',"
+            "INSERT INTO store.gap SELECT 1, min(trace_id), NULL, 'pause',"
             f" {middle}, {middle + later}, NULL FROM store.trace"
         )
     with shown_as(way, path, page) as address:

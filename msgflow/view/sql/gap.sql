@@ -11,12 +11,12 @@
 -- column: length BIGINT [ns]  Length
 -- column: event_count BIGINT  Events lost, where the tracer counted them
 -- column: total BIGINT  Gaps of the run
--- needs: main.loss_interval, main.trace, main.host
+-- needs: main.gap, main.trace, main.host
 WITH longest AS (
     SELECT
         h.hostname AS host, g.kind, g.start_ns, g.end_ns, g.event_count,
         count(*) OVER () AS total
-    FROM main.loss_interval AS g
+    FROM main.gap AS g
     JOIN main.trace AS t ON g.trace_id = t.trace_id
     JOIN main.host AS h ON t.host_id = h.host_id
     WHERE g.run_id = $run AND g.start_ns IS NOT NULL AND g.end_ns IS NOT NULL

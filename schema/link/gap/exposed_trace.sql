@@ -1,12 +1,12 @@
 -- name: derive.exposed_trace
 -- description: Traces whose recording has gaps.
 -- grain: one row per such trace
--- needs: derive.recording, store.loss_interval
+-- needs: derive.recording, store.gap
 SELECT run_id, trace_id, recording_id
 FROM (
     SELECT
         run_id, trace_id, recording_id,
-        bool_or(trace_id IN (SELECT trace_id FROM store.loss_interval)) OVER (
+        bool_or(trace_id IN (SELECT trace_id FROM store.gap)) OVER (
             PARTITION BY run_id, recording_id
         ) AS has_gaps
     FROM derive.recording

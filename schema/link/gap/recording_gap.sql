@@ -3,11 +3,11 @@
 --     take the last gap that starts before the end of the window. One touches it if `start_ns` or
 --     `covered_until_ns` of that gap is at or after the begin of the window.
 -- grain: one row per gap in a recording
--- needs: store.loss_interval, derive.exposed_trace
+-- needs: store.gap, derive.exposed_trace
 SELECT
     l.run_id,
     x.recording_id,
     l.start_ns,
     max(l.end_ns) OVER (PARTITION BY x.recording_id ORDER BY l.start_ns) AS covered_until_ns
-FROM store.loss_interval AS l
+FROM store.gap AS l
 JOIN derive.exposed_trace AS x ON l.trace_id = x.trace_id

@@ -5,10 +5,10 @@
 --     part.
 -- grain: one row per such event and side
 -- needs: staging.callback_gap, staging.predecessor, staging.event, staging.thread,
---     staging.process, staging.gap, staging.exposed_trace
+--     staging.process, staging.recording_gap, staging.exposed_trace
 WITH last_gap AS (
     SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
-    FROM staging.gap
+    FROM staging.recording_gap
     GROUP BY recording_index, cpu_id
 )
 SELECT event_id, thread_id, true AS is_behind
@@ -34,7 +34,7 @@ FROM staging.event AS e
 JOIN staging.thread AS t ON e.event_id = t.first_event_id
 JOIN staging.process AS p ON t.process_id = p.process_id
 JOIN staging.exposed_trace AS x ON e.trace_index = x.trace_index
-JOIN staging.gap AS g
+JOIN staging.recording_gap AS g
     ON x.recording_index = g.recording_index
     AND g.cpu_id IN (e.cpu_id, -1)
     AND g.start_ns < e.ts_ns

@@ -1,9 +1,10 @@
 -- name: staging.near_gap
 -- description: Events with a gap between themselves and their predecessor in a sequence of their
---     thread. `is_between`: on the CPU of either, or a pause, so that the record of the thread is
---     interrupted. Else on other CPUs only, which the thread may have visited meanwhile.
+--     thread, of which 'thread' has all events. `is_between`: on the CPU of either, or a pause, so
+--     that the record of the thread is interrupted. Else on other CPUs only, which the thread may
+--     have visited meanwhile.
 -- grain: one row per event and sequence
--- needs: staging.predecessor, staging.event, staging.exposed_trace, staging.gap
+-- needs: staging.predecessor, staging.event, staging.exposed_trace, staging.recording_gap
 WITH exposed AS (
     SELECT
         e.event_id, e.thread_index, e.trace_index, e.sequence, e.ts_ns, e.cpu_id,
@@ -11,6 +12,13 @@ WITH exposed AS (
     FROM staging.predecessor AS e
     JOIN staging.event AS p ON e.previous_event_id = p.event_id
     WHERE e.trace_index IN (SELECT trace_index FROM staging.exposed_trace)
+    UNION ALL
+    SELECT
+        event_id, thread_index, trace_index, 'thread', ts_ns, cpu_id,
+        lag(ts_ns) OVER on_thread, lag(cpu_id) OVER on_thread
+    FROM staging.event
+    WHERE trace_index IN (SELECT trace_index FROM staging.exposed_trace)
+    WINDOW on_thread AS (PARTITION BY thread_index ORDER BY event_id)
 ),
 near AS (
     SELECT
@@ -21,7 +29,7 @@ near AS (
         FROM exposed AS x
         JOIN staging.exposed_trace AS t ON x.trace_index = t.trace_index
     ) AS e
-    ASOF JOIN staging.gap AS g
+    ASOF JOIN staging.recording_gap AS g
         ON e.recording_index = g.recording_index AND e.ts_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.any_covered_until_ns > e.previous_ns
 ),
@@ -34,11 +42,11 @@ place AS (
 between_the_two AS (
     SELECT DISTINCT e.event_id, e.sequence
     FROM place AS e
-    ASOF JOIN staging.gap AS g
+    ASOF JOIN staging.recording_gap AS g
         ON e.recording_index = g.recording_index AND e.cpu_id = g.cpu_id AND e.ts_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 )
 SELECT
-    n.event_id, n.thread_index, n.sequence, b.event_id IS NOT NULL AS is_between
+    n.event_id, n.thread_index, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between
 FROM near AS n
 LEFT JOIN between_the_two AS b ON n.event_id = b.event_id AND n.sequence = b.sequence

@@ -11,13 +11,13 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 -- column: event_count BIGINT  Events lost, where the tracer counted them
--- needs: main.host, main.loss_interval, main.trace
+-- needs: main.host, main.gap, main.trace
 WITH gap AS (
     SELECT
         t.host_id, g.kind, g.event_count,
         greatest(g.start_ns, $start_ns) AS start_ns,
         least(g.end_ns, $end_ns) AS end_ns
-    FROM main.loss_interval AS g
+    FROM main.gap AS g
     JOIN main.trace AS t ON g.trace_id = t.trace_id
     WHERE g.run_id = $run_id AND g.start_ns < $end_ns AND g.end_ns >= $start_ns
 ),

@@ -90,6 +90,6 @@ INSERT INTO store.link_request
     (run_id, request_id, callback_instance_id)
 VALUES (1, 1, 20);
 INSERT INTO store.link_response (run_id, response_id, callback_instance_id) VALUES (1, 1, 40);
-INSERT INTO store.loss_interval (run_id, trace_id, cpu, kind, start_ns, end_ns, event_count)
+INSERT INTO store.gap (run_id, trace_id, cpu, kind, start_ns, end_ns, event_count)
 VALUES (1, 2, 0, 'loss', 10, 20, 3), (1, 1, NULL, 'pause', 2000, 3000, NULL),
     (2, 3, NULL, 'pause', 5400, 5500, NULL);
