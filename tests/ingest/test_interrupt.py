@@ -18,7 +18,8 @@ from msgflow.ingest import ingest
 # The command line, which says on stdout when a stage begins and then waits for the signal.
 _COMMAND = """
 import sys, time
-from msgflow.cli import app, progress
+from msgflow.__main__ import main
+from msgflow.cli import progress
 from contextlib import contextmanager
 
 awaited = sys.argv.pop(1)
@@ -34,7 +35,7 @@ def watched(quiet):
     yield show
 
 progress.ingest_progress = watched
-app.main()
+main()
 """
 STAGES = (
     "opening the traces",
