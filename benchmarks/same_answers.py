@@ -73,8 +73,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     asked = parser.parse_args()
     for checkout in (asked.before, asked.after):
-        if not (checkout / "msgflow").is_dir():
-            parser.error(f"not a checkout of msgflow — {checkout}")
+        require_checkout(checkout)
     systems, recordings = chosen(asked)
     with tempfile.TemporaryDirectory(prefix="msgflow-same-") as directory:
 
@@ -119,12 +118,31 @@ def run(checkout: Path, arguments: Sequence[str]) -> str:
         SystemExit: it failed.
     """
     environment = {**os.environ, "PYTHONPATH": str(checkout.resolve())}
+    # -P: the folder in which this is run may be a checkout, too, and would come first.
     done = subprocess.run(
-        [sys.executable, *arguments], capture_output=True, text=True, check=False, env=environment
+        [sys.executable, "-P", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
     )
     if done.returncode:
         sys.exit(f"{checkout}: {shlex.join(arguments)}\n{done.stderr}")
     return done.stdout
+
+
+def require_checkout(checkout: Path) -> None:
+    """Refuse a folder of which Python would run another msgflow, or none.
+
+    Raises:
+        SystemExit: it would.
+    """
+    package = checkout.resolve() / "msgflow" / "__init__.py"
+    if not package.is_file():
+        sys.exit(f"not a checkout of msgflow — {checkout}")
+    found = run(checkout, ["-c", "import msgflow; print(msgflow.__file__)"]).strip()
+    if Path(found).resolve() != package:
+        sys.exit(f"{checkout} would run {found}")
 
 
 def simulated(checkout: Path, system: str, factor: float, target: Path) -> None:

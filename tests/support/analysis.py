@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,6 @@ from msgflow.ingest.reported import restore
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 # What is stored of links and of what is missing comes of whole derivations.
 _DERIVED = {f"store.{name}" for name in derived_tables()}
-# The audits read what they like.
-_EVERYTHING = "the whole model"
 
 
 class Analysis:
@@ -51,7 +49,7 @@ class Analysis:
     @property
     def connection(self) -> duckdb.DuckDBPyConnection:
         """The database with the whole model of the events, and its links."""
-        self._provide(_EVERYTHING)
+        self._provide(_everything())
         return self._connection
 
     def build(self, events: StagedEvents) -> Analysis:
@@ -65,7 +63,7 @@ class Analysis:
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
         """Return the rows of a query."""
-        self._provide(sql)
+        self._provide(_needed(sql))
         return self._read(sql)
 
     def value(self, sql: str) -> Any:
@@ -78,34 +76,36 @@ class Analysis:
         return [value for (value,) in self.rows(sql)]
 
     def close(self) -> None:
-        self._provide(_EVERYTHING)
+        self._provide(_everything())
         self._connection.close()
 
-    def _provide(self, sql: str) -> None:
-        """Build what a query reads and is not there yet."""
+    def _provide(self, needed: frozenset[str]) -> None:
+        """Build what is needed and not there yet."""
         if self._built is None:
             return
-        needed = _everything() if sql == _EVERYTHING else _needed(sql)
-        links = not needed.isdisjoint(_DERIVED)
-        missing = {name for name in needed if name.startswith("staging.")} - self._built
-        if missing:
-            self._model(missing)
-        if (links or self._has_topics_to_learn()) and not self._is_derived:
-            missing = _model_of_links() - self._built
-            if missing:
-                self._model(missing)
+        self._model(needed)
+        if not self._is_derived and (
+            not needed.isdisjoint(_DERIVED) or self._has_topics_to_learn()
+        ):
+            self._model(_needed_by_links())
             self._connection.begin()
             derive(self._connection, 1)
             self._connection.commit()
             self._is_derived = True
 
-    def _model(self, names: set[str]) -> None:
-        """Build these objects of the model and store all that there are."""
+    def _model(self, needed: frozenset[str]) -> None:
+        """Build the objects of the model among these, and store all that there are."""
         assert self._built is not None
-        for header in objects.load("model"):
-            if header.name in names:
-                self._connection.execute(model.statement(header))
-        self._built |= names
+        missing = [
+            header
+            for header in objects.load("model")
+            if header.name in needed and header.name not in self._built
+        ]
+        if not missing:
+            return
+        for header in missing:
+            self._connection.execute(model.statement(header))
+            self._built.add(header.name)
         self._connection.begin()
         delete(self._connection, [1])
         store(self._connection, 1)
@@ -168,42 +168,33 @@ Analyse = Callable[[StagedEvents], Analysis]
 def _needs() -> dict[str, frozenset[str]]:
     """Return what every object of the model and of the database needs, tables of it included."""
     needs = {header.name: frozenset(header.needs) for header in objects.load("model")}
-    for name in list(needs):
-        needs[name.replace("staging.", "store.")] = frozenset({name})
-    for header in objects.views():
-        needs[header.name] = frozenset(header.needs)
-        needs.setdefault(f"main.{header.name.partition('.')[2]}", frozenset())
-    return needs
+    needs |= {name.replace("staging.", "store."): frozenset({name}) for name in needs}
+    return needs | {header.name: frozenset(header.needs) for header in objects.views()}
 
 
 @cache
 def _needed(sql: str) -> frozenset[str]:
     """Return all that a query needs; a name without its schema is that of a public view."""
-    found = [
-        f"{schema or 'main'}.{name}"
-        for schema, name in _NAME.findall(sql)
-        if schema or f"main.{name}" in _needs()
-    ]
-    return frozenset(_closure(found))
+    return _closure(f"{schema or 'main'}.{name}" for schema, name in _NAME.findall(sql))
 
 
-def _closure(names: Iterator[str] | list[str] | frozenset[str]) -> set[str]:
+@cache
+def _everything() -> frozenset[str]:
+    return _closure(header.name for header in objects.load("model")) | _DERIVED
+
+
+@cache
+def _needed_by_links() -> frozenset[str]:
+    """Return what derivations read, whatever the events."""
+    derived = (name.replace("store.", "derive.") for name in _DERIVED)
+    return _closure([*derived, "derive.topic_learned"])
+
+
+def _closure(names: Iterable[str]) -> frozenset[str]:
     waiting, found = list(names), set()
     while waiting:
         name = waiting.pop()
         if name not in found:
             found.add(name)
             waiting += _needs().get(name, ())
-    return found
-
-
-@cache
-def _everything() -> frozenset[str]:
-    return frozenset(_closure([header.name for header in objects.load("model")]) | _DERIVED)
-
-
-@cache
-def _model_of_links() -> set[str]:
-    """Return what derivations read of the model, whatever the events."""
-    derived = [name.replace("store.", "derive.") for name in _DERIVED]
-    return {name for name in _closure([*derived, "derive.topic_learned"]) if "staging." in name}
+    return frozenset(found)
