@@ -123,7 +123,6 @@ def _signature() -> Signature:
     )
 
 
-command.__signature__ = _signature()  # type: ignore[attr-defined]
-command.__annotations__ = {
-    name: parameter.annotation for name, parameter in _signature().parameters.items()
-}
+_SIGNATURE = _signature()
+command.__signature__ = _SIGNATURE  # type: ignore[attr-defined]
+command.__annotations__ = {name: each.annotation for name, each in _SIGNATURE.parameters.items()}
