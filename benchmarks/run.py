@@ -1,12 +1,14 @@
 """Speed and memory of reading and ingesting, beside Babeltrace 2 on the same trace in one run.
 
-    python benchmarks/run.py [--events 10000000 | --trace DIRECTORY] [--memory-limit SIZE] [--bt2]
-                             [--markdown FILE]
+    python benchmarks/run.py [--events 10000000] [--packet-bytes 0 8388608] [--runs 3]
+                             [--trace DIRECTORY] [--memory-limit SIZE] [--bt2] [--markdown FILE]
 
-Simulates a pipeline of nodes, then measures in processes of their own: our reader alone (all the
-columns of the catalogue, nothing kept), the whole ingest by stage, the query e2e-latency on the
-result, and `babeltrace2 -o dummy`, which decodes and does nothing. `--bt2` adds Babeltrace's Python
-bindings. Seconds of different machines and days cannot be compared, ratios of one run can.
+Simulates a pipeline of nodes, once with packets of 32 KiB, as ros2_tracing records, and once with
+packets of 8 MB, as those have who give LTTng large sub-buffers. Then measures in processes of their
+own: our reader alone (all the columns of the catalogue, nothing kept), the whole ingest by stage,
+the query e2e-latency on the result, and `babeltrace2 -o dummy`, which decodes and does nothing.
+`--bt2` adds Babeltrace's Python bindings. They take turns, so that other work on the machine slows
+all of them alike. Seconds of different machines and days cannot be compared, ratios of one run can.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import json
 import os
 import platform
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -25,120 +28,157 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 EVENTS_PER_FACTOR = 66_000
+PEER = "babeltrace2 -o dummy"
 
 SIMULATE = """
-import sys; from pathlib import Path; from msgflow.sim import simulate
-print(simulate("pipeline", Path(sys.argv[1]), factor=float(sys.argv[2])).event_count)
+import sys; from pathlib import Path; from msgflow.sim import Recording, simulate
+recording = Recording(packet_bytes=int(sys.argv[3]))
+simulate("pipeline", Path(sys.argv[1]), factor=float(sys.argv[2]), recording=recording)
 """
 
 READ = """
-import sys, time
+import json, sys, time
 import numpy, pyarrow
 from msgflow import trace
 from msgflow.ingest.catalogue import load
-begin = time.monotonic()
+begin, cpu_begin = time.monotonic(), time.process_time()
 with trace.open([sys.argv[1]], reader=sys.argv[2]) as traces:
     for item in traces.batches(load().arrow_schemas()):
         pass
-print(time.monotonic() - begin)
+print(json.dumps([time.monotonic() - begin, time.process_time() - cpu_begin]))
 """
 
 INGEST = """
-import json, sys; from pathlib import Path; from msgflow.ingest import ingest
-report = ingest([sys.argv[1]], Path(sys.argv[2]), memory_limit=sys.argv[3] or None)
-print(json.dumps([report.event_count, dict(report.stage_seconds)]))
+import json, sys, time; from pathlib import Path; from msgflow.ingest import ingest
+begins = {}
+def note(progress): begins.setdefault(progress.stage, time.process_time())
+report = ingest([sys.argv[1]], Path(sys.argv[2]), memory_limit=sys.argv[3] or None, progress=note)
+ends = [*list(begins.values())[1:], time.process_time()]
+cpu = {stage: end - begin for (stage, begin), end in zip(begins.items(), ends)}
+wall = report.stage_seconds
+print(json.dumps([report.event_count, {name: [wall[name], cpu.get(name, 0)] for name in wall}]))
 """
 
 
 @dataclass(frozen=True)
-class Row:
-    """One measurement: wall time [s], and peak memory of its process [bytes] where measured."""
+class Sample:
+    """One run: wall and CPU time [s], and peak memory of its process [bytes] where measured."""
 
-    name: str
-    seconds: float
+    wall: float
+    cpu: float
     peak_bytes: int | None = None
 
 
-def run(*command: str) -> tuple[str, float, int]:
-    """Run a process; return its output, wall time [s] and peak resident memory [bytes]."""
+def run(*command: str) -> tuple[str, Sample]:
+    """Run a process; return its output and what it took."""
     begin = time.monotonic()
     with tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen(command, stdout=output)
         _, status, usage = os.wait4(process.pid, 0)
-        seconds = time.monotonic() - begin
+        wall = time.monotonic() - begin
         if os.waitstatus_to_exitcode(status):
             raise SystemExit(f"failed: {' '.join(command)}")
         output.seek(0)
-        return output.read(), seconds, usage.ru_maxrss * 1024
+        sample = Sample(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
+        return output.read(), sample
 
 
-def measure(trace: str, database: str, memory_limit: str, with_bt2: bool) -> tuple[int, list[Row]]:
-    """Measure everything on one trace; return its number of events and the measurements."""
-    rows = []
+def measure(
+    trace: str, database: Path, memory_limit: str, with_bt2: bool
+) -> tuple[int, dict[str, Sample]]:
+    """Measure everything on one trace once; return its number of events and the measurements."""
+    samples = {}
     if shutil.which("babeltrace2"):
-        _, seconds, peak = run("babeltrace2", "-o", "dummy", trace)
-        rows.append(Row("babeltrace2 -o dummy", seconds, peak))
-    output, _, peak = run(sys.executable, "-c", READ, trace, "msgflow")
-    rows.append(Row("reader alone", float(output), peak))
-    if with_bt2:
-        output, _, peak = run(sys.executable, "-c", READ, trace, "bt2")
-        rows.append(Row("reader bt2 (Python bindings)", float(output), peak))
-    output, _, peak = run(sys.executable, "-c", INGEST, trace, database, memory_limit)
+        _, samples[PEER] = run("babeltrace2", "-o", "dummy", trace)
+    for reader, name in (("msgflow", "reader alone"), ("bt2", "reader bt2 (Python bindings)")):
+        if reader == "msgflow" or with_bt2:
+            output, sample = run(sys.executable, "-c", READ, trace, reader)
+            samples[name] = Sample(*json.loads(output), sample.peak_bytes)
+    database.unlink(missing_ok=True)
+    output, sample = run(sys.executable, "-c", INGEST, trace, str(database), memory_limit)
     events, stages = json.loads(output)
-    rows += [Row(f"ingest: {name}", seconds) for name, seconds in stages.items()]
-    rows.append(Row("ingest, whole", sum(stages.values()), peak))
-    query = (sys.executable, "-m", "msgflow", "query", "e2e-latency", "--db", database)
-    _, seconds, peak = run(*query)
-    rows.append(Row("query e2e-latency", seconds, peak))
-    return events, rows
+    samples |= {f"ingest: {name}": Sample(*taken) for name, taken in stages.items()}
+    wall, cpu = (sum(taken[which] for taken in stages.values()) for which in (0, 1))
+    samples["ingest, whole"] = Sample(wall, cpu, sample.peak_bytes)
+    query = (sys.executable, "-m", "msgflow", "query", "e2e-latency", "--db", str(database))
+    _, samples["query e2e-latency"] = run(*query)
+    return events, samples
 
 
-def report(rows: list[Row], events: int) -> list[str]:
-    """Return the lines of a Markdown table."""
-    peer = next((row.seconds for row in rows if row.name.startswith("babeltrace2")), None)
+def report(rounds: list[dict[str, Sample]], events: int) -> list[str]:
+    """Return the lines of a Markdown table; ratios are those within a round."""
     lines = [
-        "| | seconds | events/s | ratio to `babeltrace2 -o dummy` | peak memory |",
-        "| --- | ---: | ---: | ---: | ---: |",
+        f"| median (least to most) | seconds | CPU | events/s | ratio to `{PEER}` | ratio of CPU "
+        "| peak memory |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
-    for row in rows:
-        ratio = f"{row.seconds / peer:.2f}" if peer else ""
-        peak = f"{row.peak_bytes / 1e6:,.0f} MB" if row.peak_bytes else ""
-        rate = f"{events / row.seconds:,.0f}" if row.seconds > 0.005 else ""
-        lines.append(f"| {row.name} | {row.seconds:.2f} | {rate} | {ratio} | {peak} |")
+    for name in rounds[0]:
+        samples = [each[name] for each in rounds]
+        walls = [sample.wall for sample in samples]
+        wall = statistics.median(walls)
+        cpu = statistics.median(sample.cpu for sample in samples)
+        ratio = cpu_ratio = ""
+        if PEER in rounds[0]:
+            ratio = _spread([each[name].wall / each[PEER].wall for each in rounds])
+            cpu_ratio = _spread([each[name].cpu / each[PEER].cpu for each in rounds])
+        peaks = [sample.peak_bytes for sample in samples if sample.peak_bytes]
+        peak = f"{max(peaks) / 1e6:,.0f} MB" if peaks else ""
+        rate = f"{events / wall:,.0f}" if wall > 0.005 else ""
+        lines.append(
+            f"| {name} | {_spread(walls)} | {cpu:.2f} | {rate} | {ratio} | {cpu_ratio} | {peak} |"
+        )
     return lines
+
+
+def _spread(values: list[float]) -> str:
+    return f"{statistics.median(values):.2f} ({min(values):.2f} to {max(values):.2f})"
+
+
+def table(trace: str, directory: Path, what: str, arguments: argparse.Namespace) -> str:
+    """Measure one trace as often as asked; return the text about it."""
+    database = directory / "bench.duckdb"
+    rounds = []
+    for _ in range(arguments.runs):
+        events, samples = measure(trace, database, arguments.memory_limit, arguments.bt2)
+        rounds.append(samples)
+    lines = [
+        f"{datetime.now(UTC):%Y-%m-%d}: {events:,} events{what}, {os.cpu_count()} cores "
+        f"({platform.machine()}), Python {platform.python_version()}, memory limit "
+        f"{arguments.memory_limit or 'as needed'}, database "
+        f"{database.stat().st_size / 1e6:,.0f} MB, {arguments.runs} runs, "
+        f"load {os.getloadavg()[0]:.1f} at the end.",
+        "",
+        *report(rounds, events),
+    ]
+    return "\n".join(lines)
 
 
 def main() -> None:
     """Simulate, measure, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--events", type=int, default=10_000_000)
-    parser.add_argument("--trace", help="measure on this trace instead of a simulated one")
+    parser.add_argument(
+        "--packet-bytes", type=int, nargs="+", default=[0, 8 << 20], help="0: as usual, 32 KiB"
+    )
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--trace", help="measure on this trace instead of simulated ones")
     parser.add_argument("--memory-limit", default="", help="as of `msgflow ingest`")
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
-    parser.add_argument("--markdown", type=Path, help="append the table to this file")
+    parser.add_argument("--markdown", type=Path, help="append the tables to this file")
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as directory:
-        trace, database = arguments.trace, str(Path(directory) / "bench.duckdb")
-        if trace is None:
-            trace = str(Path(directory) / "trace")
-            factor = arguments.events / EVENTS_PER_FACTOR
-            run(sys.executable, "-c", SIMULATE, trace, str(factor))
-        events, rows = measure(trace, database, arguments.memory_limit, arguments.bt2)
-        size = Path(database).stat().st_size
-    load = os.getloadavg()[0]
-    lines = [
-        f"{datetime.now(UTC):%Y-%m-%d}: {events:,} events, {os.cpu_count()} cores "
-        f"({platform.machine()}), Python {platform.python_version()}, memory limit "
-        f"{arguments.memory_limit or 'as needed'}, database {size / 1e6:,.0f} MB, "
-        f"load {load:.1f} at the end.",
-        "",
-        *report(rows, events),
-    ]
-    text = "\n".join(lines)
-    print(text)
-    if arguments.markdown:
-        with arguments.markdown.open("a") as stream:
-            stream.write(f"\n{text}\n")
+    for packet_bytes in [0] if arguments.trace else arguments.packet_bytes:
+        with tempfile.TemporaryDirectory() as directory:
+            trace, what = arguments.trace, ""
+            if trace is None:
+                trace = str(Path(directory) / "trace")
+                what = f" in packets of {packet_bytes or 32 << 10:,} bytes"
+                factor = arguments.events / EVENTS_PER_FACTOR
+                run(sys.executable, "-c", SIMULATE, trace, str(factor), str(packet_bytes))
+            text = table(trace, Path(directory), what, arguments)
+        print(text, flush=True)
+        if arguments.markdown:
+            with arguments.markdown.open("a") as stream:
+                stream.write(f"\n{text}\n")
 
 
 if __name__ == "__main__":
