@@ -747,7 +747,7 @@ class Database:
         return self._ask(lambda: read_runs(connection))
 
     def check(self) -> list[CheckResult]:
-        """Audit the content: one result per check below `schema/check`."""
+        """Audit the content: one result per check below `schema/health/check`."""
         from msgflow.db.check import run_checks
 
         connection = self.connection

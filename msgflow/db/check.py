@@ -1,7 +1,7 @@
 """Audits: what must be true of every database, and which rows break it.
 
-`schema/check` holds one audit per file, a query that returns the offending rows with their run.
-Relations between tables are audited from what `tables.py` declares: there are no foreign keys.
+`schema/health/check` holds one audit per file, a query that returns the offending rows with their
+run. Relations between tables are audited from what `tables.py` declares: there are no foreign keys.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class CheckResult:
 
 
 def run_checks(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[CheckResult]:
-    """Run every audit, those of `schema/check` first.
+    """Run every audit, those of `schema/health/check` first.
 
     Args:
         con: connection to a current database.
@@ -47,7 +47,7 @@ def run_checks(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> lis
 
 def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
     of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
-    for header in objects.load("check"):
+    for header in objects.load("health/check"):
         yield CheckResult(
             header.name,
             header.severity or "error",

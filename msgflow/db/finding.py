@@ -1,7 +1,7 @@
 """Findings: what is wrong with a recording, where it comes from, and what to do about it.
 
-`schema/finding` holds one finding per file, a query that returns a row for each place where it
-holds; its header has title, severity, cause and cure.
+`schema/health/finding` holds one finding per file, a query that returns a row for each place where
+it holds; its header has title, severity, phase, cause and cure.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Finding:
     """Something wrong with the recording, at one place.
 
     Attributes:
-        name: which of `schema/finding`.
+        name: which of `schema/health/finding`.
         severity: 'error' where results are wrong or missing, 'warning' where they may be.
         title: what was found.
         run_id: the run.
@@ -53,7 +53,7 @@ class Finding:
 def find(con: duckdb.DuckDBPyConnection, run_ids: Sequence[int]) -> list[Finding]:
     """Return all findings in these runs: errors first, those of one kind together."""
     headers = sorted(
-        objects.load("finding"),
+        objects.load("health/finding"),
         key=lambda header: (SEVERITIES.index(header.severity or "error"), header.name),
     )
     return [finding for header in headers for finding in _findings(con, header, list(run_ids))]

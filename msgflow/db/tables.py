@@ -7,7 +7,7 @@ what their columns share with the table stands only here.
 
 Every table has one comment that states its grain; every column one that states its meaning.
 Relations are declared in `info["references"]`: DuckDB's foreign keys would forbid replacing a run
-in one transaction, so `schema/check` proves them instead.
+in one transaction, so `schema/health/check` proves them instead.
 """
 
 from __future__ import annotations

@@ -23,6 +23,9 @@ that stand above a table on a terminal, once for each value of the first, on whi
 depend, `slowest` the one that `--slowest N` goes by. The unit of a column may also be what it
 names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choose rows by them. Of a
 public view over the table of its name, a column may be named alone: it is what the table declares.
+What is in `schema/health` has a `severity`; findings and diagnostics the `phase` of an ingest that
+they come from, a `cause` and a `cure`, in place of which a diagnostic may name the `finding` that
+has them.
 """
 
 from __future__ import annotations
@@ -48,11 +51,13 @@ _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<descrip
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
-    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "needs",
-    "brief", "answer", "heading", "slowest",
+    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "phase",
+    "finding", "note", "needs", "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
+# Of an ingest, in their order: where what is found comes from.
+PHASES = ("reading", "model", "clocks", "links", "database")
 
 
 class HeaderError(ValueError):
@@ -114,7 +119,7 @@ class Header:
         params: parameters in the order of the file.
         columns: output columns in the order of the file.
         needs: names of the objects that the body reads.
-        severity: of a check or finding, else None.
+        severity: of a check, finding or diagnostic, else None.
         cause: where a finding comes from, else None.
         cure: what to do about a finding, else None.
         note: 'clocks' where rows compare times of several hosts, else None.
@@ -124,6 +129,8 @@ class Header:
         answer: columns that are shown also where they are 0 or empty throughout.
         heading: columns that are told once, above the rows: the first tells which rows they are of.
         slowest: column by which rows are the slowest, else None.
+        phase: of a finding or diagnostic, one of `PHASES`, else None.
+        finding: of a diagnostic, the finding that has its cause and cure, else None.
     """
 
     name: str
@@ -144,6 +151,8 @@ class Header:
     answer: tuple[str, ...] = ()
     heading: tuple[str, ...] = ()
     slowest: str | None = None
+    phase: str | None = None
+    finding: str | None = None
 
 
 @dataclass(frozen=True)
@@ -185,6 +194,9 @@ def parse(text: str, path: Path) -> Header:
     note = single.get("note")
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
+    phase = single.get("phase")
+    if phase is not None and phase not in PHASES:
+        raise _error(path, 1, f"phase {phase!r} is not one of {', '.join(PHASES)}")
     params = tuple(_param(field, path) for field in fields if field.key == "param")
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
@@ -212,6 +224,8 @@ def parse(text: str, path: Path) -> Header:
         answer=_names(single.get("answer", "")),
         heading=_names(single.get("heading", "")),
         slowest=single.get("slowest"),
+        phase=phase,
+        finding=single.get("finding"),
     )
 
 

@@ -241,7 +241,7 @@ def test_all_that_msgflow_asks_itself_is_reading(empty_database: Path) -> None:
         *load_queries(),
         *(
             header
-            for layer in (*objects.VIEW_LAYERS, "check", "finding")
+            for layer in (*objects.VIEW_LAYERS, "health/check", "health/finding")
             for header in objects.load(layer)
             if header.kind != "macro"
         ),

@@ -13,7 +13,14 @@ NAMED = re.findall(r"`([\w./-]+)`", TEXT)
 PLACES = ("msgflow", "schema", "tests", "docs", "benchmarks", "queries")
 ROOMS = [
     folder
-    for parent in ("msgflow", "schema", "schema/model", "schema/link", "schema/stat")
+    for parent in (
+        "msgflow",
+        "schema",
+        "schema/model",
+        "schema/link",
+        "schema/stat",
+        "schema/health",
+    )
     for folder in sorted((ROOT / parent).iterdir())
     if folder.is_dir() and folder.name not in ("__pycache__", "_data")
 ]

@@ -16,6 +16,7 @@ TESTS = Path(__file__).resolve().parents[1]
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
 PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
+FINDINGS = [file for file in FILES if file.layer == "finding"]
 PUBLIC = [file for file in FILES if file.layer == "public"]
 # Those of kind 'inline' are parts of others.
 PAGE_QUERIES = sorted(
@@ -57,6 +58,11 @@ def test_every_public_view_with_logic_has_a_case(file: SqlFile) -> None:
 
 @pytest.mark.parametrize("file", PROGRAM, ids=str)
 def test_everything_that_the_program_asks_has_a_case(file: SqlFile) -> None:
+    assert cases(TESTS / "schema" / "cases" / file.header.name)
+
+
+@pytest.mark.parametrize("file", FINDINGS, ids=str)
+def test_every_finding_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 

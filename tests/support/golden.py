@@ -17,9 +17,10 @@
 A query is run as `Database.query` runs it; what the program asks for itself (program.<name>) of
 run 1, likewise over tables of scratch; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
-`main.node`) is read whole, a table macro called with its arguments, both sorted by all columns. An
-empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables of BASE of
-which a case says nothing have one row, of key 1.
+`main.node`), a finding or an audit (`finding.NAME`, `check.NAME`) is read whole, a table macro
+called with its arguments, all sorted by all columns. An empty field is NULL, "" is an empty text.
+Lines that begin with # are comments. Tables of BASE of which a case says nothing have one row, of
+key 1.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ import duckdb
 import pyarrow as pa
 import pytest
 
+from msgflow.db import objects
 from msgflow.db.derive import derive
 from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
@@ -62,6 +64,7 @@ _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SELECTION = ("run", "start", "end", "skip_first", "internal")
 _PAGE_QUERY = "view."
 _PROGRAM = "program."
+_HEALTH = ("finding.", "check.")
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _TEMPLATE = pytest.StashKey[Path]()
 _SECTION = "== "
@@ -300,6 +303,8 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
         return QueryResult(_page_rows(connection, case, name.removeprefix(_PAGE_QUERY), given))
     if name.startswith(_PROGRAM):
         return QueryResult(_program_rows(connection, case, name.removeprefix(_PROGRAM), given))
+    if name.startswith(_HEALTH):
+        return QueryResult(_health_rows(connection, name))
     if "." in name:
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
         source = name if case.parameters is None else f"{name}({arguments})"
@@ -318,6 +323,11 @@ def _program_rows(
             file.flush()
             connection.execute(f"CREATE TEMP TABLE {table} AS FROM read_csv(?)", [file.name])
     return program().run(connection, name, _FRAME | given).to_arrow_table()
+
+
+def _health_rows(connection: duckdb.DuckDBPyConnection, name: str) -> pa.Table:
+    (header,) = (h for h in objects.load(f"health/{name.partition('.')[0]}") if h.name == name)
+    return connection.sql(f"SELECT * FROM ({header.body}) ORDER BY ALL").to_arrow_table()
 
 
 def _page_rows(

@@ -59,7 +59,12 @@ class SqlFile:
 def sql_paths() -> list[tuple[str, Path]]:
     """Return (layer, path) of every SQL file with a header."""
     schema = resource_directory("schema")
-    folders = [(folder.name, folder) for folder in sorted(schema.iterdir()) if folder.is_dir()]
+    folders = [
+        (folder.name, folder)
+        for parent in (schema, schema / "health")
+        for folder in sorted(parent.iterdir())
+        if folder.is_dir() and folder.name != "health"
+    ]
     folders.append(("queries", resource_directory("queries")))
     return [(layer, path) for layer, folder in folders for path in sorted(folder.glob("**/*.sql"))]
 

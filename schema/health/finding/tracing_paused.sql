@@ -1,0 +1,24 @@
+-- name: finding.tracing_paused
+-- title: Tracing was paused
+-- description: All streams of a trace are silent at once between packets. What happened meanwhile
+--     is missing, and nothing is paired across the pause.
+-- cause: The session was stopped and started again (lttng stop, lttng start), or the machine slept.
+-- cure: Record without stopping. For this recording: ingest one stretch at a time, or leave the
+--     pauses out with --start and --end.
+-- grain: one row per trace
+-- severity: warning
+-- phase: reading
+-- needs: main.gap, main.trace, derive.counted
+SELECT
+    t.run_id,
+    t.path AS subject,
+    count(*) AS count,
+    printf(
+        '%s, %.3f s in all, the longest %.3f s',
+        derive.counted(count(*), 'pause'), sum(g.end_ns - g.start_ns) / 1e9,
+        max(g.end_ns - g.start_ns) / 1e9
+    ) AS detail
+FROM main.gap AS g
+JOIN main.trace AS t ON g.trace_id = t.trace_id
+WHERE g.kind = 'pause'
+GROUP BY t.run_id, t.trace_id, t.path
