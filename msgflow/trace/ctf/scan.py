@@ -1,4 +1,4 @@
-"""Finds where events begin, packet after packet: best for few packets."""
+"""Finds where events begin, packet after packet: best for little data."""
 
 from __future__ import annotations
 
@@ -37,11 +37,22 @@ class Scanned:
 
 def scan(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> list[Scanned]:
     """Find the events of these packets; `layout.header` must be known."""
-    return [scan_packet(layout, memory, span, span.begin) for span in spans]
+    scanned = []
+    for span in spans:
+        found, position = scan_until(layout, memory, span, span.begin, span.end)
+        scanned.append(whole(layout, memory, span, found, position))
+    return scanned
 
 
-def scan_packet(layout: StreamLayout, memory: Memory, span: Span, position: int) -> Scanned:
-    """Find the events of a packet from this position on."""
+def scan_until(
+    layout: StreamLayout, memory: Memory, span: Span, position: int, until: int
+) -> tuple[Scanned, int]:
+    """Find the events of a packet that begin in front of the byte `until`, from this one on.
+
+    Returns:
+        the events, and where the one after them begins: not before `until`, unless there is a
+        problem.
+    """
     header = layout.header
     assert header is not None
     place = header.selector
@@ -50,11 +61,10 @@ def scan_packet(layout: StreamLayout, memory: Memory, span: Span, position: int)
     step_of = layout.steps.get
     residues, last_residue = layout.residues, layout.residues - 1
     offsets, shift, mask = place.offsets, place.shift, place.mask
-    end = span.end
     positions: list[int] = []
     append = positions.append
     problem = None
-    while position < end:
+    while position < until:
         residue = position & last_residue
         selector = read(data, position + offsets[residue])[0] >> shift & mask
         step = step_of(selector * residues + residue)
@@ -69,20 +79,25 @@ def scan_packet(layout: StreamLayout, memory: Memory, span: Span, position: int)
         else:
             append(position)
             position += step
-    if position > end:
-        problem = (positions.pop(), BEYOND_END)
-    return whole(layout, memory, span, Scanned(np.array(positions, np.int64), problem))
+    return Scanned(np.array(positions, np.int64), problem), position
 
 
-def whole(layout: StreamLayout, memory: Memory, span: Span, found: Scanned) -> Scanned:
+def whole(
+    layout: StreamLayout, memory: Memory, span: Span, found: Scanned, following: int
+) -> Scanned:
     """Return the events of a packet without a last one that reaches beyond its content.
 
-    Sizes that are known beforehand go from header to header, with the padding in between: where
-    padding is cut off, the end of the last event may be, too.
+    `following` is where the event after the last one begins. Sizes that are known beforehand go
+    from header to header, with the padding in between: where padding is cut off, the end of the
+    last event may be, too.
     """
-    if span.limit == span.end or found.problem is not None or not found.positions.size:
+    if found.problem is not None or not found.positions.size:
         return found
     last = int(found.positions[-1])
+    if following > span.end:
+        return Scanned(found.positions[:-1], (last, BEYOND_END))
+    if span.limit == span.end:
+        return found
     try:
         layout.next_event(memory.data, last, span)
     except FieldError as error:
