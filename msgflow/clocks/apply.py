@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db.change import change_runs
 from msgflow.db.derive import derive_from_clocks
+from msgflow.db.diagnostic import forget, note
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,12 +58,6 @@ INSERT INTO store.clock_uncertainty (run_id, clock_id, at_ns, uncertainty_ns)
 SELECT $run_id, sync.clock_id, bound.at_ns, bound.uncertainty_ns
 FROM clock_synchronised AS sync, unnest(sync.bounds) AS unnested (bound)
 ORDER BY sync.clock_id, bound.at_ns
-"""
-
-_FINDINGS = """
-INSERT INTO store.diagnostic (run_id, name, severity, count, detail)
-SELECT $run_id, name, 'warning', count, detail
-FROM derive.clock_finding($run_id)
 """
 
 _CLOCKS = """
@@ -118,16 +113,12 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
     """
     con.execute(_FORGET, {"run_id": run_id})
     con.execute("DELETE FROM store.clock_uncertainty WHERE run_id = ?", [run_id])
-    con.execute(
-        "DELETE FROM store.diagnostic WHERE run_id = ? "
-        "AND name IN ('clock_not_synchronised', 'clock_uneven')",
-        [run_id],
-    )
+    forget(con, run_id, "clocks")
     if sync.method == "messages":
         con.execute(_SYNCHRONISED, {"run_id": run_id})
         con.execute(_FROM_MESSAGES)
         con.execute(_BOUNDS, {"run_id": run_id})
-        con.execute(_FINDINGS, {"run_id": run_id})
+        note(con, run_id, "clocks")
         con.execute("DROP TABLE temp.clock_synchronised")
     elif sync.method == "file":
         _set_given(con, run_id, sync)

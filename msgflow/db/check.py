@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import duckdb
 
 
+RELATION_SEVERITY = "error"
+
+
 @dataclass(frozen=True)
 class CheckResult:
     """Outcome of one audit.
@@ -76,7 +79,7 @@ def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[C
         table, column, reference = relations[number]
         yield CheckResult(
             f"relation.{table.name}.{column.name}",
-            "error",
+            RELATION_SEVERITY,
             row_count,
             f"Every {column.name} of {table.name} is a row of {reference.partition('.')[0]}.",
         )

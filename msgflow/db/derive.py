@@ -6,6 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
+from msgflow.db.diagnostic import forget, note
 from msgflow.db.tables import SCHEMA, metadata
 
 if TYPE_CHECKING:
@@ -19,23 +20,6 @@ _CLOCKS = {"store.clock", "store.clock_uncertainty"}
 # Tables of `store` whose rows can learn their topic from a link.
 _TOPIC_OWNERS = ("publisher", "subscription")
 _TOPICS = "derive.topic_learned"
-
-_PATHS_SHOWN = 3
-
-_PATH_CUT = """
-INSERT INTO store.diagnostic (run_id, name, severity, count, detail)
-SELECT
-    run_id,
-    'path_cut',
-    'warning',
-    count(*),
-    'chains of topics that go on or have siblings beyond the limits of path enumeration (give '
-    || 'e2e-latency --from, --to, --max-depth or --max-paths), among them '
-    || array_to_string(list(path ORDER BY path_id)[1:$shown], '; ')
-FROM main.flow_path([$run_id], NULL, NULL)
-WHERE is_cut
-GROUP BY run_id
-"""
 
 
 def derive(
@@ -60,11 +44,8 @@ def derive(
     if synchronise is not None:
         synchronise()
     derive_from_clocks(con, run_id)
-    con.execute(
-        "DELETE FROM store.diagnostic WHERE run_id = ? AND name = 'path_cut'",
-        [run_id],
-    )
-    con.execute(_PATH_CUT, {"run_id": run_id, "shown": _PATHS_SHOWN})
+    forget(con, run_id, "links")
+    note(con, run_id, "links")
     con.execute(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [derivation_hash(), run_id],

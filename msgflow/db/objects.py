@@ -13,6 +13,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgflow.db.diagnostic import composed
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
 from msgflow.version import __version__
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 # Folders whose objects live in the database; each may need only those to its left, and itself.
 PUBLIC = "public"
+# Views are put together of what lies here.
+DIAGNOSTICS = "health/diagnostic"
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Of a database: tables, what is derived from them, and what users read.
@@ -31,7 +34,7 @@ SCHEMAS = ("store", "derive", "main")
 
 _REVISION = re.compile(r"[0-9]{4}")
 # What makes tables, and views of them, beside `schema/`: read as text, as SQLAlchemy takes long.
-_DECLARATION = ("tables.py", "table_view.py", "create.py")
+_DECLARATION = ("tables.py", "table_view.py", "create.py", "diagnostic.py")
 
 
 @cache
@@ -39,7 +42,7 @@ def load(layer: str) -> tuple[Header, ...]:
     """Return the objects of one folder of `schema/` and its rooms, each after those it needs.
 
     Among those of `public` are the views that `tables.py` declares, and columns that their header
-    only names are as they stand there.
+    only names are as they stand there; among others what diagnostics are put together to.
 
     Raises:
         ValueError: two objects need each other, or a column is declared nowhere.
@@ -50,7 +53,7 @@ def load(layer: str) -> tuple[Header, ...]:
         from msgflow.db.table_view import table_views
 
         headers = [*map(_completed, headers), *table_views()]
-    return sort(headers)
+    return sort([*headers, *composed(layer)])
 
 
 def _completed(header: Header) -> Header:
@@ -117,7 +120,7 @@ def definition_hash() -> str:
 
     Reads the files without parsing them, so that opening a database stays quick.
     """
-    return hash_of([*_texts(VIEW_LAYERS), *_declaration()])
+    return hash_of([*_texts((*VIEW_LAYERS, DIAGNOSTICS)), *_declaration()])
 
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""What an ingest left out on request, told as diagnostics, so that nobody looks for it later."""
+"""Which events an ingest leaves out on request."""
 
 from __future__ import annotations
 
@@ -14,26 +14,16 @@ def is_ignored(name: str, patterns: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def diagnostics(
+def matches(
     patterns: Sequence[str], counts: Mapping[tuple[int, str], int]
-) -> Iterator[tuple[str, str, int, str]]:
-    """Yield name, severity, count and detail of what is worth knowing of the ignored events.
+) -> Iterator[tuple[int, str, str | None]]:
+    """Yield place and name of each pattern with each event that it matches, None if there is none.
 
     Args:
         patterns: of the names to leave out.
         counts: (trace index, event name) -> events that occurred.
     """
-    occurred = [(name, count) for (_, name), count in counts.items() if count]
-    by_pattern = {
-        pattern: sum(count for name, count in occurred if fnmatch.fnmatchcase(name, pattern))
-        for pattern in dict.fromkeys(patterns)
-    }
-    used = [f"{pattern} ({count})" for pattern, count in by_pattern.items() if count]
-    unused = [pattern for pattern, count in by_pattern.items() if not count]
-    if used:
-        total = sum(count for name, count in occurred if is_ignored(name, patterns))
-        detail = f"events that were left out on request: {', '.join(used)}"
-        yield "ignored_events", "info", total, detail
-    if unused:
-        detail = f"patterns of events to leave out that match none: {', '.join(unused)}"
-        yield "ignored_nothing", "warning", len(unused), detail
+    occurred = sorted({name for (_, name), count in counts.items() if count})
+    for place, pattern in enumerate(dict.fromkeys(patterns)):
+        matching = [name for name in occurred if is_ignored(name, [pattern])]
+        yield from ((place, pattern, name) for name in matching or (None,))

@@ -46,11 +46,10 @@ class Implausible:
     def _count(self, name: str, column: str, what: str, bad: int) -> None:
         self._counts[name, column, what] = self._counts.get((name, column, what), 0) + bad
 
-    def diagnostics(self) -> Iterator[tuple[str, str, int, str]]:
-        """Yield name, severity, count and detail of what was left out."""
-        for (name, column, what), count in sorted(self._counts.items()):
-            detail = f"values of {column} in {name} that cannot be {what}: left out"
-            yield "implausible_value", "data_loss", count, detail
+    def rows(self) -> Iterator[tuple[str, str, str, int]]:
+        """Yield event, field, what its values cannot be, and how many were left out."""
+        for key, count in sorted(self._counts.items()):
+            yield *key, count
 
 
 def _is_time(values: pa.Array) -> pa.Array | None:

@@ -19,6 +19,7 @@ from msgflow.db import migrate
 from msgflow.db.check import run_checks
 from msgflow.db.connection import attach
 from msgflow.db.derive import derivation_hash, derive
+from msgflow.db.diagnostic import note
 from msgflow.db.memory import Memory
 from msgflow.db.opening import open_memory, shut_in
 from msgflow.db.runs import require_run_name
@@ -302,45 +303,17 @@ def _store(
         "FROM store.trace WHERE run_id = ?",
         [run_id, run_name, __version__, derivation_hash(), run_id],
     )
-    if loaded.duplicate_packet_count:
-        _add_diagnostic(
-            con,
-            run_id,
-            "duplicate_packet",
-            "info",
-            loaded.duplicate_packet_count,
-            "packets that several of the given traces hold were read once",
-        )
-    if loaded.repeated_packet_counts:
-        _add_diagnostic(
-            con,
-            run_id,
-            "repeated_packet",
-            "warning",
-            sum(loaded.repeated_packet_counts.values()),
-            "packets that one trace holds twice, such as those of a stream file copied beside "
-            "itself, were read once",
-        )
-    for diagnostic in loaded.diagnostics:
-        _add_diagnostic(con, run_id, *diagnostic)
     return run_id, run_name
 
 
 def _check(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    for result in run_checks(con, run_id):
-        if result.row_count:
-            detail = f"{result.name}: {result.description}"
-            _add_diagnostic(con, run_id, "check_failed", result.severity, result.row_count, detail)
-
-
-def _add_diagnostic(
-    con: duckdb.DuckDBPyConnection, run_id: int, name: str, severity: str, count: int, detail: str
-) -> None:
-    con.execute(
-        "INSERT INTO store.diagnostic (run_id, name, severity, count, detail) "
-        "VALUES (?, ?, ?, ?, ?)",
-        [run_id, name, severity, count, detail],
-    )
+    failed = [
+        {"name": result.name, "row_count": result.row_count, "description": result.description}
+        for result in run_checks(con, run_id)
+        if result.row_count
+    ]
+    if failed:
+        note(con, run_id, "database", failed=failed)
 
 
 def _diagnostics(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Diagnostic, ...]:

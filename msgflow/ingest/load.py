@@ -13,8 +13,7 @@ import duckdb
 from msgflow.errors import UsageError
 from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
-from msgflow.ingest.ignored import diagnostics as ignored_diagnostics
-from msgflow.ingest.ignored import is_ignored
+from msgflow.ingest.ignored import is_ignored, matches
 from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.sequences import Sequences
@@ -54,17 +53,11 @@ class Loaded:
 
     Attributes:
         event_counts: (trace index, event name) -> events read, wanted or not.
-        duplicate_packet_count: packets that another trace of the input held already.
-        repeated_packet_counts: trace index -> packets that the same trace held already.
         replaced_runs: ids of the runs that hold some of these packets already.
-        diagnostics: name, severity, count and detail of what was left out.
     """
 
     event_counts: Mapping[tuple[int, str], int]
-    duplicate_packet_count: int
-    repeated_packet_counts: Mapping[int, int]
     replaced_runs: frozenset[int]
-    diagnostics: tuple[tuple[str, str, int, str], ...]
 
 
 def load_traces(
@@ -161,13 +154,17 @@ def load_traces(
                 damage.message,
             ],
         )
-    return Loaded(
-        dict(traces.event_counts),
-        traces.duplicate_packet_count,
-        dict(traces.repeated_packet_counts),
-        frozenset(tables.replaced),
-        (*ignored_diagnostics(ignore, traces.event_counts), *implausible.diagnostics()),
-    )
+    for match in matches(ignore, traces.event_counts):
+        con.execute("INSERT INTO staging.ignored VALUES (?, ?, ?)", match)
+    for left_out in implausible.rows():
+        con.execute("INSERT INTO staging.implausible VALUES (?, ?, ?, ?)", left_out)
+    if traces.duplicate_packet_count:
+        con.execute(
+            "INSERT INTO staging.packet_read_once VALUES (NULL, ?)", [traces.duplicate_packet_count]
+        )
+    for repeated in traces.repeated_packet_counts.items():
+        con.execute("INSERT INTO staging.packet_read_once VALUES (?, ?)", repeated)
+    return Loaded(dict(traces.event_counts), frozenset(tables.replaced))
 
 
 def _placed(

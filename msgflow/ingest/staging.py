@@ -4,9 +4,11 @@
 as read. `staging` is a database in memory, which spills to the temporary directory:
 `staging.source` (one row per trace), `staging.event_count`, `staging.declared` (tracepoints that
 were enabled in a trace, also if they never occurred), `staging.left_out` (events that another trace
-holds as well), `staging.event` (all events of known tracepoints but those of the kernel, without
-payload), `staging.predecessor` (the pointers from event to event), and the objects of
-`schema/model`.
+holds as well), `staging.ignored` (patterns of events to leave out, with the events that match, NULL
+if none does), `staging.packet_read_once` (packets that a trace holds twice, or where it is NULL
+several traces), `staging.implausible` (values that were left out), `staging.damage`,
+`staging.event` (all events of known tracepoints but those of the kernel, without payload),
+`staging.predecessor` (the pointers from event to event), and the objects of `schema/model`.
 """
 
 from __future__ import annotations
@@ -66,6 +68,20 @@ CREATE TABLE staging.left_out (
 )
 """
 
+_IGNORED_TABLE = """
+CREATE TABLE staging.ignored (place INTEGER, pattern VARCHAR, event VARCHAR)
+"""
+
+_PACKET_READ_ONCE_TABLE = """
+CREATE TABLE staging.packet_read_once (trace_index INTEGER, packet_count BIGINT)
+"""
+
+_IMPLAUSIBLE_TABLE = """
+CREATE TABLE staging.implausible (
+    event VARCHAR, field VARCHAR, what VARCHAR, value_count BIGINT
+)
+"""
+
 _DAMAGE_TABLE = """
 CREATE TABLE staging.damage (
     trace_index INTEGER, file VARCHAR, position BIGINT, byte_offset BIGINT, message VARCHAR
@@ -89,6 +105,9 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         _EVENT_COUNT_TABLE,
         _DECLARED_TABLE,
         _LEFT_OUT_TABLE,
+        _IGNORED_TABLE,
+        _PACKET_READ_ONCE_TABLE,
+        _IMPLAUSIBLE_TABLE,
         _DAMAGE_TABLE,
     ):
         con.execute(statement)

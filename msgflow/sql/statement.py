@@ -10,7 +10,7 @@ from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     import duckdb
@@ -44,6 +44,18 @@ class Statements:
     def text(self, name: str) -> str:
         """Return the SQL of a statement, with what it needs of the others in front."""
         return _text(self, name)
+
+    def parts(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Return what these statements need of the others, as a WITH clause lists it, in order."""
+        needed = (part for name in names for part in _parts(self, self.header(name)))
+        return tuple(f"{part} AS (\n{self.header(part).body}\n)" for part in dict.fromkeys(needed))
+
+    def sources(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Return what these statements and their parts read that is not among the others."""
+        headers = [self.header(name) for name in names]
+        parts = {part for header in headers for part in _parts(self, header)}
+        needs = {need for h in (*headers, *map(self.header, parts)) for need in h.needs}
+        return tuple(sorted(need for need in needs if need.partition(".")[0] != self.layer))
 
     def run(
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
@@ -80,13 +92,10 @@ def _header(statements: Statements, name: str) -> Header:
 
 @cache
 def _text(statements: Statements, name: str) -> str:
-    header = statements.header(name)
-    parts = [
-        f"{need} AS (\n{statements.header(need).body}\n)" for need in _parts(statements, header)
-    ]
+    body = statements.header(name).body
+    parts = statements.parts([name])
     if not parts:
-        return header.body
-    body = header.body
+        return body
     if body.startswith("WITH "):
         return "WITH " + ",\n".join(parts) + ",\n" + body.removeprefix("WITH ")
     return "WITH " + ",\n".join(parts) + "\n" + body

@@ -7,12 +7,9 @@
 -- column: severity
 -- column: count
 -- column: detail
--- needs: store.diagnostic, derive.link_diagnostic, derive.annotation_conflict
+-- needs: store.diagnostic, derive.link_diagnostic
 SELECT run_id, trace_id, name, severity, count, detail
 FROM store.diagnostic
 UNION ALL
 SELECT run_id, trace_id, name, severity, count, detail
 FROM derive.link_diagnostic
-UNION ALL
-SELECT run_id, trace_id, name, severity, count, detail
-FROM derive.annotation_conflict

@@ -20,7 +20,7 @@ def _generated_pages() -> dict[Path, str]:
     return pages
 
 
-@pytest.mark.parametrize("page", ["data-model.md", "queries.md"])
+@pytest.mark.parametrize("page", ["data-model.md", "health.md", "queries.md"])
 def test_page_is_current(page: str) -> None:
     path = ROOT / "docs" / page
     assert path.read_text() == _generated_pages()[path], "run: python docs/generate.py"

@@ -24,7 +24,11 @@ VIEWS = [file for file in FILES if file.layer in objects.VIEW_LAYERS and file.he
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
 PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
-LAYER_OF |= {header.name: "public" for header in objects.load("public")}
+LAYER_OF |= {
+    header.name: layer for layer in ("model", "stat", "public") for header in objects.load(layer)
+}
+# Of statements, which have those that they need in front of them by their bare names.
+PARTS = ("program.", "reconcile.", "diagnostic.")
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +63,7 @@ def test_the_name_is_the_place(file: SqlFile) -> None:
 @pytest.mark.parametrize("file", FILES, ids=str)
 def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
     needs = [
-        name
-        for name in file.header.needs
-        if is_defined_in_sql(name) and not name.startswith(("program.", "reconcile."))
+        name for name in file.header.needs if is_defined_in_sql(name) and not name.startswith(PARTS)
     ]
     assert sorted(needs) == sorted(filter(is_defined_in_sql, file.references))
 

@@ -11,16 +11,17 @@
         == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
                              forbids NULL 1 for a key, else 0, false or an empty text
         == scratch TABLE     of page queries over what pages compute once per run: its rows
+        == staging TABLE     of a diagnostic of what was read: the columns of staging.TABLE it needs
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
 A query is run as `Database.query` runs it; what the program asks for itself (program.<name>) of
 run 1, likewise over tables of scratch; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
-`main.node`), a finding or an audit (`finding.NAME`, `check.NAME`) is read whole, a table macro
-called with its arguments, all sorted by all columns. An empty field is NULL, "" is an empty text.
-Lines that begin with # are comments. Tables of BASE of which a case says nothing have one row, of
-key 1.
+`main.node`), a finding, an audit or a diagnostic of run 1 (`finding.NAME`, `check.NAME`,
+`diagnostic.NAME`) is read whole, a table macro called with its arguments, all sorted by all
+columns. An empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables
+of BASE of which a case says nothing have one row, of key 1.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ import pytest
 
 from msgflow.db import objects
 from msgflow.db.derive import derive
+from msgflow.db.diagnostic import diagnostics, statement
 from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
@@ -65,6 +67,7 @@ _SELECTION = ("run", "start", "end", "skip_first", "internal")
 _PAGE_QUERY = "view."
 _PROGRAM = "program."
 _HEALTH = ("finding.", "check.")
+_DIAGNOSTIC = "diagnostic."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _TEMPLATE = pytest.StashKey[Path]()
 _SECTION = "== "
@@ -81,6 +84,7 @@ class Case:
         parameters: None where it gives none.
         tables: CSV of the rows of each table.
         scratch: CSV of the rows of each table that pages compute.
+        staging: CSV of the rows of each table of what was read.
         expected: CSV of the output.
     """
 
@@ -89,6 +93,7 @@ class Case:
     parameters: dict[str, Any] | None = None
     tables: dict[str, str] = field(default_factory=dict)
     scratch: dict[str, str] = field(default_factory=dict)
+    staging: dict[str, str] = field(default_factory=dict)
     expected: str = ""
 
 
@@ -106,12 +111,16 @@ def read_case(path: Path) -> Case:
                 case.parameters = json.loads(text)
             case "scratch":
                 case.scratch[name] = text
+            case "staging":
+                case.staging[name] = text
             case "expected":
                 case.expected = text
             case table:
                 case.tables[table] = text
     if case.system and (shared := SYSTEMS / f"{case.system}.case").exists():
-        case.tables = read_case(shared).tables | case.tables
+        given = read_case(shared)
+        case.tables = given.tables | case.tables
+        case.staging = given.staging | case.staging
     return case
 
 
@@ -305,6 +314,8 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
         return QueryResult(_program_rows(connection, case, name.removeprefix(_PROGRAM), given))
     if name.startswith(_HEALTH):
         return QueryResult(_health_rows(connection, name))
+    if name.startswith(_DIAGNOSTIC):
+        return QueryResult(_diagnostic_rows(connection, case, name, given))
     if "." in name:
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
         source = name if case.parameters is None else f"{name}({arguments})"
@@ -318,11 +329,31 @@ def _program_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     for table, text in case.scratch.items():
-        with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
-            file.write(text)
-            file.flush()
-            connection.execute(f"CREATE TEMP TABLE {table} AS FROM read_csv(?)", [file.name])
+        _create(connection, f"temp.{table}", text)
     return program().run(connection, name, _FRAME | given).to_arrow_table()
+
+
+def _create(connection: duckdb.DuckDBPyConnection, table: str, text: str) -> None:
+    """Make a table with the columns that the rows of text are of."""
+    rows = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
+    with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+        file.writelines(rows)
+        file.flush()
+        connection.execute(f"CREATE TABLE {table} AS FROM read_csv(?, header = true)", [file.name])
+
+
+def _diagnostic_rows(
+    connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
+) -> pa.Table:
+    (header,) = (header for header in diagnostics() if header.name == name)
+    if case.staging:
+        connection.execute("ATTACH ':memory:' AS staging")
+        for table, text in case.staging.items():
+            _create(connection, f"staging.{table}", text)
+    values = {param.name: (_FRAME | given)[param.name] for param in header.params}
+    return connection.sql(
+        f"SELECT * FROM ({statement([header])}) ORDER BY ALL", params=values
+    ).to_arrow_table()
 
 
 def _health_rows(connection: duckdb.DuckDBPyConnection, name: str) -> pa.Table:

@@ -13,7 +13,7 @@ from msgflow.sql.header import Header, read
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
     "model", "reconcile", "store", "link", "clock", "delivery", "flow", "stat", "public",
-    "check", "finding", "queries", "program",
+    "check", "finding", "diagnostic", "queries", "program",
 )  # fmt: skip
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
@@ -27,6 +27,7 @@ SCHEMAS = {
     "public": "main",
     "check": "check",
     "finding": "finding",
+    "diagnostic": "diagnostic",
     "program": "program",
 }
 _REFERENCE = re.compile(r"\b(?:staging|store|derive|main)\.[a-z_0-9]+\b")

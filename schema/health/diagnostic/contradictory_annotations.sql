@@ -1,8 +1,13 @@
--- name: derive.annotation_conflict
+-- name: diagnostic.contradictory_annotations
+-- title: Annotations that contradict each other
 -- description: Inputs and outputs that one annotation declares periodic_async, and another
 --     partial_sync. Both cannot be right: the caches would be emptied by one, and kept by the
 --     other.
--- grain: one row per run with such annotations
+-- cause: A file of links declares one, the trace or another entry of the file the other.
+-- cure: Take the wrong one out of the file (msgflow links apply FILE), or out of the node.
+-- grain: one row per run
+-- severity: warning
+-- phase: links
 -- needs: store.annotation, store.annotation_input, store.annotation_output, store.subscription,
 --     store.publisher
 WITH declared AS (
@@ -20,9 +25,7 @@ conflict AS (
 )
 SELECT
     c.run_id,
-    NULL::BIGINT AS trace_id,
-    'contradictory_annotations' AS name,
-    'warning' AS severity,
+    NULL AS trace_id,
     count(*) AS count,
     'inputs and outputs that are declared both periodic_async and partial_sync, which both count: '
     || string_agg(

@@ -1,0 +1,12 @@
+-- name: diagnostic.inferred_subscription
+-- title: Subscriptions that were not seen to be created
+-- description: Subscriptions were used whose creation is not in the trace. What they are called is
+--     not known, or deduced.
+-- finding: started_late
+-- grain: one row, if there are any
+-- severity: warning
+-- phase: model
+-- needs: diagnostic.unseen_object
+SELECT NULL AS trace_id, count, detail
+FROM unseen_object
+WHERE kind = 'subscription'

@@ -1,0 +1,18 @@
+-- name: diagnostic.overlapping_traces
+-- title: Two traces hold the same events
+-- description: Threads were recorded twice at the same time. Their events were read from one trace
+--     only.
+-- finding: overlapping_traces
+-- grain: one row per pair of traces
+-- severity: warning
+-- phase: reading
+-- needs: staging.left_out, staging.source
+SELECT
+    o.trace_index + 1 AS trace_id,
+    o.event_count AS count,
+    printf(
+        'events of %d threads, over %.3f s, left out because the trace %s has them too',
+        o.thread_count, o.length_ns / 1e9, s.path
+    ) AS detail
+FROM staging.left_out AS o
+JOIN staging.source AS s ON o.used_index = s.trace_index

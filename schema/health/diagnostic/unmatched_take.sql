@@ -1,0 +1,32 @@
+-- name: diagnostic.unmatched_take
+-- title: Messages received whose publication is not known
+-- description: Messages were received whose publication is not known. Their flows begin at the
+--     take.
+-- cause: The publisher is not traced, events of it were lost, or the message carries no stamp.
+-- cure: msgflow query unmatched gives the reason of each; what can be done is told by the findings
+--     publisher_not_traced, trace_ends_early and message_without_stamp.
+-- grain: one row per trace, for messages with a stamp and without
+-- severity: warning
+-- phase: links
+-- needs: store.take, store.subscription, store.link_transport
+WITH unmatched AS (
+    SELECT t.run_id, t.trace_id, s.topic_name, t.source_timestamp_ns IS NULL AS has_no_stamp
+    FROM store.take AS t
+    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
+    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
+),
+by_topic AS (
+    SELECT run_id, trace_id, has_no_stamp, coalesce(topic_name, '?') AS topic_name,
+        count(*) AS number
+    FROM unmatched
+    GROUP BY ALL
+)
+SELECT
+    run_id,
+    trace_id,
+    sum(number) AS count,
+    'messages received whose publication is not known'
+    || CASE WHEN has_no_stamp THEN ', and that carry no stamp: ' ELSE ': ' END
+    || string_agg(printf('%s (%d)', topic_name, number), ', ' ORDER BY topic_name) AS detail
+FROM by_topic
+GROUP BY run_id, trace_id, has_no_stamp
