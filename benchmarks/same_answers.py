@@ -6,7 +6,7 @@
 Each checkout ingests the same traces into a new database: those that `msgflow simulate NAME` of
 BEFORE writes, with the options given there, and the recorded ones in ../shared/traces where that
 folder exists. Then every public view, every table macro of whole runs or of a few messages, and
-every named query are read in both. AFTER is this checkout when left out.
+every named query are read in both, and findings and audits. AFTER is this checkout when left out.
 
 Prints a line for each difference: what it is of, and rows that only one of them has. Rows of views
 are compared in any order, those of queries in theirs. What the versions say of themselves does not
@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -165,6 +166,8 @@ READER = "import sys; sys.path.append(sys.argv[1]); import same_answers; same_an
 
 def read_all() -> None:
     """Read the database of the command line into files; runs in a checkout."""
+    import pyarrow.parquet
+
     import msgflow
 
     database, folder = Path(sys.argv[2]), Path(sys.argv[3])
@@ -177,6 +180,10 @@ def read_all() -> None:
         for header in opened.list_queries():
             result = opened.query(header.name, run=1, internal=True)
             result.to_parquet(folder / f"query {header.name}.parquet")
+        told = {"findings": opened.findings(run=1), "audits": opened.check()}
+    for name, items in told.items():
+        rows = pyarrow.Table.from_pylist([asdict(item) for item in items])
+        pyarrow.parquet.write_table(rows, folder / f"query {name}.parquet")
 
 
 def sources(connection: duckdb.DuckDBPyConnection) -> Iterator[tuple[str, str]]:
