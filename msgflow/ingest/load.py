@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 
 # Rows that wait for a commit take memory that nothing limits.
 _ROWS_PER_TRANSACTION = 2_000_000
+# DuckDB's row group: fewer at once cost more each.
+_ROWS_PER_INSERT = 122_880
+# Rows that wait for more, of all tables.
+_MOST_WAITING = 500_000
 
 # Packets of the target database that the packets just read are the same as.
 _SAME_PACKETS = """
@@ -116,6 +120,7 @@ def load_traces(
                 for batch in _placed(batches, sequences, corrections, implausible):
                     interrupts.check()
                     inserter.put(batch)
+            tables.flush()
             con.commit()
         except BaseException:
             with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
@@ -206,6 +211,8 @@ def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, 
 class _Tables:
     """The tables of `raw`, filled inside a transaction that is committed now and then.
 
+    Rows wait until there are enough of them, or `flush` is called.
+
     Attributes:
         replaced: ids of the runs that hold some of the packets added already.
     """
@@ -216,6 +223,8 @@ class _Tables:
         self._con = con
         self._may_hold = may_hold
         self._may_replace = may_replace
+        self._waiting: dict[str, list[pa.RecordBatch]] = {}
+        self._counts: dict[str, int] = {}
         self._uncommitted = 0
         self.replaced: set[int] = set()
 
@@ -228,8 +237,24 @@ class _Tables:
         table, rows = item
         if table == PACKET and self._may_hold:
             self.replaced |= self._same_packets(rows)
+        self._waiting.setdefault(table, []).append(rows)
+        self._counts[table] = self._counts.get(table, 0) + rows.num_rows
+        if self._counts[table] >= _ROWS_PER_INSERT:
+            self._insert(table)
+        elif sum(self._counts.values()) > _MOST_WAITING:
+            self._insert(max(self._counts, key=self._counts.__getitem__))
+
+    def flush(self) -> None:
+        """Insert what waits."""
+        for table in list(self._waiting):
+            self._insert(table)
+
+    def _insert(self, table: str) -> None:
+        import pyarrow as pa
+
+        rows = pa.Table.from_batches(self._waiting.pop(table))
         self._con.from_arrow(rows).insert_into(f"raw.main.{table}")
-        self._uncommitted += rows.num_rows
+        self._uncommitted += self._counts.pop(table)
         if self._uncommitted >= _ROWS_PER_TRANSACTION:
             self._con.commit()
             self._con.begin()

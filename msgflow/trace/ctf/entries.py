@@ -32,7 +32,9 @@ class Entry:
         discarded: events lost in it.
         lost: packets lost right before it.
         base: where it lies in memory, in bytes.
-        events: begins of its events as found by the scan, relative to `base`; None before.
+        events: begins of its events as found by the scan, relative to `base`, those that are done
+            left out; None before.
+        clock_before: value of the clock at the event before these, or at the begin.
     """
 
     stream: Stream
@@ -44,6 +46,10 @@ class Entry:
     lost: int
     base: int = -1
     events: NDArray[np.int64] | None = field(default=None)
+    clock_before: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.clock_before = self.begin
 
     @property
     def size(self) -> int:

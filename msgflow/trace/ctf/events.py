@@ -81,8 +81,8 @@ def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) 
     bases = np.array([entry.base for entry in entries], np.int64)
     positions = np.concatenate([_begins(entry) for entry in entries])
     positions += np.repeat(bases, counts)
-    begins = np.array([entry.begin for entry in entries], np.uint64)
-    headers = read_headers(layout, memory, positions, counts, begins)
+    befores = np.array([entry.clock_before for entry in entries], np.uint64)
+    headers = read_headers(layout, memory, positions, counts, befores)
     return Events(counts, headers.classes, headers.clock, headers.bodies, positions)
 
 
@@ -178,7 +178,7 @@ def _walk_headers(
     values = []
     for entry in entries:
         walk = walk_of(layout, memory, entry, entry.base)
-        clock = entry.begin
+        clock = entry.clock_before
         for position in _begins(entry).tolist():
             header = walk.header(position)
             if header.time is not None:

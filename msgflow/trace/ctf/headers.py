@@ -35,7 +35,7 @@ def read_headers(
     memory: Memory,
     positions: NDArray[np.int64],
     counts: NDArray[np.int64],
-    begins: NDArray[np.uint64],
+    befores: NDArray[np.uint64],
 ) -> Headers:
     """Read the headers of the events at these positions.
 
@@ -44,10 +44,10 @@ def read_headers(
         memory: where they lie.
         positions: as a scan found them, packet after packet.
         counts: events of each packet.
-        begins: value of the clock at the begin of each packet.
+        befores: value of the clock before the first of them in each packet.
     """
     reader = _Reader(layout, memory, positions)
-    owner_begins = begins[counts > 0]
+    owner_befores = befores[counts > 0]
     firsts = (np.cumsum(counts) - counts)[counts > 0]
     header = layout.header
     assert header is not None
@@ -67,11 +67,11 @@ def read_headers(
             if form.time.bits == 64:
                 whole.append(np.arange(positions.size) if isinstance(rows, slice) else rows)
         else:
-            values[rows] = np.repeat(begins, counts)[rows]
+            values[rows] = np.repeat(befores, counts)[rows]
     if header.narrow_bits is None:
         return Headers(classes, values, bodies)
     whole_rows = np.sort(np.concatenate([*whole, np.empty(0, np.int64)]))
-    clock = _unwrapped(values, header.narrow_bits, firsts, owner_begins, whole_rows)
+    clock = _unwrapped(values, header.narrow_bits, firsts, owner_befores, whole_rows)
     return Headers(classes, clock, bodies)
 
 
@@ -146,27 +146,27 @@ def _unwrapped(
     values: NDArray[np.uint64],
     bits: int,
     firsts: NDArray[np.int64],
-    begins: NDArray[np.uint64],
+    befores: NDArray[np.uint64],
     whole: NDArray[np.int64],
 ) -> NDArray[np.uint64]:
     """Turn the low bits of a clock into its values.
 
     A time stamp is the first value at or after the previous one with these low bits, and the
-    previous one of a packet's first event is the packet's begin. So the distances are known from
-    the low bits alone, and their sum from a whole value on is the clock.
+    previous one of a packet's first event is that before it, or the packet's begin. So the
+    distances are known from the low bits alone, and their sum from a whole value on is the clock.
 
     Args:
         values: low bits, or whole values.
         bits: how many low bits.
         firsts: rows at which packets begin.
-        begins: value of the clock there.
+        befores: value of the clock before these.
         whole: rows that have a whole value.
     """
     if not values.size:
         return values
     distance = np.empty_like(values)
     np.subtract(values[1:], values[:-1], out=distance[1:])
-    distance[firsts] = values[firsts] - begins
+    distance[firsts] = values[firsts] - befores
     distance &= np.uint64((1 << bits) - 1)
     known = np.zeros(values.size, np.bool_)
     known[firsts] = True
@@ -174,7 +174,7 @@ def _unwrapped(
     clock = np.cumsum(distance, dtype=np.uint64)
     starts = np.flatnonzero(known)
     start_values = np.empty(values.size, np.uint64)
-    start_values[firsts] = begins + distance[firsts]
+    start_values[firsts] = befores + distance[firsts]
     start_values[whole] = values[whole]
     shifts = start_values[starts] - clock[starts]
     clock += np.repeat(shifts, np.diff(starts, append=values.size))

@@ -80,7 +80,7 @@ class Iteration:
         packets = PacketRows(self._report_damage)
         # Events of the next batch are found while columns of this one are made and used.
         batches = Prefetch(
-            lambda: ordered_batches(self._entries, size, self._report_damage, _AHEAD), _AHEAD
+            lambda: ordered_batches(self._entries, size, self._report_damage), _AHEAD
         )
         try:
             for number, batch in enumerate(batches.items()):

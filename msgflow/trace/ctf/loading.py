@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import weakref
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.layout import GAP
-from msgflow.trace.ctf.memory import Memory, room_for
+from msgflow.trace.ctf.memory import PADDING, Memory, room_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,18 +22,17 @@ _ONES = b"\xff" * GAP
 class Loader:
     """Keeps the packets of the current batch in memory.
 
-    What a batch does not use up is copied to the next one. The memories are used in turn: one is
-    not touched before as many batches have been loaded as there are others.
+    What a batch does not use up is copied to the next one. The room of memories that nobody uses
+    any more is used again.
+
+    Attributes:
+        memory: where the packets of the current batch are.
     """
 
-    def __init__(self, memories: int = 2) -> None:
-        self._memories = [Memory(0) for _ in range(memories)]
+    def __init__(self) -> None:
+        self.memory = Memory(bytearray(PADDING))
+        self._rooms: list[tuple[bytearray, weakref.ref[Memory]]] = []
         self._files: dict[Path, int] = {}
-
-    @property
-    def memory(self) -> Memory:
-        """Where the packets of the current batch are."""
-        return self._memories[-1]
 
     def load(self, entries: Sequence[Entry]) -> list[Entry]:
         """Put these packets into memory in this order, those that are there already included.
@@ -43,9 +43,7 @@ class Loader:
         missing = []
         size = sum(room_for(entry.size) for entry in entries)
         before = self.memory
-        memory = self._memories.pop(0)
-        if memory.size < size:
-            memory = Memory(size)
+        memory = self._new_memory(size)
         at = 0
         with memoryview(memory.data) as target, memoryview(before.data) as source:
             for entry in entries:
@@ -58,7 +56,7 @@ class Loader:
                 target[end : end + GAP] = _ONES
                 entry.base = at
                 at += room_for(entry.size)
-        self._memories.append(memory)
+        self.memory = memory
         return missing
 
     def close(self) -> None:
@@ -66,6 +64,15 @@ class Loader:
         for descriptor in self._files.values():
             os.close(descriptor)
         self._files.clear()
+
+    def _new_memory(self, size: int) -> Memory:
+        size += PADDING
+        used = [(room, user) for room, user in self._rooms if user() is not None]
+        free = [room for room, user in self._rooms if user() is None and len(room) >= size]
+        room = free[0] if free else bytearray(size)
+        memory = Memory(room)
+        self._rooms = [*used, (room, weakref.ref(memory))]
+        return memory
 
     def _read(self, entry: Entry, target: memoryview) -> bool:
         path = entry.packet.path

@@ -11,7 +11,8 @@ from msgflow.trace.ctf.layout import GAP
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_PADDING = 2 * GAP
+PADDING = 2 * GAP
+"""Bytes behind all packets."""
 
 
 class Memory:
@@ -22,15 +23,10 @@ class Memory:
         bytes: for numpy.
     """
 
-    def __init__(self, size: int) -> None:
-        self.data = bytearray(size + _PADDING)
+    def __init__(self, data: bytearray) -> None:
+        self.data = data
         self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)
         self._views: dict[str, NDArray[Any]] = {}
-
-    @property
-    def size(self) -> int:
-        """Bytes there is room for."""
-        return len(self.data) - _PADDING
 
     def view(self, dtype: str) -> NDArray[Any]:
         """Return an array whose n-th element begins at the n-th byte."""

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.memory import Memory
 
 _NEVER_NS = 1 << 64
+_MOST_EVENTS = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -65,32 +66,31 @@ def ordered_batches(
     entries: Sequence[Entry],
     size: int,
     report: Callable[[Entry, int, str], None],
-    ahead: int = 0,
 ) -> Iterator[Batch]:
     """Read packets, given in order of time, about `size` bytes of them at once.
 
     An event at or after the begin of the next unread packet may have to wait for events of that
-    one: its packet stays in memory for the next batch. So nothing is ever sorted twice, and no
-    more is held than a batch and a packet or so per stream.
+    one: its packet stays in memory for the next batch. So no more is held than a batch and a packet
+    or so per stream.
 
-    `report` is called with a packet, the byte of it and a message for everything damaged. A batch
-    may be used until `ahead` more than the next one have been taken.
+    `report` is called with a packet, the byte of it and a message for everything damaged.
     """
-    loader = Loader(2 + ahead)
+    loader = Loader()
     try:
         held: list[Entry] = []
+        are_cut = True
         done = 0
         since_ns = -_NEVER_NS
         while done < len(entries) or held:
-            budget = max(size, sum(entry.size for entry in held))
+            budget = max(size, sum(entry.size for entry in held) // 2)
             first = done
             while done < len(entries) and budget > 0:
                 budget -= entries[done].size
                 done += 1
             until_ns = entries[done].order_ns if done < len(entries) else _NEVER_NS
             batch = _load(loader, held, entries[first:done], report)
-            yield _cut(batch, len(held) > 0, since_ns, until_ns)
-            held = _unfinished(batch, until_ns)
+            yield from _parts(_cut(batch, are_cut, since_ns, until_ns))
+            held, are_cut = _unfinished(batch, until_ns)
             _forget(batch, held)
             since_ns = until_ns
     finally:
@@ -145,11 +145,14 @@ def _load(
     )
 
 
-def _cut(batch: Batch, any_held: bool, since_ns: int, until_ns: int) -> Batch:
-    """Pick the events before `until_ns`; those of held packets before `since_ns` are done."""
+def _cut(batch: Batch, are_cut: bool, since_ns: int, until_ns: int) -> Batch:
+    """Pick the events before `until_ns`.
+
+    Unless `are_cut`, held packets have events that are done: those before `since_ns`.
+    """
     ts_ns = batch.ts_ns
     rows: NDArray[np.int64] | None = None
-    if any_held:
+    if not are_cut:
         waits = np.repeat(np.array(batch.new), batch.counts) | (ts_ns >= since_ns)
         rows = np.flatnonzero(waits)
     # Stable: at the same time, rows stay in the order of streams and of places in a stream.
@@ -161,12 +164,45 @@ def _cut(batch: Batch, any_held: bool, since_ns: int, until_ns: int) -> Batch:
     return Batch(**{**vars(batch), "order": order})
 
 
-def _unfinished(batch: Batch, until_ns: int) -> list[Entry]:
-    """Return the packets that have events at or after this time."""
+def _parts(batch: Batch) -> Iterator[Batch]:
+    """Yield the batch in parts, as large packets make it large: columns of it take memory."""
+    new = batch.new
+    for begin in range(0, max(batch.order.size, 1), _MOST_EVENTS):
+        order = batch.order[begin : begin + _MOST_EVENTS]
+        yield Batch(**{**vars(batch), "order": order, "new": new})
+        new = [False] * len(new)
+
+
+def _unfinished(batch: Batch, until_ns: int) -> tuple[list[Entry], bool]:
+    """Return the packets that have events at or after this time, and whether only these are left.
+
+    That is so unless time runs backward in one of them.
+    """
     if until_ns >= _NEVER_NS:
-        return []
-    late = np.unique(batch.packets[batch.ts_ns >= until_ns])
-    return [batch.entries[packet] for packet in late.tolist()]
+        return [], True
+    late = np.flatnonzero(batch.ts_ns >= until_ns)
+    packets, first, counts = np.unique(batch.packets[late], return_index=True, return_counts=True)
+    ends = np.cumsum(batch.counts)[packets]
+    begins = ends - batch.counts[packets]
+    held, are_cut = [], True
+    for packet, begin, at, end, count in zip(
+        packets.tolist(),
+        begins.tolist(),
+        late[first].tolist(),
+        ends.tolist(),
+        counts.tolist(),
+        strict=True,
+    ):
+        entry = batch.entries[packet]
+        held.append(entry)
+        assert entry.events is not None
+        if count == end - at and entry.events.size == end - begin:
+            if at > begin:
+                entry.events = entry.events[at - begin :]
+                entry.clock_before = int(batch.clock[at - 1])
+        else:
+            are_cut = False
+    return held, are_cut
 
 
 def _forget(batch: Batch, held: Sequence[Entry]) -> None:

@@ -1,0 +1,54 @@
+"""Rows wait until there are enough of them for the database, but not too many."""
+
+from __future__ import annotations
+
+import duckdb
+import pyarrow as pa
+import pytest
+
+from msgflow.ingest import load
+
+
+@pytest.fixture
+def con(monkeypatch: pytest.MonkeyPatch) -> duckdb.DuckDBPyConnection:
+    """Tables `a` to `d` of `raw`; 100 rows are enough, 150 are too many."""
+    monkeypatch.setattr(load, "_ROWS_PER_INSERT", 100)
+    monkeypatch.setattr(load, "_MOST_WAITING", 150)
+    con = duckdb.connect()
+    con.execute("ATTACH ':memory:' AS raw")
+    for table in "abcd":
+        con.execute(f"CREATE TABLE raw.{table} (n BIGINT)")
+    con.begin()
+    return con
+
+
+def counts(con: duckdb.DuckDBPyConnection) -> list[int]:
+    rows = (con.execute(f"SELECT count(*) FROM raw.{table}").fetchall() for table in "abcd")
+    return [count for ((count,),) in rows]
+
+
+def rows(count: int) -> pa.RecordBatch:
+    return pa.record_batch({"n": pa.array(range(count))})
+
+
+def test_rows_wait_for_more(con: duckdb.DuckDBPyConnection) -> None:
+    tables = load._Tables(con, may_hold=False, may_replace=False)
+    tables.add(("a", rows(60)))
+    assert counts(con) == [0, 0, 0, 0]
+    tables.add(("b", rows(60)))
+    tables.add(("a", rows(40)))
+    assert counts(con) == [100, 0, 0, 0]
+    tables.flush()
+    assert counts(con) == [100, 60, 0, 0]
+    tables.flush()
+    assert counts(con) == [100, 60, 0, 0]
+
+
+def test_not_too_many_wait(con: duckdb.DuckDBPyConnection) -> None:
+    """Those of the table with most of them go first."""
+    tables = load._Tables(con, may_hold=False, may_replace=False)
+    for table, count in (("a", 40), ("b", 70), ("c", 40), ("d", 1)):
+        tables.add((table, rows(count)))
+    assert counts(con) == [0, 70, 0, 0]
+    tables.flush()
+    assert counts(con) == [40, 70, 40, 1]
