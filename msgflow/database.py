@@ -11,6 +11,7 @@ import duckdb
 from msgflow.db.connection import connect
 from msgflow.db.objects import public_names
 from msgflow.db.reading import reading_statements, require_condition
+from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.query.result import QueryResult
@@ -43,8 +44,6 @@ _T = TypeVar("_T")
 
 DEFAULT_LIMIT = 10_000
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
-# Where named paths are looked for.
-DEFAULT_PATHS = "paths.yaml"
 # Of reports, bytes: what mail servers take.
 DEFAULT_REPORT_SIZE = 20_000_000
 

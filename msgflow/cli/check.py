@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import OUTPUT, DatabaseOption, RunOption
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
 if TYPE_CHECKING:

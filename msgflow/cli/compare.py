@@ -11,7 +11,6 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.declared import given_of, parameter
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
     DatabaseOption,
@@ -20,6 +19,7 @@ from msgflow.cli.options import (
     OutputOption,
     WideOption,
 )
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 from msgflow.sql.statement import program

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 import typer.core
 
-from msgflow.cli.defaults import DEFAULT_DATABASE, DEFAULT_PATHS
+from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
 app = typer.Typer(help="Check, upgrade and describe a database file.")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
@@ -18,6 +17,7 @@ from msgflow.cli.options import (
     SkipFirstOption,
     StartOption,
 )
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.export.series import What
 from msgflow.query.show.times import Times

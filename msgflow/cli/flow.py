@@ -10,7 +10,6 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.declared import declared
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
@@ -19,6 +18,7 @@ from msgflow.cli.options import (
     OutputOption,
     RunOption,
 )
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.sql.statement import program
 

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
     DatabaseOption,
@@ -17,6 +16,7 @@ from msgflow.cli.options import (
     SkipFirstOption,
     StartOption,
 )
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.export.graph import GraphFormat
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import OUTPUT, DatabaseOption, InternalOption, RunOption, WideOption
+from msgflow.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

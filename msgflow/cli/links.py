@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, RunOption, WideOption
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 
 app = typer.Typer(help="Declare indirect links: how nodes use messages that they keep.")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import DatabaseOption
+from msgflow.default_files import DEFAULT_DATABASE
 
 
 def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:

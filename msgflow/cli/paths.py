@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
+from msgflow.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(help="Give paths names, for --path.")
 

@@ -9,7 +9,6 @@ import typer
 from typer.core import TyperCommand
 
 from msgflow.cli.declared import escape, given_of, parameter
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import (
     OUTPUT,
     ColumnsOption,
@@ -25,6 +24,7 @@ from msgflow.cli.options import (
     WideOption,
 )
 from msgflow.cli.selecting import selecting_options
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.query.selection import KINDS
 from msgflow.query.show.present import MOST_ROWS

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import OUTPUT, SELECTION, DatabaseOption, EndOption, RunOption, StartOption
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(B|kB|KB|MB|GB)?")

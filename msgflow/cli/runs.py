@@ -8,8 +8,8 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.default_command import with_default
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
+from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode, UsageError
 
 app = typer.Typer(

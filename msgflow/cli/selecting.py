@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msgflow.cli.completion import complete, complete_path
-from msgflow.cli.defaults import DEFAULT_PATHS
+from msgflow.default_files import DEFAULT_PATHS
 from msgflow.query.selection import KINDS, PATH, columns_of
 
 if TYPE_CHECKING:

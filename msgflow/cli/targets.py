@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.defaults import DEFAULT_DATABASE
 from msgflow.cli.options import DatabaseOption, OutputOption, RunOption, SkipFirstOption
+from msgflow.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(help="Write requirements for verify.")
 

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.defaults import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.cli.options import (
     OUTPUT,
     DatabaseOption,
@@ -19,6 +18,7 @@ from msgflow.cli.options import (
     StartOption,
     WideOption,
 )
+from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import ExitCode
 
 

@@ -76,7 +76,7 @@ def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
         stored_of = LAYER_OF.get(name.replace("store.", "derive.", 1), "store")
         layer = stored_of if name.startswith("store.") else LAYER_OF.get(name, "model")
         assert LAYERS.index(layer) <= position, f"{file} reads {name}"
-    if file.layer in {"queries", "program"}:
+    if file.layer == "queries":
         assert {name.partition(".")[0] for name in file.references} <= {"main"}
 
 

@@ -10,7 +10,8 @@
 -- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: is_cut BOOLEAN  The path goes on or has siblings beyond the limits of the search
 -- column: is_comparable BOOLEAN  The clocks of all its hosts were brought together, or are one
--- needs: main.flow_path, main.publisher, main.subscription, main.process, main.host, main.clock
+-- needs: main.flow_path, main.publisher, main.subscription, main.process, main.host, main.clock,
+--     derive.clock_group_id
 WITH path AS MATERIALIZED (
     SELECT path_id, path, topics, publishers, subscriptions, is_cut
     FROM main.flow_path([$run], NULL, NULL)
@@ -27,7 +28,9 @@ visited AS (
 ),
 timed AS (
     SELECT
-        v.path_id, count(DISTINCT coalesce(c.reference_clock_id, -c.clock_id)) = 1 AS is_comparable
+        v.path_id,
+        count(DISTINCT derive.clock_group_id(c.clock_id, c.reference_clock_id)) = 1
+            AS is_comparable
     FROM visited AS v
     JOIN main.process AS p ON v.process_id = p.process_id
     JOIN main.host AS h ON p.host_id = h.host_id

@@ -8,7 +8,7 @@
 -- grain: one row per pair of hosts
 -- severity: warning
 -- phase: clocks
--- needs: main.remote_latency, main.host, main.clock, derive.counted
+-- needs: main.remote_latency, main.host, main.clock, derive.clock_group_id, derive.counted
 SELECT
     l.run_id,
     f.hostname || ' → ' || t.hostname AS subject,
@@ -22,7 +22,8 @@ JOIN main.host AS f ON l.from_host_id = f.host_id
 JOIN main.host AS t ON l.to_host_id = t.host_id
 JOIN main.clock AS fc ON f.clock_id = fc.clock_id
 JOIN main.clock AS tc ON t.clock_id = tc.clock_id
-WHERE coalesce(fc.reference_clock_id, -fc.clock_id) <> coalesce(tc.reference_clock_id, -tc.clock_id)
+WHERE derive.clock_group_id(fc.clock_id, fc.reference_clock_id)
+    <> derive.clock_group_id(tc.clock_id, tc.reference_clock_id)
 GROUP BY l.run_id, f.hostname, t.hostname
 -- Shown as apart already.
 HAVING min(l.latency_ns) >= 0

@@ -9,7 +9,8 @@
 -- column: clocks BIGINT  How many
 -- column: greatest_ms DOUBLE [ms]  Most by which two of them can differ; NULL: not known
 -- column: is_tried BOOLEAN  Messages did not suffice to bring the clocks of the run together
--- needs: main.clock, main.clock_uncertainty, main.diagnostic, program.clock_host
+-- needs: main.clock, main.clock_uncertainty, main.diagnostic, derive.clock_group_id,
+--     program.clock_host
 WITH known AS (
     SELECT clock_id, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
@@ -18,7 +19,7 @@ WITH known AS (
 bound AS (
     SELECT
         c.run_id, c.clock_id, n.hosts,
-        coalesce(c.reference_clock_id, -c.clock_id) AS together,
+        derive.clock_group_id(c.clock_id, c.reference_clock_id) AS together,
         coalesce(k.greatest_ns, c.uncertainty_ns) AS bound_ns
     FROM main.clock AS c
     LEFT JOIN clock_host AS n ON c.clock_id = n.clock_id
