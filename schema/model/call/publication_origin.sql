@@ -5,7 +5,7 @@
 --     identifies, belongs to the process's only /rosout publisher. What only the middleware
 --     publishes has none.
 -- grain: one row per publish() call
--- needs: staging.publication_call, staging.publisher_known
+-- needs: staging.publication_call, staging.publisher_known, staging.with_latest
 WITH call AS (
     SELECT
         c.start_event_id, c.process_id, c.publisher_handle, c.rmw_handle, c.writer,
@@ -13,32 +13,16 @@ WITH call AS (
         AND c.rmw_handle IS NULL AND c.writer IS NULL AS may_be_rosout
     FROM staging.publication_call AS c
 ),
-known AS (
-    SELECT
-        event_id, process_id, publisher_handle,
-        count(*) OVER (PARTITION BY process_id, publisher_handle) > 1 AS is_repeated
-    FROM staging.publisher_known
+used AS NOT MATERIALIZED (
+    SELECT start_event_id AS event_id, process_id, publisher_handle AS handle FROM call
 ),
--- Nearly every handle is used once: only the others need an order.
+known AS (
+    SELECT event_id, process_id, publisher_handle AS handle FROM staging.publisher_known
+),
 by_rcl AS (
-    SELECT c.start_event_id, p.event_id AS publisher_event_id
-    FROM call AS c
-    JOIN known AS p
-        ON c.process_id = p.process_id
-        AND c.publisher_handle = p.publisher_handle
-        AND c.start_event_id >= p.event_id
-    WHERE NOT p.is_repeated
-    UNION ALL
-    SELECT c.start_event_id, p.event_id
-    FROM (
-        SELECT * FROM call
-        SEMI JOIN (SELECT * FROM known WHERE is_repeated) AS r
-            ON call.process_id = r.process_id AND call.publisher_handle = r.publisher_handle
-    ) AS c
-    ASOF JOIN (SELECT * FROM known WHERE is_repeated) AS p
-        ON c.process_id = p.process_id
-        AND c.publisher_handle = p.publisher_handle
-        AND c.start_event_id >= p.event_id
+    SELECT event_id AS start_event_id, object_event_id AS publisher_event_id
+    FROM staging.with_latest('used', 'known')
+    WHERE object_event_id IS NOT NULL
 ),
 not_by_rcl AS (
     SELECT c.start_event_id, c.process_id, c.publisher_handle, c.rmw_handle, c.writer,

@@ -2,33 +2,17 @@
 -- description: The subscription of each take, by rmw handle or ring buffer, as initialised last
 --     before the take.
 -- grain: one row per take or dequeue whose subscription was initialised in the trace
--- needs: staging.take_chain, staging.subscription_known, staging.buffer_subscription
-WITH known AS (
-    SELECT
-        event_id, process_id, rmw_handle,
-        count(*) OVER (PARTITION BY process_id, rmw_handle) > 1 AS is_repeated
-    FROM staging.subscription_known
+-- needs: staging.take_chain, staging.subscription_known, staging.buffer_subscription,
+--     staging.with_latest
+WITH used AS NOT MATERIALIZED (
+    SELECT start_event_id AS event_id, process_id, rmw_handle AS handle FROM staging.take_chain
+),
+subscription AS (
+    SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known
 )
--- Nearly every handle is used once: only the others need an order.
-SELECT c.start_event_id, s.event_id AS subscription_event_id
-FROM staging.take_chain AS c
-JOIN known AS s
-    ON c.process_id = s.process_id
-    AND c.rmw_handle = s.rmw_handle
-    AND c.start_event_id >= s.event_id
-WHERE NOT s.is_repeated
-UNION ALL
-SELECT c.start_event_id, s.event_id
-FROM (
-    SELECT t.start_event_id, t.process_id, t.rmw_handle
-    FROM staging.take_chain AS t
-    SEMI JOIN (SELECT * FROM known WHERE is_repeated) AS r
-        ON t.process_id = r.process_id AND t.rmw_handle = r.rmw_handle
-) AS c
-ASOF JOIN (SELECT * FROM known WHERE is_repeated) AS s
-    ON c.process_id = s.process_id
-    AND c.rmw_handle = s.rmw_handle
-    AND c.start_event_id >= s.event_id
+SELECT event_id AS start_event_id, object_event_id AS subscription_event_id
+FROM staging.with_latest('used', 'subscription')
+WHERE object_event_id IS NOT NULL
 UNION ALL
 SELECT c.start_event_id, b.subscription_event_id
 FROM staging.take_chain AS c

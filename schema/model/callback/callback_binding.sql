@@ -5,39 +5,23 @@
 --     for another; the subscriptions agree where both are known.
 -- grain: one row per callback_start
 -- needs: staging.callback_run, staging.callback_known, staging.take_chain,
---     staging.take_subscription
-WITH known AS (
+--     staging.take_subscription, staging.with_latest
+WITH begun AS NOT MATERIALIZED (
     SELECT
-        event_id, process_id, callback_handle, kind, subscription_event_id,
-        count(*) OVER (PARTITION BY process_id, callback_handle) > 1 AS is_repeated
-    FROM staging.callback_known
+        start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,
+        previous_event_id, previous_executor_event_id
+    FROM staging.callback_run
 ),
--- Nearly every address is used once: only the others need an order.
-repeated AS (
-    SELECT r.start_event_id, k.event_id
-    FROM (
-        SELECT u.start_event_id, u.process_id, u.callback_handle
-        FROM staging.callback_run AS u
-        SEMI JOIN (SELECT * FROM known WHERE is_repeated) AS o
-            ON u.process_id = o.process_id AND u.callback_handle = o.callback_handle
-    ) AS r
-    ASOF JOIN (SELECT * FROM known WHERE is_repeated) AS k
-        ON r.process_id = k.process_id
-        AND r.callback_handle = k.callback_handle
-        AND r.start_event_id >= k.event_id
+known AS (
+    SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known
 ),
 run AS (
     SELECT
-        r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process,
-        r.previous_event_id, r.previous_executor_event_id, k.event_id AS callback_event_id,
-        k.kind, k.subscription_event_id
-    FROM staging.callback_run AS r
-    LEFT JOIN repeated AS o ON r.start_event_id = o.start_event_id
-    LEFT JOIN known AS k
-        ON r.process_id = k.process_id
-        AND r.callback_handle = k.callback_handle
-        AND r.start_event_id >= k.event_id
-        AND (NOT k.is_repeated OR k.event_id = o.event_id)
+        b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
+        b.is_intra_process, b.previous_event_id, b.previous_executor_event_id,
+        b.object_event_id AS callback_event_id, k.kind, k.subscription_event_id
+    FROM staging.with_latest('begun', 'known') AS b
+    LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
 ),
 taken AS (
     SELECT c.start_event_id, c.end_event_id, c.method, s.subscription_event_id

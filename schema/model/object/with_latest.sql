@@ -1,0 +1,33 @@
+-- name: staging.with_latest
+-- kind: macro
+-- description: Uses of handles, each with the object of that handle that was initialised last
+--     before it, in its process. Both are the names of tables with an event_id, process_id and
+--     handle; uses may have other columns as well.
+-- grain: one row per use; `object_event_id` is NULL where no such object was initialised before
+CREATE OR REPLACE MACRO staging.with_latest(uses, objects) AS TABLE
+WITH object AS (
+    SELECT event_id, process_id, handle
+    FROM query_table(objects)
+    WHERE handle IS NOT NULL
+),
+repeated AS (
+    SELECT process_id, handle
+    FROM object
+    GROUP BY process_id, handle
+    HAVING count(*) > 1
+)
+-- Nearly every handle is used once: only the others need an order.
+SELECT u.*, o.event_id AS object_event_id
+FROM query_table(uses) AS u
+LEFT JOIN object AS o
+    ON u.process_id = o.process_id AND u.handle = o.handle AND u.event_id >= o.event_id
+ANTI JOIN repeated AS r ON u.process_id = r.process_id AND u.handle = r.handle
+UNION ALL
+SELECT u.*, o.event_id
+FROM (
+    SELECT s.*
+    FROM query_table(uses) AS s
+    SEMI JOIN repeated AS r ON s.process_id = r.process_id AND s.handle = r.handle
+) AS u
+ASOF LEFT JOIN object AS o
+    ON u.process_id = o.process_id AND u.handle = o.handle AND u.event_id >= o.event_id
