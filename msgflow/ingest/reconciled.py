@@ -14,16 +14,17 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from msgflow.ingest.catalogue import load
 from msgflow.resources import resource_directory
 from msgflow.sql.statement import Statements
+from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import duckdb
+    import pyarrow as pa
     from numpy.typing import NDArray
 
 # By how much the two records of one event may be apart [ns], at the ends of a recording.
@@ -70,17 +71,15 @@ class Corrections:
         return batch
 
     def _without_copies(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        is_copy = _are_among(np.asarray(batch["event_id"]), self.left_out)[0]
-        return batch.filter(pa.array(~is_copy)) if is_copy.any() else batch
+        is_copy = _are_among(to_numpy(batch["event_id"]), self.left_out)[0]
+        return batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
 
     def _with_namespaces(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        processes = _process(self.hosts[np.asarray(batch["trace_index"])], batch["vpid"])
+        processes = _process(self.hosts[to_numpy(batch["trace_index"])], to_numpy(batch["vpid"]))
         is_known, places = _are_among(processes, self.processes)
-        is_given = np.asarray(batch["pid_ns"].is_valid())
-        values = np.where(
-            is_given, np.asarray(batch["pid_ns"].fill_null(0)), self.namespaces[places]
-        )
-        column = pa.array(values, pa.int64(), mask=~(is_given | is_known))
+        is_given = is_valid(batch["pid_ns"])
+        values = np.where(is_given, to_numpy(batch["pid_ns"]), self.namespaces[places])
+        column = to_arrow(values, ~(is_given | is_known))
         return batch.set_column(batch.schema.get_field_index("pid_ns"), "pid_ns", column)
 
 
@@ -136,7 +135,9 @@ def _events() -> str:
     )
 
 
-def _process(hosts: NDArray[np.int64], pids: Sequence[int] | pa.Array) -> NDArray[np.int64]:
+def _process(
+    hosts: NDArray[np.int64], pids: Sequence[int] | NDArray[np.int32]
+) -> NDArray[np.int64]:
     return (np.asarray(hosts, np.int64) << 32) | np.asarray(pids, np.int64)
 
 

@@ -15,6 +15,7 @@ import pyarrow as pa
 
 from msgflow.ingest.catalogue import Origin
 from msgflow.trace import COMMON_SCHEMA
+from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -78,6 +79,7 @@ class Sequences:
         """
         self._tracepoints = catalogue.tracepoints
         self._labels = catalogue.labels
+        self._label_texts = texts_to_arrow(catalogue.labels)
         self._label_of = {
             name: _NONE if t.label is None else self._labels.index(t.label)
             for name, t in catalogue.tracepoints.items()
@@ -142,13 +144,13 @@ class Sequences:
         places: NDArray[np.int32],
     ) -> pa.RecordBatch:
         columns = {column: batch[column] for column in _LEADING}
-        columns["thread_index"] = pa.array(threads)
+        columns["thread_index"] = to_arrow(threads)
         for predecessor in self._tracepoints[name].predecessors:
             values = origins[predecessor.sequence][predecessor.origin][places]
             is_missing = values == _NONE
-            column = pa.array(values, mask=is_missing if is_missing.any() else None)
+            column = to_arrow(values, is_missing)
             if predecessor.origin is Origin.LABEL:
-                column = pa.DictionaryArray.from_arrays(column, pa.array(self._labels))
+                column = pa.DictionaryArray.from_arrays(column, self._label_texts)
             columns[predecessor.column] = column
         for field in batch.schema.names[_CONTEXTS:]:
             columns[field] = batch[field]
@@ -172,7 +174,10 @@ class _Threads:
     def of(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> NDArray[np.int32]:
         """Return the thread of each event, batch after batch."""
         pairs = np.concatenate(
-            [np.column_stack((batch["vpid"], batch["vtid"])) for _, batch in batches]
+            [
+                np.column_stack((to_numpy(batch["vpid"]), to_numpy(batch["vtid"])))
+                for _, batch in batches
+            ]
         )
         names = self._names.of(pairs.view(np.int64).reshape(-1))
         has_namespaces = any(batch["pid_ns"].null_count < batch.num_rows for _, batch in batches)
@@ -181,8 +186,10 @@ class _Threads:
         spaces = self._hosts[_gathered(batches, "trace_index")] << 32
         if has_namespaces:
             given = [batch["pid_ns"] for _, batch in batches]
-            values = np.concatenate([np.asarray(column.fill_null(0)) for column in given])
-            is_given = np.concatenate([np.asarray(column.is_valid()) for column in given])
+            values = np.concatenate(
+                [np.where(is_valid(column), to_numpy(column), 0) for column in given]
+            )
+            is_given = np.concatenate([is_valid(column) for column in given])
             spaces |= np.where(is_given, self._namespaces.of(values) + 1, 0)
         return self._threads.of(names | (self._spaces.of(spaces).astype(np.int64) << 32))
 
@@ -293,12 +300,12 @@ def _new_threads(
 ) -> pa.RecordBatch:
     fresh = np.flatnonzero(threads >= known)
     found, first = np.unique(threads[fresh], return_index=True)
-    rows = pa.array(fresh[first])
+    rows = to_arrow(fresh[first])
     columns = [
         pa.chunked_array([batch[name] for _, batch in batches]).take(rows).combine_chunks()
         for name in THREAD_SCHEMA.names[1:]
     ]
-    return pa.RecordBatch.from_arrays([pa.array(found), *columns], schema=THREAD_SCHEMA)
+    return pa.RecordBatch.from_arrays([to_arrow(found), *columns], schema=THREAD_SCHEMA)
 
 
 def _names(
@@ -308,21 +315,24 @@ def _names(
 ) -> pa.RecordBatch:
     encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
     codes = np.concatenate(
-        [np.asarray(chunk.indices.fill_null(_NONE)) for chunk in encoded.chunks]
+        [
+            np.where(is_valid(chunk.indices), to_numpy(chunk.indices), _NONE)
+            for chunk in encoded.chunks
+        ]
     )[groups.rows]
     is_start = np.append(True, codes[1:] != codes[:-1])
     is_start[groups.starts] = True
     starts = np.flatnonzero(is_start)
     ends = np.append(starts[1:], codes.size) - 1
-    names = encoded.chunks[0].dictionary.take(pa.array(codes[starts], mask=codes[starts] == _NONE))
+    names = encoded.chunks[0].dictionary.take(to_arrow(codes[starts], codes[starts] == _NONE))
     extents = [
         events[origin][at] for origin in (Origin.EVENT_ID, Origin.TS_NS) for at in (starts, ends)
     ]
     return pa.RecordBatch.from_arrays(
-        [pa.array(groups.threads[starts]), names.cast(pa.string()), *map(pa.array, extents)],
+        [to_arrow(groups.threads[starts]), names.cast(pa.string()), *map(to_arrow, extents)],
         schema=THREAD_NAME_SCHEMA,
     )
 
 
 def _gathered(batches: Sequence[tuple[str, pa.RecordBatch]], name: str) -> NDArray[Any]:
-    return np.concatenate([np.asarray(batch[name]) for _, batch in batches])
+    return np.concatenate([to_numpy(batch[name]) for _, batch in batches])

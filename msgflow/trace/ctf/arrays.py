@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from msgflow.trace.numpy_arrow import to_arrow
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
 def number_array(values: NDArray[Any], data_type: pa.DataType) -> pa.Array:
     """Return numbers; integers that do not fit are wrapped round as C would."""
-    return pa.array(_converted(values, data_type))
+    return to_arrow(_converted(values, data_type))
 
 
 def list_array(
@@ -23,7 +25,7 @@ def list_array(
 ) -> pa.Array:
     """Return lists of numbers."""
     return pa.ListArray.from_arrays(
-        pa.array(offsets.astype(np.int32)),
+        to_arrow(offsets.astype(np.int32)),
         number_array(elements, data_type.value_type),
         type=data_type,
     )
@@ -56,12 +58,12 @@ def scattered_array(
             places = places[:, np.newaxis] + np.arange(values.shape[1])
         elements[places] = _converted(values, element_type)
     if not is_list:
-        return pa.array(elements, mask=is_missing)
+        return to_arrow(elements, is_missing)
     return pa.ListArray.from_arrays(
-        pa.array(offsets.astype(np.int32)),
-        pa.array(elements),
+        to_arrow(offsets.astype(np.int32)),
+        to_arrow(elements),
         type=data_type,
-        mask=pa.array(is_missing),
+        mask=to_arrow(is_missing),
     )
 
 

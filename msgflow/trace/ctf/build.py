@@ -14,6 +14,7 @@ from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.gather import FieldRows
 from msgflow.trace.ctf.thread_names import ThreadNames, word_offsets
 from msgflow.trace.ctf.types import Scope
+from msgflow.trace.numpy_arrow import to_arrow
 from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
@@ -81,10 +82,10 @@ def build_batch(
     """
     count = rows.event_ids.size
     columns = {
-        "event_id": pa.array(rows.event_ids),
-        "ts_ns": pa.array(rows.ts_ns),
-        "trace_index": pa.array(np.full(count, plan.stream.trace_index, np.int32)),
-        "cpu_id": pa.array(rows.cpus, mask=None if rows.has_cpu is None else ~rows.has_cpu),
+        "event_id": to_arrow(rows.event_ids),
+        "ts_ns": to_arrow(rows.ts_ns),
+        "trace_index": to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
+        "cpu_id": to_arrow(rows.cpus, None if rows.has_cpu is None else ~rows.has_cpu),
     }
     field_of: _FastFields | _SlowFields
     if plan.is_slow:
@@ -102,7 +103,7 @@ def build_batch(
         elif not is_common and field.name in plan.inner:
             arrays.append(field_of.inner_array(plan.inner[field.name], field.type))
         elif is_common and field.name in _WITHOUT_CONTEXT:
-            arrays.append(pa.array(np.full(count, _WITHOUT_CONTEXT[field.name], np.int32)))
+            arrays.append(to_arrow(np.full(count, _WITHOUT_CONTEXT[field.name], np.int32)))
         else:
             arrays.append(pa.nulls(count, field.type))
     return pa.RecordBatch.from_arrays(arrays, schema=plan.schema)

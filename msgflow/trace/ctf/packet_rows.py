@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow as pa
 
-from msgflow.trace.columns import record_batch
 from msgflow.trace.ctf.quirks import events_may_follow_end
 from msgflow.trace.model import EventBatch
+from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
 
 if TYPE_CHECKING:
@@ -54,8 +55,11 @@ class PacketRows:
         """Give away what was collected in this round, at most so many rows at once."""
         for begin in range(0, len(self._rows), most):
             rows = self._rows[begin : begin + most]
-            columns = dict(zip(PACKET_SCHEMA.names, zip(*rows, strict=True), strict=True))
-            batch = record_batch(PACKET_SCHEMA, columns, {}, len(rows))
+            columns = [
+                integers_to_arrow(values, field.type)
+                for field, values in zip(PACKET_SCHEMA, zip(*rows, strict=True), strict=True)
+            ]
+            batch = pa.RecordBatch.from_arrays(columns, schema=PACKET_SCHEMA)
             yield EventBatch(PACKET, batch, number)
         self._rows.clear()
 

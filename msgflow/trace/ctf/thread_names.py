@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -27,8 +29,8 @@ class ThreadNames:
     def array(self, indexes: NDArray[np.int32]) -> pa.Array:
         """Return names given by their indexes."""
         if self._dictionary is None or len(self._dictionary) < len(self._index_of_name):
-            self._dictionary = pa.array(list(self._index_of_name), pa.string())
-        return pa.DictionaryArray.from_arrays(pa.array(indexes), self._dictionary)
+            self._dictionary = texts_to_arrow(list(self._index_of_name))
+        return pa.DictionaryArray.from_arrays(to_arrow(indexes), self._dictionary)
 
     def index_of(self, name: str) -> int:
         """Return the index of a name."""
@@ -38,7 +40,9 @@ class ThreadNames:
         """Return an array of names given one by one."""
         indexes = [None if name is None else self.index_of(name) for name in names]
         self.array(np.empty(0, np.int32))
-        return pa.DictionaryArray.from_arrays(pa.array(indexes, pa.int32()), self._dictionary)
+        return pa.DictionaryArray.from_arrays(
+            integers_to_arrow(indexes, pa.int32()), self._dictionary
+        )
 
     def indexes(self, words: list[NDArray[np.uint64]], length: int) -> NDArray[np.int32]:
         """Return the indexes of names given by their bytes.

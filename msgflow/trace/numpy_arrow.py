@@ -1,0 +1,87 @@
+"""Between numpy and Arrow without a detour.
+
+pyarrow's own ways import pandas wherever that is installed, to see whether they were given
+something of it: that takes longer than reading a small trace.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+_NUMBERS = {
+    np.dtype(name): getattr(pa, name)()
+    for name in (
+        *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
+        *("float32", "float64"),
+    )
+}
+
+
+def to_arrow(values: NDArray[Any], is_missing: NDArray[np.bool_] | None = None) -> pa.Array:
+    """Return numbers or truth values; those that are missing are NULL."""
+    count = values.size
+    valid = None if is_missing is None or not is_missing.any() else _bits(~is_missing)
+    if values.dtype == np.bool_:
+        return pa.Array.from_buffers(pa.bool_(), count, [valid, _bits(values)])
+    native = np.ascontiguousarray(values, values.dtype.newbyteorder("="))
+    return pa.Array.from_buffers(_NUMBERS[native.dtype], count, [valid, pa.py_buffer(native)])
+
+
+def integers_to_arrow(values: Sequence[int | None], data_type: pa.DataType) -> pa.Array:
+    """Return integers, those that do not fit wrapped round as C would, or truth values."""
+    is_missing = np.array([value is None for value in values], np.bool_)
+    given = [value or 0 for value in values]
+    if pa.types.is_boolean(data_type):
+        return to_arrow(np.array(given, np.bool_), is_missing)
+    bits = data_type.bit_width
+    low = np.array([value & ((1 << bits) - 1) for value in given], f"u{bits // 8}")
+    return to_arrow(low.view(data_type.to_pandas_dtype()), is_missing)
+
+
+def texts_to_arrow(texts: Sequence[str | None]) -> pa.Array:
+    """Return texts; None is NULL."""
+    encoded = [b"" if text is None else text.encode() for text in texts]
+    offsets = np.zeros(len(texts) + 1, np.int32)
+    np.cumsum([len(text) for text in encoded], out=offsets[1:])
+    is_missing = np.array([text is None for text in texts], np.bool_)
+    valid = _bits(~is_missing) if is_missing.any() else None
+    content = pa.py_buffer(b"".join(encoded))
+    return pa.Array.from_buffers(pa.string(), len(texts), [valid, pa.py_buffer(offsets), content])
+
+
+def to_numpy(array: pa.Array) -> NDArray[Any]:
+    """Return numbers or truth values; what is in the place of NULL means nothing."""
+    _, content = array.buffers()
+    begin, end = array.offset, array.offset + len(array)
+    if content is None:
+        return np.zeros(len(array), array.type.to_pandas_dtype())
+    if pa.types.is_boolean(array.type):
+        return _truths(content, begin, end)
+    values: NDArray[Any] = np.frombuffer(content, array.type.to_pandas_dtype())[begin:end]
+    return values
+
+
+def is_valid(array: pa.Array) -> NDArray[np.bool_]:
+    """Return which values are not NULL."""
+    valid = array.buffers()[0]
+    if valid is None:
+        return np.full(len(array), array.null_count == 0)
+    return _truths(valid, array.offset, array.offset + len(array))
+
+
+def _bits(truths: NDArray[np.bool_]) -> pa.Buffer:
+    return pa.py_buffer(np.packbits(truths, bitorder="little"))
+
+
+def _truths(bits: pa.Buffer, begin: int, end: int) -> NDArray[np.bool_]:
+    return np.unpackbits(np.frombuffer(bits, np.uint8), count=end, bitorder="little")[begin:].view(
+        np.bool_
+    )

@@ -1,0 +1,89 @@
+"""What goes from numpy to Arrow and back is what pyarrow makes of it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from msgflow.sim import simulate
+from msgflow.trace.numpy_arrow import (
+    integers_to_arrow,
+    is_valid,
+    texts_to_arrow,
+    to_arrow,
+    to_numpy,
+)
+
+TYPES = ["bool", "int8", "int32", "int64", "uint16", "uint64", "float32", "float64", ">u4", ">i8"]
+
+
+@settings(deadline=None)
+@given(
+    kind=st.sampled_from(TYPES),
+    rows=st.lists(st.tuples(st.integers(0, 127), st.booleans()), max_size=40),
+    begin=st.integers(0, 20),
+)
+def test_there_and_back(kind: str, rows: list[tuple[int, bool]], begin: int) -> None:
+    values = np.array([value for value, _ in rows], kind)
+    is_missing = np.array([missing for _, missing in rows], np.bool_)
+    expected = pa.array(values.astype(values.dtype.newbyteorder("=")), mask=is_missing)
+    array = to_arrow(values, is_missing)
+    array.validate(full=True)
+    assert array.equals(expected)
+    assert array.null_count == expected.null_count
+    assert to_arrow(values).null_count == 0
+    for part in (array.slice(begin), expected.slice(begin), to_arrow(values).slice(begin)):
+        present = is_valid(part)
+        assert present.tolist() == [value is not None for value in part.to_pylist()]
+        kept = [value for value in part.to_pylist() if value is not None]
+        assert to_numpy(part)[present].tolist() == kept
+
+
+def test_values_apart_in_memory() -> None:
+    values = np.arange(20, dtype=np.int32)[::3]
+    assert to_arrow(values).to_pylist() == values.tolist()
+
+
+def test_nulls_alone() -> None:
+    nothing = pa.nulls(3, pa.int32())
+    assert not is_valid(nothing).any()
+    assert to_numpy(nothing).size == 3
+
+
+@settings(deadline=None)
+@given(st.lists(st.none() | st.integers(-(1 << 70), 1 << 70)))
+def test_integers_are_wrapped(values: list[int | None]) -> None:
+    low = [
+        None if value is None else (value + (1 << 31)) % (1 << 32) - (1 << 31) for value in values
+    ]
+    assert integers_to_arrow(values, pa.int32()).to_pylist() == low
+    truths = [None if value is None else bool(value) for value in values]
+    assert integers_to_arrow(values, pa.bool_()).to_pylist() == truths
+
+
+@settings(deadline=None)
+@given(st.lists(st.none() | st.text(st.characters(exclude_categories=["Cs"]))))
+def test_texts(texts: list[str | None]) -> None:
+    array = texts_to_arrow(texts)
+    array.validate(full=True)
+    assert array.to_pylist() == texts
+
+
+def test_an_ingest_does_not_import_pandas(tmp_path: Path) -> None:
+    """It takes longer than reading a small trace."""
+    pytest.importorskip("pandas")
+    simulate("pipeline", tmp_path / "trace", factor=0.02)
+    script = (
+        "import sys; from pathlib import Path; from msgflow.ingest import ingest\n"
+        "ingest([sys.argv[1]], Path(sys.argv[2]))\n"
+        "sys.exit('pandas' in sys.modules)"
+    )
+    command = [sys.executable, "-c", script, tmp_path / "trace", tmp_path / "run.duckdb"]
+    subprocess.run(command, check=True)
