@@ -17,6 +17,7 @@ those of DAILY, and all recordings; `--system all` is every one there is.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import shlex
 import subprocess
@@ -182,8 +183,8 @@ def read_all() -> None:
             result.to_parquet(folder / f"query {header.name}.parquet")
         told = {"findings": opened.findings(run=1), "audits": opened.check()}
     for name, items in told.items():
-        rows = pyarrow.Table.from_pylist([asdict(item) for item in items])
-        pyarrow.parquet.write_table(rows, folder / f"query {name}.parquet")
+        rows = pyarrow.array([json.dumps(asdict(item)) for item in items], pyarrow.string())
+        pyarrow.parquet.write_table(pyarrow.table({"told": rows}), folder / f"query {name}.parquet")
 
 
 def sources(connection: duckdb.DuckDBPyConnection) -> Iterator[tuple[str, str]]:

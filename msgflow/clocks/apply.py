@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 from msgflow.db.change import change_runs
 from msgflow.db.derive import derive_from_clocks
 from msgflow.db.diagnostic import forget, note
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     import duckdb
@@ -17,56 +19,17 @@ if TYPE_CHECKING:
     from msgflow.clocks.file import ClockSync, GivenClock
     from msgflow.run.choice import Run
 
-_FORGET = """
-UPDATE store.clock SET
-    offset_ns = 0, drift_ppb = 0, reference_ns = begun.begin_ns, uncertainty_ns = NULL,
-    drift_uncertainty_ppb = NULL, reference_clock_id = NULL, method = 'none'
-FROM (
-    SELECT c.clock_id, coalesce(min(t.start_ns), 0) AS begin_ns
-    FROM store.clock AS c
-    LEFT JOIN store.host AS h ON c.clock_id = h.clock_id
-    LEFT JOIN store.trace AS t ON h.host_id = t.host_id
-    WHERE c.run_id = $run_id
-    GROUP BY c.clock_id
-) AS begun
-WHERE clock.clock_id = begun.clock_id
-"""
-
-_SYNCHRONISED = """
-CREATE OR REPLACE TEMP TABLE clock_synchronised AS
-SELECT *, count(*) OVER (PARTITION BY reference_clock_id) > 1 AS is_connected
-FROM derive.clock_sync($run_id)
-"""
-
-# A clock that nothing connects with another one stays as it is.
-_FROM_MESSAGES = """
-UPDATE store.clock SET
-    offset_ns = sync.offset_ns, drift_ppb = sync.drift_ppb, reference_ns = sync.reference_ns,
-    uncertainty_ns = sync.uncertainty_ns, drift_uncertainty_ppb = sync.drift_uncertainty_ppb,
-    reference_clock_id = sync.reference_clock_id,
-    method = CASE
-        WHEN sync.clock_id = sync.reference_clock_id THEN 'none'
-        WHEN sync.has_packets THEN 'packets'
-        ELSE 'messages'
-    END
-FROM clock_synchronised AS sync
-WHERE clock.clock_id = sync.clock_id AND sync.is_connected
-"""
+# What a correction consists of.
+_CORRECTION = (
+    "offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns", "drift_uncertainty_ppb",
+    "reference_clock_id", "method",
+)  # fmt: skip
 
 _BOUNDS = """
 INSERT INTO store.clock_uncertainty (run_id, clock_id, at_ns, uncertainty_ns)
 SELECT $run_id, sync.clock_id, bound.at_ns, bound.uncertainty_ns
 FROM clock_synchronised AS sync, unnest(sync.bounds) AS unnested (bound)
 ORDER BY sync.clock_id, bound.at_ns
-"""
-
-_CLOCKS = """
-SELECT c.clock_id, c.uuid, list(h.hostname ORDER BY h.host_id)
-FROM store.clock AS c
-JOIN store.host AS h ON c.clock_id = h.clock_id
-WHERE c.run_id = ?
-GROUP BY c.clock_id, c.uuid
-ORDER BY c.clock_id
 """
 
 _GIVEN = """
@@ -111,12 +74,16 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
     Raises:
         UsageError: a file that does not fit the run.
     """
-    con.execute(_FORGET, {"run_id": run_id})
+    _correct(con, f"({program().text('clock_as_recorded')})", {"run_id": run_id})
     con.execute("DELETE FROM store.clock_uncertainty WHERE run_id = ?", [run_id])
     forget(con, run_id, "clocks")
     if sync.method == "messages":
-        con.execute(_SYNCHRONISED, {"run_id": run_id})
-        con.execute(_FROM_MESSAGES)
+        con.execute(
+            "CREATE OR REPLACE TEMP TABLE clock_synchronised AS\n"
+            + program().text("clock_from_messages"),
+            {"run_id": run_id},
+        )
+        _correct(con, "(FROM clock_synchronised WHERE is_connected)")
         con.execute(_BOUNDS, {"run_id": run_id})
         note(con, run_id, "clocks")
         con.execute("DROP TABLE temp.clock_synchronised")
@@ -124,8 +91,20 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
         _set_given(con, run_id, sync)
 
 
+def _correct(
+    con: duckdb.DuckDBPyConnection, source: str, values: Mapping[str, int] | None = None
+) -> None:
+    """Store the corrections that the rows of `source` hold of their clocks."""
+    assigned = ", ".join(f"{column} = new.{column}" for column in _CORRECTION)
+    con.execute(
+        f"UPDATE store.clock SET {assigned} FROM {source} AS new "
+        "WHERE clock.clock_id = new.clock_id",
+        values or {},
+    )
+
+
 def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:
-    clocks = con.execute(_CLOCKS, [run_id]).fetchall()
+    clocks = program().run(con, "clock_known", {"run_id": run_id}).fetchall()
     chosen: dict[int, GivenClock] = {}
     for given in sync.clocks:
         found = [clock for clock in clocks if given.name == clock[1]] or [

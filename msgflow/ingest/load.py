@@ -17,6 +17,7 @@ from msgflow.ingest.ignored import is_ignored, matches
 from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.sequences import Sequences
+from msgflow.sql.statement import program
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 
 if TYPE_CHECKING:
@@ -34,21 +35,6 @@ _ROWS_PER_TRANSACTION = 2_000_000
 _ROWS_PER_INSERT = 122_880
 # Rows that wait for more, of all tables.
 _MOST_WAITING = 500_000
-
-# Packets of the target database that the packets just read are the same as.
-_SAME_PACKETS = """
-SELECT DISTINCT r.run_id, r.name
-FROM packet_batch AS b
-JOIN staging.source AS s ON b.trace_index = s.trace_index
-JOIN store.trace AS t ON s.uuid = t.uuid
-JOIN store.packet AS p
-    ON t.trace_id = p.trace_id
-    AND b.stream_class_id = p.stream_class_id
-    AND b.stream_instance_id IS NOT DISTINCT FROM p.stream_instance_id
-    AND b.begin_ns = p.begin_ns
-JOIN store.run AS r ON p.run_id = r.run_id
-ORDER BY r.run_id
-"""
 
 
 @dataclass(frozen=True)
@@ -263,7 +249,7 @@ class _Tables:
     def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
         self._con.register("packet_batch", rows)
         try:
-            runs = self._con.execute(_SAME_PACKETS).fetchall()
+            runs = self._con.execute(program().text("known_packet")).fetchall()
         finally:
             self._con.unregister("packet_batch")
         if runs and not self._may_replace:

@@ -33,14 +33,6 @@ _SLACK_NS = 100_000
 # Tables that are made of each other, in this order, and gone in the end.
 _TABLES = ("session_trace", "told_namespace", "coverage", "overlap")
 
-_REPORT = """
-INSERT INTO staging.left_out
-SELECT
-    trace_index, used_index, count(*), count(DISTINCT thread), max(ts_ns) - min(ts_ns)
-FROM left_out
-GROUP BY trace_index, used_index
-"""
-
 
 @dataclass(frozen=True)
 class Corrections:
@@ -96,7 +88,7 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
         con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
         _make(con, "left_out")
         con.execute("DROP VIEW thread_event")
-        con.execute(_REPORT)
+        con.execute("INSERT INTO staging.left_out\n" + statements().text("left_out_between"))
         left_out = con.execute("SELECT event_id FROM left_out ORDER BY ALL").fetchnumpy()[
             "event_id"
         ]
@@ -117,13 +109,14 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
 
 def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:
     """Make a temporary table as `schema/reconcile` has it."""
-    header = _statements().header(table)
+    header = statements().header(table)
     values = {"slack_ns": _SLACK_NS} if header.params else {}
     con.execute(f"CREATE OR REPLACE TEMP TABLE {table} AS\n{header.body}", values)
 
 
 @cache
-def _statements() -> Statements:
+def statements() -> Statements:
+    """Return what is asked about what traces tell twice."""
     return Statements("reconcile", resource_directory("schema") / "reconcile")
 
 

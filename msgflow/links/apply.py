@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.change import change_runs
 from msgflow.db.derive import derive
 from msgflow.links.match import match_links
+from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -17,22 +18,6 @@ if TYPE_CHECKING:
     from msgflow.links.file import LinksFile
     from msgflow.links.match import MatchedLink
     from msgflow.run.choice import Run
-
-_LISTED = """
-SELECT a.kind, a.process_id,
-    (
-        SELECT list(i.subscription_id ORDER BY i.subscription_id)
-        FROM store.annotation_input AS i
-        WHERE i.annotation_id = a.annotation_id
-    ),
-    (
-        SELECT list(o.publisher_id ORDER BY o.publisher_id)
-        FROM store.annotation_output AS o
-        WHERE o.annotation_id = a.annotation_id
-    )
-FROM store.annotation AS a
-WHERE a.run_id = ? AND a.source = 'trace'
-"""
 
 
 @dataclass(frozen=True)
@@ -112,7 +97,9 @@ def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) 
     unique = {_key(link): link for link in matched}
     traced = {
         (kind, process_id, tuple(inputs or ()), tuple(outputs or ()))
-        for kind, process_id, inputs, outputs in con.execute(_LISTED, [run_id]).fetchall()
+        for kind, process_id, inputs, outputs in program()
+        .run(con, "link_declared", {"run_id": run_id})
+        .fetchall()
     }
     added = [link for key, link in unique.items() if key not in traced]
     for annotation_id, link in enumerate(added, start=first):
@@ -150,12 +137,5 @@ def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]
 
 def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]:
     """Return how many indirect links files declare, and how many the trace does."""
-    counts = dict(
-        con.execute(
-            "SELECT a.source, count(*) FROM store.link_causal AS l "
-            "JOIN store.annotation AS a ON l.annotation_id = a.annotation_id "
-            "WHERE l.run_id = ? GROUP BY a.source",
-            [run_id],
-        ).fetchall()
-    )
-    return counts.get("file", 0), counts.get("trace", 0)
+    ((of_file, of_trace),) = program().run(con, "link_source", {"run_id": run_id}).fetchall()
+    return of_file, of_trace

@@ -11,7 +11,7 @@
         == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
                              forbids NULL 1 for a key, else 0, false or an empty text
         == scratch TABLE     of page queries over what pages compute once per run: its rows
-        == staging TABLE     of a diagnostic of what was read: the columns of staging.TABLE it needs
+        == staging TABLE     of what was read: the columns of staging.TABLE that are needed
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
@@ -329,27 +329,32 @@ def _program_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     for table, text in case.scratch.items():
-        _create(connection, f"temp.{table}", text)
+        _create(connection, f"TEMP TABLE {table}", text)
+    _stage(connection, case)
     return program().run(connection, name, _FRAME | given).to_arrow_table()
 
 
-def _create(connection: duckdb.DuckDBPyConnection, table: str, text: str) -> None:
-    """Make a table with the columns that the rows of text are of."""
+def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None:
+    """Make what stands behind CREATE, with the columns that the rows of text are of."""
     rows = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
     with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
         file.writelines(rows)
         file.flush()
-        connection.execute(f"CREATE TABLE {table} AS FROM read_csv(?, header = true)", [file.name])
+        connection.execute(f"CREATE {what} AS FROM read_csv(?, header = true)", [file.name])
+
+
+def _stage(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
+    if case.staging:
+        connection.execute("ATTACH ':memory:' AS staging")
+    for table, text in case.staging.items():
+        _create(connection, f"TABLE staging.{table}", text)
 
 
 def _diagnostic_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     (header,) = (header for header in diagnostics() if header.name == name)
-    if case.staging:
-        connection.execute("ATTACH ':memory:' AS staging")
-        for table, text in case.staging.items():
-            _create(connection, f"staging.{table}", text)
+    _stage(connection, case)
     values = {param.name: (_FRAME | given)[param.name] for param in header.params}
     return connection.sql(
         f"SELECT * FROM ({statement([header])}) ORDER BY ALL", params=values
