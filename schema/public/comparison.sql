@@ -59,7 +59,8 @@
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
 -- needs: derive.known_word, main.run, main.flow_path, main.end_to_end, main.callback_instance,
 --     main.callback_label, main.take, main.link_transport, main.subscription, main.process,
---     main.node, derive.node_label
+--     main.node, derive.node_label, derive.dominance, derive.block_length,
+--     derive.bootstrap_interval
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
     skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false,
@@ -165,28 +166,8 @@ measured AS MATERIALIZED (
     FROM sided
     GROUP BY side, subject
 ),
--- Rank sums, ties in the middle: how often values of B exceed values of A.
-ranked AS (
-    SELECT
-        subject,
-        side,
-        rank() OVER (PARTITION BY subject ORDER BY value_ns)
-        + (count(*) OVER (PARTITION BY subject, value_ns) - 1) / 2 AS value_rank
-    FROM sided
-    WHERE value_ns IS NOT NULL
-),
 dominance AS (
-    SELECT
-        subject,
-        2 * (
-            sum(value_rank) FILTER (WHERE side = 'b')
-            - count(*) FILTER (WHERE side = 'b') * (count(*) FILTER (WHERE side = 'b') + 1) / 2
-        ) / (
-            count(*) FILTER (WHERE side = 'a') * count(*) FILTER (WHERE side = 'b')
-        ) - 1 AS cliffs_delta
-    FROM ranked
-    GROUP BY subject
-    HAVING count(DISTINCT side) = 2
+    FROM derive.dominance('sided')
 ),
 -- What each statistic varies with, about its mean: the value, or whether it lies beyond a quantile.
 centred AS MATERIALIZED (
@@ -206,186 +187,11 @@ centred AS MATERIALIZED (
     JOIN dominance AS e ON s.subject = e.subject
     WHERE s.value_ns IS NOT NULL AND m.number >= 20
 ),
-variance AS (
-    SELECT
-        side,
-        subject,
-        avg(median_part) AS median_mean,
-        avg(mean_part) AS mean_mean,
-        avg(p95_part) AS p95_mean,
-        avg(p99_part) AS p99_mean,
-        nullif(var_pop(median_part), 0) AS median_variance,
-        nullif(var_pop(mean_part), 0) AS mean_variance,
-        nullif(var_pop(p95_part), 0) AS p95_variance,
-        nullif(var_pop(p99_part), 0) AS p99_variance
-    FROM centred
-    GROUP BY side, subject
-),
--- Blocks of 2, 4, 8, … neighbours, each overlapping the next one by half; five of them at least.
-half AS (
-    SELECT
-        c.side,
-        c.subject,
-        1 << n.level AS half_length,
-        c.position >> n.level AS place,
-        any_value(c.number) AS number,
-        sum(c.median_part) AS median_sum,
-        sum(c.mean_part) AS mean_sum,
-        sum(c.p95_part) AS p95_sum,
-        sum(c.p99_part) AS p99_sum
-    FROM centred AS c
-    JOIN range(24) AS n (level) ON c.number >= 10 * (1 << n.level)
-    WHERE c.position < (c.number >> n.level) << n.level
-    GROUP BY c.side, c.subject, n.level, c.position >> n.level
-),
-whole AS (
-    SELECT
-        side,
-        subject,
-        number,
-        2 * half_length AS block_length,
-        median_sum + lead(median_sum) OVER following AS median_sum,
-        mean_sum + lead(mean_sum) OVER following AS mean_sum,
-        p95_sum + lead(p95_sum) OVER following AS p95_sum,
-        p99_sum + lead(p99_sum) OVER following AS p99_sum
-    FROM half
-    WINDOW following AS (PARTITION BY side, subject, half_length ORDER BY place)
-),
--- For how many values they are alike (integrated autocorrelation time), by batch means: how much
--- more the means of blocks vary than those of as many independent values.
-alike AS (
-    SELECT
-        w.side,
-        w.subject,
-        w.number,
-        w.block_length,
-        list_transform(
-            [
-                avg(pow(w.median_sum - w.block_length * v.median_mean, 2) / v.median_variance),
-                avg(pow(w.mean_sum - w.block_length * v.mean_mean, 2) / v.mean_variance),
-                avg(pow(w.p95_sum - w.block_length * v.p95_mean, 2) / v.p95_variance),
-                avg(pow(w.p99_sum - w.block_length * v.p99_mean, 2) / v.p99_variance)
-            ],
-            lambda each: coalesce(
-                each / w.block_length * w.number / (w.number - w.block_length), 1
-            )
-        ) AS times
-    FROM whole AS w
-    JOIN variance AS v ON w.side = v.side AND w.subject = v.subject
-    GROUP BY w.side, w.subject, w.number, w.block_length
-),
-grown AS (
-    SELECT
-        side,
-        subject,
-        number,
-        block_length,
-        times,
-        lead(times) OVER longer AS twice_times,
-        max(list_max(times)) OVER longer AS longest
-    FROM alike
-    WINDOW longer AS (PARTITION BY side, subject ORDER BY block_length)
-),
--- Blocks are long enough where they are twice that; the more values, the longer in any case. They
--- still miss what reaches beyond their ends: it halves with twice the length, and is added. How
--- much so few blocks vary is not known well: intervals are wider by as much as Student's t is.
 block AS (
-    SELECT
-        side,
-        subject,
-        block_length,
-        list_transform(
-            list_zip(times, twice_times),
-            lambda each: sqrt(
-                least(greatest(1, 2 * each[2] / each[1] - 1), 3)
-                * (number / block_length - 1) / (number / block_length - 3)
-            )
-        ) AS widenings,
-        list_transform(
-            list_zip(times, twice_times),
-            lambda each: greatest(1, each[1], 2 * each[2] - each[1])
-        ) AS times
-    FROM grown
-    WHERE block_length >= greatest(2 * longest, cbrt(number) / 2) AND number >= 10 * block_length
-    QUALIFY row_number() OVER (PARTITION BY side, subject ORDER BY block_length) = 1
-),
--- Blocks wrap around the end. More than 1000 values (ten blocks) are not drawn at once: the spread
--- of fewer is wider by the root of how many times fewer they are, and is made narrower by that. Of
--- a block longer than 128 values, every other one (third, …) is taken.
-ring AS (
-    SELECT
-        m.side,
-        m.subject,
-        m.number,
-        m.quantiles,
-        m.mean_ns,
-        k.block_length,
-        greatest(10, ceil(least(m.number, 1000) / k.block_length))::BIGINT AS blocks,
-        ceil(k.block_length / 128)::BIGINT AS step,
-        list_concat(m.series, m.series[:k.block_length - 1]) AS series,
-        k.widenings,
-        hash(m.side, m.subject, seed) AS salt
-    FROM measured AS m
-    JOIN block AS k ON m.side = k.side AND m.subject = k.subject
-    WHERE resamples * (1 - confidence) >= 20 - 1e-9
-),
-drawn AS (
-    SELECT
-        r.side,
-        r.subject,
-        r.quantiles,
-        r.mean_ns,
-        r.widenings,
-        sqrt(r.blocks * r.block_length / r.number) AS narrowing,
-        n.resample,
-        list_sort(flatten(list_transform(
-            list_transform(
-                range(r.blocks),
-                lambda block: (hash(r.salt, n.resample, block) % r.number)::BIGINT
-            ),
-            lambda before: r.series[1 + before:r.block_length + before:r.step]
-        ))) AS sorted
-    FROM ring AS r
-    CROSS JOIN range(resamples) AS n (resample)
-),
-resampled AS (
-    SELECT
-        side,
-        subject,
-        resample,
-        narrowing,
-        widenings,
-        [
-            sorted[ceil(0.5 * len(sorted))::BIGINT] - quantiles[1],
-            list_avg(sorted) - mean_ns,
-            sorted[ceil(0.95 * len(sorted))::BIGINT] - quantiles[2],
-            sorted[ceil(0.99 * len(sorted))::BIGINT] - quantiles[3]
-        ]::DOUBLE[] AS deviations
-    FROM drawn
-),
-deviation AS (
-    SELECT
-        side,
-        subject,
-        resample,
-        unnest(['median', 'mean', 'p95', 'p99']) AS statistic,
-        unnest(list_transform(
-            list_zip(deviations, widenings), lambda each: each[1] * each[2] * narrowing
-        )) AS deviation_ns
-    FROM resampled
+    FROM derive.block_length('centred')
 ),
 spread AS (
-    SELECT
-        a.subject,
-        a.statistic,
-        quantile_cont(
-            b.deviation_ns - a.deviation_ns, [(1 - confidence) / 2, (1 + confidence) / 2]
-        ) AS ends
-    FROM deviation AS a
-    JOIN deviation AS b
-        ON a.subject = b.subject AND a.statistic = b.statistic AND a.resample = b.resample
-    WHERE a.side = 'a' AND b.side = 'b'
-    GROUP BY a.subject, a.statistic
+    FROM derive.bootstrap_interval('measured', 'block', resamples, confidence, seed)
 ),
 value AS (
     SELECT
