@@ -8,21 +8,7 @@
 -- grain: one row per run
 -- severity: warning
 -- phase: links
--- needs: store.annotation, store.annotation_input, store.annotation_output, store.subscription,
---     store.publisher
-WITH declared AS (
-    SELECT a.run_id, a.annotation_id, a.kind, i.subscription_id, o.publisher_id
-    FROM store.annotation AS a
-    JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
-    JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
-),
-conflict AS (
-    SELECT DISTINCT p.run_id, p.subscription_id, p.publisher_id
-    FROM declared AS p
-    JOIN declared AS s
-        ON p.subscription_id = s.subscription_id AND p.publisher_id = s.publisher_id
-    WHERE p.kind = 'periodic_async' AND s.kind = 'partial_sync'
-)
+-- needs: store.subscription, store.publisher, diagnostic.declared_pair
 SELECT
     c.run_id,
     NULL AS trace_id,
@@ -32,7 +18,13 @@ SELECT
         printf('%s → %s', coalesce(s.topic_name, '?'), coalesce(p.topic_name, '?')),
         ', ' ORDER BY s.topic_name, p.topic_name, c.subscription_id, c.publisher_id
     ) AS detail
-FROM conflict AS c
+FROM (
+    SELECT DISTINCT p.run_id, p.subscription_id, p.publisher_id
+    FROM declared_pair AS p
+    JOIN declared_pair AS s
+        ON p.subscription_id = s.subscription_id AND p.publisher_id = s.publisher_id
+    WHERE p.kind = 'periodic_async' AND s.kind = 'partial_sync'
+) AS c
 LEFT JOIN store.subscription AS s ON c.subscription_id = s.subscription_id
 LEFT JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
 GROUP BY c.run_id

@@ -9,18 +9,6 @@
 -- severity: warning
 -- phase: links
 -- needs: store.take, store.subscription, store.link_transport
-WITH unmatched AS (
-    SELECT t.run_id, t.trace_id, s.topic_name, t.source_timestamp_ns IS NULL AS has_no_stamp
-    FROM store.take AS t
-    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
-    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
-),
-by_topic AS (
-    SELECT run_id, trace_id, has_no_stamp, coalesce(topic_name, '?') AS topic_name,
-        count(*) AS number
-    FROM unmatched
-    GROUP BY ALL
-)
 SELECT
     run_id,
     trace_id,
@@ -28,5 +16,13 @@ SELECT
     'messages received whose publication is not known'
     || CASE WHEN has_no_stamp THEN ', and that carry no stamp: ' ELSE ': ' END
     || string_agg(printf('%s (%d)', topic_name, number), ', ' ORDER BY topic_name) AS detail
-FROM by_topic
+FROM (
+    SELECT
+        t.run_id, t.trace_id, coalesce(s.topic_name, '?') AS topic_name,
+        t.source_timestamp_ns IS NULL AS has_no_stamp, count(*) AS number
+    FROM store.take AS t
+    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
+    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
+    GROUP BY ALL
+)
 GROUP BY run_id, trace_id, has_no_stamp
