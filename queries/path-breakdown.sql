@@ -43,27 +43,48 @@
 -- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
 -- note: clocks
--- needs: main.end_to_end_part, main.executor_wait, main.flow_path, main.callback_instance,
---     main.callback_label, main.publisher, main.node, main.process
-WITH whole AS MATERIALIZED (
-    SELECT
-        e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_instance_id,
-        i.callback_id
-    FROM main.end_to_end_part(
-        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
-        max_depth := $max_depth, max_paths := $max_paths
-    ) AS e
-    LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id
-),
--- How long the executor was busy before each take. Between clocks that are apart the time that
--- they show may be shorter than that.
-taken AS (
+-- needs: main.end_to_end_flow, main.end_to_end_trail, main.end_to_end_piece, main.executor_wait,
+--     main.flow_path, main.callback_instance, main.callback_label, main.publisher, main.node,
+--     main.process
+CREATE TEMP TABLE breakdown_flow AS
+SELECT
+    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
+FROM main.end_to_end_flow(
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, $case,
+    max_depth := $max_depth, max_paths := $max_paths
+);
+
+CREATE TEMP TABLE breakdown_trail AS
+SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
+FROM main.end_to_end_trail(
+    'breakdown_flow', $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
+);
+
+CREATE TEMP TABLE breakdown_part AS
+SELECT
+    e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_instance_id,
+    i.callback_id
+FROM main.end_to_end_piece('breakdown_flow', 'breakdown_trail', $runs) AS e
+LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id;
+
+-- How long the executor was busy before each take.
+CREATE TEMP TABLE breakdown_wait AS
+SELECT callback_instance_id, busy_min_ns, busy_max_ns
+FROM main.executor_wait
+WHERE callback_instance_id IN (
+    SELECT callback_instance_id
+    FROM breakdown_part
+    WHERE part IN ('publish_to_take', 'request_to_take')
+);
+
+-- Between clocks that are apart the time that they show may be shorter than the executor was busy.
+WITH taken AS (
     SELECT
         e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_id,
         least(coalesce(w.busy_min_ns, 0), greatest(e.duration_ns, 0)) AS busy_min_ns,
         least(coalesce(w.busy_max_ns, e.duration_ns), greatest(e.duration_ns, 0)) AS busy_max_ns
-    FROM whole AS e
-    LEFT JOIN main.executor_wait AS w ON e.callback_instance_id = w.callback_instance_id
+    FROM breakdown_part AS e
+    LEFT JOIN breakdown_wait AS w ON e.callback_instance_id = w.callback_instance_id
     WHERE e.part IN ('publish_to_take', 'request_to_take')
 ),
 part AS (
@@ -71,7 +92,7 @@ part AS (
         path_id, flow_id, hop, position, part, duration_ns,
         CASE WHEN part IN ('callback', 'cache', 'take_to_callback', 'service') THEN callback_id END
             AS callback_id
-    FROM whole
+    FROM breakdown_part
     WHERE part NOT IN ('publish_to_take', 'request_to_take')
     UNION ALL
     SELECT
@@ -91,25 +112,28 @@ part AS (
 -- A flow has a part twice only in a hop with a cache or a service. To tell so many flows apart
 -- everywhere would take most of the memory.
 repeated AS (
-    SELECT DISTINCT path_id, hop FROM whole WHERE part IN ('cache', 'service')
+    SELECT p.path_id, p.hop, p.part, p.callback_id, count(DISTINCT p.flow_id) AS flows
+    FROM part AS p
+    JOIN (
+        SELECT DISTINCT path_id, hop FROM breakdown_part WHERE part IN ('cache', 'service')
+    ) AS r ON p.path_id = r.path_id AND p.hop = r.hop
+    GROUP BY p.path_id, p.hop, p.part, p.callback_id
 ),
 measured AS (
     SELECT
-        p.path_id,
-        p.hop,
-        p.part,
-        p.callback_id,
-        min(p.position) AS position,
-        CASE WHEN any_value(r.hop) IS NULL THEN count(*)
-            ELSE count(DISTINCT p.flow_id) FILTER (WHERE r.hop IS NOT NULL) END AS flows,
-        count(*) FILTER (WHERE p.duration_ns < 0) AS overlaps,
-        quantile_disc(p.duration_ns, [0.5, 0.95]) AS quantiles,
-        round(avg(p.duration_ns))::BIGINT AS mean_ns,
-        max(p.duration_ns) AS max_ns,
-        sum(p.duration_ns)::BIGINT AS total_ns
-    FROM part AS p
-    LEFT JOIN repeated AS r ON p.path_id = r.path_id AND p.hop = r.hop
-    GROUP BY p.path_id, p.hop, p.part, p.callback_id
+        path_id,
+        hop,
+        part,
+        callback_id,
+        min(position) AS position,
+        count(*) AS flows,
+        count(*) FILTER (WHERE duration_ns < 0) AS overlaps,
+        quantile_disc(duration_ns, [0.5, 0.95]) AS quantiles,
+        round(avg(duration_ns))::BIGINT AS mean_ns,
+        max(duration_ns) AS max_ns,
+        sum(duration_ns)::BIGINT AS total_ns
+    FROM part
+    GROUP BY path_id, hop, part, callback_id
 ),
 message AS (
     SELECT
@@ -131,7 +155,7 @@ SELECT
         l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
     ) AS node,
     coalesce(l.label, h.topic_name) AS what,
-    m.flows,
+    coalesce(d.flows, m.flows) AS flows,
     m.overlaps,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
@@ -142,6 +166,11 @@ SELECT
     p.path
 FROM measured AS m
 JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
+LEFT JOIN repeated AS d
+    ON m.path_id = d.path_id
+    AND m.hop = d.hop
+    AND m.part = d.part
+    AND m.callback_id IS NOT DISTINCT FROM d.callback_id
 LEFT JOIN message AS h ON m.path_id = h.path_id AND m.hop = h.hop
 LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
 LEFT JOIN main.process AS r ON b.process_id = r.process_id

@@ -21,6 +21,8 @@ _CLOCKS = {"store.clock", "store.clock_uncertainty"}
 _TOPIC_OWNERS = ("publisher", "subscription")
 _TOPICS = "derive.topic_learned"
 
+_FLOW_TABLES = ("flow_call", "flow_root", "flow_hop")
+
 
 def derive(
     con: duckdb.DuckDBPyConnection,
@@ -50,6 +52,13 @@ def derive(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [derivation_hash(), run_id],
     )
+
+
+def derive_flows(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Derive anew what the graph of flows makes of links, inside the open transaction."""
+    for name in derived_tables():
+        if name in _FLOW_TABLES:
+            _store(con, name, run_id)
 
 
 def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:

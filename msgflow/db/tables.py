@@ -52,6 +52,16 @@ class Texts(UserDefinedType[list[str]]):
         return "VARCHAR[]"
 
 
+class Identities(UserDefinedType[list[int]]):
+    """BIGINT[]."""
+
+    cache_ok = True
+
+    def get_col_spec(self, **_: object) -> str:
+        """Return the name of the type in SQL."""
+        return "BIGINT[]"
+
+
 SCHEMA = "store"
 metadata = MetaData(schema=SCHEMA)
 
@@ -165,6 +175,15 @@ def _flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
 
 def _handle(name: str, comment: str) -> Column[Any]:
     return _column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
+
+
+def _route() -> Column[Any]:
+    return _column(
+        "route",
+        Identities,
+        "Node (or, negative, process) that called, then services; empty: by no service",
+        required=True,
+    )
 
 
 def _computed(name: str, type_: type[TypeEngine[Any]], comment: str, *, sql: str) -> Column[Any]:
@@ -977,4 +996,68 @@ orphan_take = _table(
         "subscription_id", "Subscription that received it", to="subscription.subscription_id"
     ),
     _text("reason", "Why; a closed vocabulary", required=True),
+)
+# --- the graph of flows --------------------------------------------------------------------------
+
+flow_call = _table(
+    "flow_call",
+    "One row per publication of a service, callback instance that called for it, and way it did so",
+    _run(),
+    _reference(
+        "publication_id", "What was published", to="publication.publication_id", required=True
+    ),
+    _reference("publisher_id", "Its publisher", to="publisher.publisher_id"),
+    _text("kind", "Kind of the causal link to the publication", required=True),
+    _reference(
+        "callback_instance_id",
+        "Callback instance of the service",
+        to="callback_instance.callback_instance_id",
+        required=True,
+    ),
+    _reference(
+        "caller_id",
+        "Callback instance that called",
+        to="callback_instance.callback_instance_id",
+        required=True,
+    ),
+    _route(),
+    _reference("take_id", "Message that the caller was for; NULL: none", to="take.take_id"),
+    _reference(
+        "subscription_id", "Subscription of that message", to="subscription.subscription_id"
+    ),
+)
+
+flow_root = _table(
+    "flow_root",
+    "One row per publication on a topic of the application",
+    _run(),
+    _reference("publication_id", "The message", to="publication.publication_id", required=True),
+    _reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
+    _flag("is_source", "No message that was taken led to it"),
+    _text("root_kind", "'callback_instance' or 'publication'", required=True),
+    _column(
+        "root_id", BigInteger, "Where its flow can be said to begin, of that kind", required=True
+    ),
+    _route(),
+)
+
+flow_hop = _table(
+    "flow_hop",
+    "One row per step of the graph: subscription before, route, publisher and subscription",
+    _run(),
+    _reference(
+        "from_subscription_id",
+        "Subscription whose message led on; NULL: none",
+        to="subscription.subscription_id",
+    ),
+    _route(),
+    _reference("publisher_id", "Publisher", to="publisher.publisher_id", required=True),
+    _reference(
+        "subscription_id",
+        "Subscription that took from it",
+        to="subscription.subscription_id",
+        required=True,
+    ),
+    _flag("is_source", "Some publication of it was led to by no message"),
+    _flag("is_cached", "The message may wait in the node for others"),
 )

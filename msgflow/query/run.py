@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
 from typing import TYPE_CHECKING
@@ -30,7 +31,7 @@ from msgflow.sql.failure import is_of_the_file
 from msgflow.sql.value import described_type, parse_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -89,9 +90,11 @@ def run_query(
             read, or rows that the query does not have.
         QueryError: the database could not run it.
     """
-    used = connection.extract_statements(header.body)[0].named_parameters
-    has_window = bool(used & {"start_ns", "end_ns"})
-    if not has_window and not start is end is skip_first is None:
+    used = [
+        connection.extract_statements(statement)[0].named_parameters
+        for statement in header.statements
+    ]
+    if not header.has_window and not start is end is skip_first is None:
         raise UsageError(
             f"the query has no time window — {header.name}",
             "leave out --start, --end and --skip-first",
@@ -103,7 +106,6 @@ def run_query(
         "start_ns": start_ns,
         "end_ns": end_ns,
     }
-    bindings = {name: value for name, value in reserved.items() if name in used}
     own = bind(header, parameters)
     require_places(connection, runs, own)
     require_identities(connection, runs, own)
@@ -111,9 +113,11 @@ def run_query(
     sql, chosen = selected(header, selection, internal)
     for kind, names in selection.names().items():
         require_names(connection, runs, kind, names)
-    bindings |= own | chosen
+    values = reserved | own
+    bindings = {name: values[name] for name in used[-1]} | chosen
     try:
-        table = connection.sql(sql, params=bindings).to_arrow_table()
+        with _steps(connection, header, used, values):
+            table = connection.sql(sql, params=bindings).to_arrow_table()
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
@@ -141,6 +145,23 @@ def run_query(
     if header.note == "clocks" and table.num_rows:
         notes += clock_notes(connection, runs)
     return QueryResult(table, header, runs, notes)
+
+
+@contextlib.contextmanager
+def _steps(
+    connection: duckdb.DuckDBPyConnection,
+    header: Header,
+    used: Sequence[set[str]],
+    values: Mapping[str, Value],
+) -> Iterator[None]:
+    """Make the tables that a query needs on its way; drop them in the end."""
+    try:
+        for step, names in zip(header.steps, used, strict=False):
+            connection.execute(step.sql, {name: values[name] for name in names})
+        yield
+    finally:
+        for step in header.steps:
+            connection.execute(f"DROP TABLE IF EXISTS temp.{step.table}")
 
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:

@@ -26,6 +26,9 @@ public view over the table of its name, a column may be named alone: it is what 
 What is in `schema/health` has a `severity`; findings and diagnostics the `phase` of an ingest that
 they come from, a `cause` and a `cure`, in place of which a diagnostic may name the `finding` that
 has them.
+
+What a statement looks up stays in memory until it ends. A query may therefore go in steps: before
+its own statement stand others, each of the form `CREATE TEMP TABLE name AS SELECT …;`.
 """
 
 from __future__ import annotations
@@ -48,6 +51,7 @@ _CHOICES = r"(?: +\{(?P<choices>[^{}]+)\})?"
 _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
+_STEP = re.compile(r"(?:--[^\n]*\n)*CREATE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+", re.DOTALL)
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
@@ -106,6 +110,19 @@ class Column:
 
 
 @dataclass(frozen=True)
+class Step:
+    """A table on the way to the result of a query.
+
+    Attributes:
+        table: its name.
+        sql: the statement that makes it.
+    """
+
+    table: str
+    sql: str
+
+
+@dataclass(frozen=True)
 class Header:
     """Everything that an SQL file says of itself, and its body.
 
@@ -123,7 +140,7 @@ class Header:
         cause: where a finding comes from, else None.
         cure: what to do about a finding, else None.
         note: 'clocks' where rows compare times of several hosts, else None.
-        body: the SQL below the header.
+        body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.
         answer: columns that are shown also where they are 0 or empty throughout.
@@ -131,6 +148,7 @@ class Header:
         slowest: column by which rows are the slowest, else None.
         phase: of a finding or diagnostic, one of `PHASES`, else None.
         finding: of a diagnostic, the finding that has its cause and cure, else None.
+        steps: what a query makes before, in order.
     """
 
     name: str
@@ -153,6 +171,17 @@ class Header:
     slowest: str | None = None
     phase: str | None = None
     finding: str | None = None
+    steps: tuple[Step, ...] = ()
+
+    @property
+    def statements(self) -> tuple[str, ...]:
+        """All that is executed, in order."""
+        return (*(step.sql for step in self.steps), self.body)
+
+    @property
+    def has_window(self) -> bool:
+        """Whether there is a window of time to give."""
+        return any("$start_ns" in statement for statement in self.statements)
 
 
 @dataclass(frozen=True)
@@ -173,6 +202,7 @@ def parse(text: str, path: Path) -> Header:
         HeaderError: says which line is wrong, and how.
     """
     fields, body = _split(text, path)
+    steps, body = _steps(body)
     single: dict[str, str] = {}
     for field in fields:
         if field.key in _REPEATABLE:
@@ -226,6 +256,7 @@ def parse(text: str, path: Path) -> Header:
         slowest=single.get("slowest"),
         phase=phase,
         finding=single.get("finding"),
+        steps=steps,
     )
 
 
@@ -266,6 +297,14 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
     if not fields:
         raise _error(path, 1, "there is no header")
     return fields, "\n".join(lines[count:]).strip("\n") + "\n"
+
+
+def _steps(body: str) -> tuple[tuple[Step, ...], str]:
+    steps: list[Step] = []
+    while match := _STEP.match(body):
+        steps.append(Step(match["table"], match[0].rstrip()))
+        body = body[match.end() :]
+    return tuple(steps), body
 
 
 def _names(text: str) -> tuple[str, ...]:

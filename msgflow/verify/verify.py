@@ -252,7 +252,7 @@ class _Work:
         elif target.kind == PATH:
             own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
         start, end = self._window
-        has_window = "$start_ns" in header.body
+        has_window = header.has_window
         result = run_query(
             self._connection,
             around,

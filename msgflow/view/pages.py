@@ -192,7 +192,7 @@ class Pages:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
         extent = self.extent(connection, params)
-        has_window = "$start_ns" in header.body and self._window != (MINIMUM_NS, MAXIMUM_NS)
+        has_window = header.has_window and self._window != (MINIMUM_NS, MAXIMUM_NS)
         start, end = self._window if has_window else (None, None)
         result = run_query(
             connection, header, {}, run=str(extent.run.run_id), start=start, end=end,

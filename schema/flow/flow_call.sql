@@ -1,4 +1,5 @@
 -- name: derive.flow_call
+-- kind: macro
 -- description: Publications that the callbacks of services led to. Each has the callback instance
 --     on whose request they ran, and the message that this instance was for, if any.
 -- grain: one row per publication, callback instance that called for it, and way it did so
@@ -8,10 +9,12 @@
 -- What a join looks up stays in memory until the query ends, and how often services were called is
 -- hard to guess. So only callback instances that called, and publications of services, are looked
 -- up.
+CREATE OR REPLACE MACRO derive.flow_call(only_run) AS TABLE
 WITH caller AS (
     SELECT i.callback_instance_id, i.take_id
     FROM store.callback_instance AS i
     SEMI JOIN store.link_request AS l ON i.callback_instance_id = l.callback_instance_id
+    WHERE i.run_id = only_run
 ),
 taking AS (
     SELECT i.callback_instance_id, i.take_id, t.subscription_id
@@ -23,8 +26,11 @@ published AS (
         l.run_id, l.callback_instance_id, l.publication_id, l.publisher_id, l.kind
     FROM store.link_causal AS l
     SEMI JOIN (
-        SELECT callback_instance_id FROM store.callback_instance WHERE request_id IS NOT NULL
+        SELECT callback_instance_id
+        FROM store.callback_instance
+        WHERE run_id = only_run AND request_id IS NOT NULL
     ) AS i ON l.callback_instance_id = i.callback_instance_id
+    WHERE l.run_id = only_run
 )
 SELECT
     p.run_id, p.publication_id, p.publisher_id, p.kind, p.callback_instance_id, c.caller_id,
@@ -32,3 +38,4 @@ SELECT
 FROM derive.flow_caller AS c
 JOIN taking AS t ON c.caller_id = t.callback_instance_id
 JOIN published AS p ON c.callback_instance_id = p.callback_instance_id
+WHERE c.run_id = only_run

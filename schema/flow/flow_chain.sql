@@ -6,7 +6,7 @@
 --     there. A name or glob that fits a topic stands for topics. One that fits none stands for
 --     nodes: a node is often called like the topic that it publishes.
 -- grain: one row per run and chain
--- needs: derive.flow_hop, store.publisher, store.subscription, store.node
+-- needs: store.flow_hop, store.publisher, store.subscription, store.node
 CREATE OR REPLACE MACRO derive.flow_chain(
     runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
 ) AS TABLE
@@ -42,7 +42,7 @@ hop AS MATERIALIZED (
         END AS is_start,
         (p.topic_name IN (SELECT topic_name FROM wanted_topic WHERE is_end)) IS true
         OR (s.node_id IN (SELECT node_id FROM wanted_node WHERE is_end)) IS true AS is_last
-    FROM derive.flow_hop AS h
+    FROM store.flow_hop AS h
     JOIN store.publisher AS p ON h.publisher_id = p.publisher_id
     JOIN store.subscription AS s ON h.subscription_id = s.subscription_id
     WHERE list_contains(runs, h.run_id)

@@ -1,22 +1,25 @@
 -- name: derive.flow_root
+-- kind: macro
 -- description: Where the flow of each publication can be said to begin: with the callback
 --     instance of the timer (or other callback without a message) that published it, or that
 --     called the service that did; else with the publication itself. It is a source if no taken
 --     message led to it. The route (derive.flow_caller) starts at the instance that called; if
 --     none did, it is empty.
 -- grain: one row per publication on a topic of the application
--- needs: store.publication, store.publisher, store.link_causal, derive.flow_call,
+-- needs: store.publication, store.publisher, store.link_causal, store.flow_call,
 --     derive.flow_caller
+CREATE OR REPLACE MACRO derive.flow_root(only_run) AS TABLE
 WITH called AS (
     SELECT run_id, publication_id, publisher_id, caller_id, take_id, route
-    FROM derive.flow_call AS l
+    FROM store.flow_call AS l
     ANTI JOIN derive.flow_caller AS f ON l.caller_id = f.callback_instance_id
+    WHERE l.run_id = only_run
 ),
 message AS (
     SELECT l.publication_id
     FROM store.link_causal AS l
     ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
-    WHERE l.take_id IS NOT NULL
+    WHERE l.run_id = only_run AND l.take_id IS NOT NULL
     UNION ALL
     SELECT publication_id FROM called WHERE take_id IS NOT NULL
 ),
@@ -27,11 +30,12 @@ run AS (
         run_id, publication_id, publisher_id, NULL::BIGINT AS callback_instance_id,
         NULL::BIGINT[] AS route
     FROM store.publication
+    WHERE run_id = only_run
     UNION ALL
     SELECT l.run_id, l.publication_id, l.publisher_id, l.callback_instance_id, NULL
     FROM store.link_causal AS l
     ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
-    WHERE l.take_id IS NULL
+    WHERE l.run_id = only_run AND l.take_id IS NULL
     UNION ALL
     SELECT run_id, publication_id, publisher_id, caller_id, route FROM called WHERE take_id IS NULL
 ),
@@ -72,4 +76,4 @@ SELECT
 FROM store.publication AS b
 JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
 SEMI JOIN message AS m ON b.publication_id = m.publication_id
-WHERE NOT p.is_internal
+WHERE b.run_id = only_run AND NOT p.is_internal

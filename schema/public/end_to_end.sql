@@ -38,7 +38,7 @@
 -- column: is_newest BOOLEAN  Newest root of the arrival
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
--- needs: derive.known_word, derive.flow_chain, derive.flow_root, derive.flow_transport,
+-- needs: derive.known_word, derive.flow_chain, store.flow_root, derive.flow_transport,
 --     derive.flow_continuation,
 --     main.publication, main.callback_instance, main.take, main.gap, store.undelivered
 CREATE OR REPLACE MACRO main.end_to_end(
@@ -66,9 +66,14 @@ lineage (path_id, prefix_id, depth, parent_path_id) AS (
 path AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path
+        first_publisher_id, first_route, route, is_cached, is_path,
+        dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
     FROM chain
     WHERE path_id IN (SELECT prefix_id FROM lineage)
+),
+-- What recursion looks up stays in memory: one number stands for all that a step has to fit.
+way AS MATERIALIZED (
+    SELECT DISTINCT way_id, publisher_id, subscription_id, route FROM path
 ),
 -- root_key: positive for a callback instance, negative for a publication.
 root AS MATERIALIZED (
@@ -81,7 +86,7 @@ root AS MATERIALIZED (
             ELSE i.callback_instance_id END AS root_key,
         coalesce(i.start_ns, b.start_ns) AS root_ns,
         b.start_ns AS published_ns
-    FROM derive.flow_root AS r
+    FROM store.flow_root AS r
     JOIN main.publication AS b ON r.publication_id = b.publication_id
     LEFT JOIN main.callback_instance AS i
         ON from_event <> 'publish'
@@ -93,20 +98,24 @@ root AS MATERIALIZED (
         AND coalesce(coalesce(i.start_ns, b.start_ns) >= window_start_ns, true)
         AND coalesce(coalesce(i.start_ns, b.start_ns) < window_end_ns, true)
 ),
-transport AS MATERIALIZED (
+transport AS NOT MATERIALIZED (
     SELECT publication_id, publisher_id, take_id, subscription_id
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
-continuation AS MATERIALIZED (
+continuation AS NOT MATERIALIZED (
     SELECT take_id, subscription_id, publication_id, publisher_id, route
     FROM derive.flow_continuation
     WHERE list_contains(runs, run_id)
 ),
 step AS MATERIALIZED (
-    SELECT c.take_id AS from_take_id, c.route, t.publisher_id, t.subscription_id, t.take_id
+    SELECT c.take_id AS from_take_id, w.way_id, t.take_id
     FROM continuation AS c
     JOIN transport AS t ON c.publication_id = t.publication_id
+    JOIN way AS w
+        ON t.publisher_id = w.publisher_id
+        AND t.subscription_id = w.subscription_id
+        AND c.route = w.route
 ),
 reached (path_id, root_key, take_id) AS (
     SELECT p.path_id, r.root_key, t.take_id
@@ -121,11 +130,7 @@ reached (path_id, root_key, take_id) AS (
     SELECT p.path_id, r.root_key, s.take_id
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.parent_path_id
-    JOIN step AS s
-        ON r.take_id = s.from_take_id
-        AND p.publisher_id = s.publisher_id
-        AND p.subscription_id = s.subscription_id
-        AND p.route = s.route
+    JOIN step AS s ON r.take_id = s.from_take_id AND p.way_id = s.way_id
 ),
 arrival AS MATERIALIZED (
     SELECT
@@ -204,6 +209,7 @@ stuck AS (
     LEFT JOIN (
         SELECT take_id, publisher_id, route, max(publication_id) AS publication_id
         FROM continuation
+        WHERE take_id IN (SELECT last_take.take_id FROM progress)
         GROUP BY take_id, publisher_id, route
     ) AS c
         ON p.last_take.take_id = c.take_id

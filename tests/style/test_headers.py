@@ -22,6 +22,8 @@ FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
 VIEWS = [file for file in FILES if file.layer in objects.VIEW_LAYERS and file.header.kind == "view"]
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
+# Parameters that name a table, and what the rows of it are.
+TABLES = {"flows": "main.end_to_end_flow([1])", "trail": "main.end_to_end_trail('flows', [1])"}
 PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 LAYER_OF |= {
@@ -102,26 +104,32 @@ def test_units_agree_with_names(file: SqlFile) -> None:
 def test_parameters_of_a_query_are_those_of_its_sql(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
-    (statement,) = connection.extract_statements(file.header.body)
+    used: set[str] = set()
+    for text in file.header.statements:
+        (statement,) = connection.extract_statements(text)
+        used |= statement.named_parameters
     names = {param.name for param in file.header.params}
-    assert names == statement.named_parameters - set(RESERVED)
-    assert "runs" in statement.named_parameters
+    assert names == used - set(RESERVED)
+    assert "runs" in used
     assert not names & (COMMON_OPTIONS | set(RESERVED))
-    assert ("start_ns" in statement.named_parameters) == ("end_ns" in statement.named_parameters)
+    assert ("start_ns" in used) == ("end_ns" in used) == file.header.has_window
 
 
 @pytest.mark.parametrize("file", QUERIES, ids=str)
 def test_columns_of_a_query_are_those_of_its_output(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
-    (statement,) = connection.extract_statements(file.header.body)
     # The values do not matter, but for choices, which a query may refuse.
     values = {
         param.name: param.default if param.has_default else None for param in file.header.params
     }
     values |= {"runs": [1], "start_ns": 0, "end_ns": 1}
-    bound = {name: values[name] for name in statement.named_parameters}
-    assert described(connection.sql(file.header.body, params=bound)) == declared(file)
+    *steps, last = (connection.extract_statements(text)[0] for text in file.header.statements)
+    with connection.cursor() as cursor:
+        for step in steps:
+            cursor.execute(step, {name: values[name] for name in step.named_parameters})
+        bound = {name: values[name] for name in last.named_parameters}
+        assert described(cursor.sql(file.header.body, params=bound)) == declared(file)
 
 
 @pytest.mark.parametrize("file", QUERIES, ids=str)
@@ -206,11 +214,15 @@ def test_parameters_and_columns_of_a_public_macro_are_declared(
         assert [param.name for param in file.header.params] == parameters
     if rows[0][1] == "table_macro":
         arguments = ", ".join(
-            f"{param.name} := CAST(NULL AS {param.type})"
+            f"{param.name} := "
+            + (f"'{param.name}'" if param.name in TABLES else f"CAST(NULL AS {param.type})")
             for param in file.header.params
             if not param.has_default
         )
-        output = described(connection.sql(f"FROM {file.header.name}({arguments})"))
+        with connection.cursor() as cursor:
+            for name, rows_of in TABLES.items():
+                cursor.execute(f"CREATE TEMP TABLE {name} AS FROM {rows_of}")
+            output = described(cursor.sql(f"FROM {file.header.name}({arguments})"))
         assert output == declared(file)
 
 

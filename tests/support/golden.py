@@ -5,13 +5,19 @@
         == system NAME       what several cases have in common, in tests/support/systems: the tables
                              of NAME.case, each unless the case has it too; or SQL, NAME.sql, that
                              fills the store beside the rows of BASE
-        == derive            if this section is there, links are derived before
+        == derive            if this section is there, links are derived before; without it only
+                             what the graph of flows makes of the links given
         == params            parameters of the query, and run, start, end, skip_first, internal; or
                              arguments of the macro, as JSON
         == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
                              forbids NULL 1 for a key, else 0, false or an empty text
+<<<<<<< HEAD
         == scratch TABLE     of page queries over what pages compute once per run: its rows
         == staging TABLE     of what was read: the columns of staging.TABLE that are needed
+=======
+        == scratch TABLE     of page queries over what pages compute once per run, and of macros
+                             over a table that they are given: its rows
+>>>>>>> 44366c9 (Less memory for path-breakdown: queries may go in steps; what flows are made of is stored; executor_wait looks up only where something ran)
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
@@ -39,9 +45,13 @@ import duckdb
 import pyarrow as pa
 import pytest
 
+<<<<<<< HEAD
 from msgflow.db import objects
 from msgflow.db.derive import derive
 from msgflow.db.diagnostic import diagnostics, statement
+=======
+from msgflow.db.derive import derive, derive_flows
+>>>>>>> 44366c9 (Less memory for path-breakdown: queries may go in steps; what flows are made of is stored; executor_wait looks up only where something ran)
 from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
@@ -194,9 +204,8 @@ def evaluate(path: Path, empty: Path) -> str:
         shutil.copyfile(empty, database)
         with duckdb.connect(str(database)) as connection:
             case = fill_case(connection, path)
-            if case.derives:
-                for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-                    derive(connection, run_id)
+            for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
+                (derive if case.derives else derive_flows)(connection, run_id)
             result = _result(connection, path.parent.name, case)
     stream = io.BytesIO()
     write_result(result, Format.CSV, stream)
@@ -317,6 +326,7 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
     if name.startswith(_DIAGNOSTIC):
         return QueryResult(_diagnostic_rows(connection, case, name, given))
     if "." in name:
+        _make_scratch(connection, case)
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
         source = name if case.parameters is None else f"{name}({arguments})"
         relation = connection.sql(f"SELECT * FROM {source} ORDER BY ALL", params=given)
@@ -325,12 +335,23 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
     return run_query(connection, load_query(name), given, **selection)
 
 
+def _make_scratch(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
+    for table, text in case.scratch.items():
+<<<<<<< HEAD
+        _create(connection, f"TEMP TABLE {table}", text)
+    _stage(connection, case)
+=======
+        with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+            file.write(text)
+            file.flush()
+            connection.execute(f"CREATE TEMP TABLE {table} AS FROM read_csv(?)", [file.name])
+
+
 def _program_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
-    for table, text in case.scratch.items():
-        _create(connection, f"TEMP TABLE {table}", text)
-    _stage(connection, case)
+    _make_scratch(connection, case)
+>>>>>>> 44366c9 (Less memory for path-breakdown: queries may go in steps; what flows are made of is stored; executor_wait looks up only where something ran)
     return program().run(connection, name, _FRAME | given).to_arrow_table()
 
 

@@ -54,7 +54,8 @@ class SqlFile:
     @property
     def references(self) -> set[str]:
         """Every object that the body names, with its schema, but for itself."""
-        return set(_REFERENCE.findall(_COMMENT.sub("", self.header.body))) - {self.header.name}
+        text = "\n".join(self.header.statements)
+        return set(_REFERENCE.findall(_COMMENT.sub("", text))) - {self.header.name}
 
 
 def sql_paths() -> list[tuple[str, Path]]:

@@ -4,7 +4,8 @@
 --     not before it last went to sleep, nor before the last polling point but one, which would
 --     have found it (unless that callback ran in between: then more of its input may have
 --     waited). At the latest when the executor last learned what is ready, before it picked this
---     callback.
+--     callback. With that wait of the executor, the end of the wait before it, and the time spent
+--     waiting before.
 -- grain: one row per callback instance that is not nested in another
 -- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
 --     store.executor_thread, store.executor_state, store.thread_break
@@ -25,13 +26,18 @@ picked AS (
     SELECT r.callback_instance_id, r.executor_id, s.start_ns
     FROM (SELECT * FROM release WHERE thread_count > 1) AS r
     ASOF JOIN (
-        SELECT thread_id, start_ns FROM store.executor_state WHERE state = 'process'
+        SELECT e.thread_id, e.start_ns
+        FROM store.executor_state AS e
+        JOIN derive.executor_size AS z ON e.executor_id = z.executor_id
+        WHERE e.state = 'process' AND z.thread_count > 1
     ) AS s ON r.thread_id = s.thread_id AND r.start_ns >= s.start_ns
 ),
 polled AS (
-    SELECT p.callback_instance_id, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns
+    SELECT
+        p.callback_instance_id, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
+        w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
     FROM picked AS p
-    ASOF JOIN derive.executor_poll AS w
+    ASOF JOIN derive.executor_poll() AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
 ),
 broken AS (
@@ -39,10 +45,16 @@ broken AS (
     FROM store.thread_break AS b
     JOIN store.executor_thread AS x ON b.thread_id = x.thread_id
 ),
+resumed AS (
+    SELECT r.callback_instance_id, b.resumed_ns
+    FROM (SELECT * FROM release SEMI JOIN broken USING (executor_id)) AS r
+    ASOF JOIN broken AS b ON r.executor_id = b.executor_id AND r.start_ns >= b.resumed_ns
+),
 known AS (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
         r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, r.thread_count, b.resumed_ns,
+        p.polled_ns AS wait_end_ns, p.wait_start_ns, p.wait_before_ns, p.previous_end_ns,
         CASE WHEN p.polled_ns < b.resumed_ns THEN NULL ELSE p.polled_ns END AS polled_ns,
         CASE
             WHEN p.previous_end_ns < b.resumed_ns THEN NULL
@@ -53,19 +65,21 @@ known AS (
             THEN p.asleep_ns END AS asleep_ns
     FROM release AS r
     LEFT JOIN polled AS p ON r.callback_instance_id = p.callback_instance_id
-    ASOF LEFT JOIN broken AS b ON r.executor_id = b.executor_id AND r.start_ns >= b.resumed_ns
+    LEFT JOIN resumed AS b ON r.callback_instance_id = b.callback_instance_id
 ),
 confined AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
-        origin_ns, subscribed_ns, latest_ns, thread_count, resumed_ns, polled_ns,
+        origin_ns, subscribed_ns, latest_ns, thread_count, resumed_ns, polled_ns, wait_start_ns,
+        wait_end_ns, wait_before_ns, previous_end_ns,
         greatest(not_polled_ns, asleep_ns) AS not_ready_ns
     FROM known
 ),
 bounded AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
-        thread_count, resumed_ns, latest_ns,
+        thread_count, resumed_ns, latest_ns, wait_start_ns, wait_end_ns, wait_before_ns,
+        previous_end_ns,
         CASE WHEN since = 'timer' THEN greatest(origin_ns, not_ready_ns) ELSE origin_ns END
             AS origin_ns,
         CASE WHEN origin_ns IS NOT NULL OR not_ready_ns IS NOT NULL
@@ -89,5 +103,9 @@ SELECT
         AS latest_ns,
     start_ns,
     thread_count,
+    wait_start_ns,
+    wait_end_ns,
+    wait_before_ns,
+    previous_end_ns AS previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded

@@ -1,21 +1,43 @@
 -- name: derive.executor_poll
+-- kind: macro
 -- description: The moments at which executors learned what is ready: the ends of their waits
 --     (polling points). What is not found there waits for the next one. With the sum of all time
 --     spent waiting before. A wait for less than a millisecond may have found something ready at
 --     once; in a longer one nothing was ready when it began. What a callback that spins waits for
 --     is no business of its executor.
 -- grain: one row per wait of an executor that was seen to end
--- needs: store.executor_state, derive.executor_run
+-- param: executors BIGINT[] = NULL  Only these; NULL: all
+-- needs: store.executor_state, store.callback_instance, derive.executor_run
+CREATE OR REPLACE MACRO derive.executor_poll(executors := NULL) AS TABLE
 WITH wait AS (
     SELECT run_id, executor_id, thread_id, start_ns, end_ns
     FROM store.executor_state
     WHERE state = 'wait' AND end_ns IS NOT NULL AND executor_id IS NOT NULL
+        AND (executors IS NULL OR list_contains(executors, executor_id))
+),
+-- Threads with a callback that may spin: it does not end before the next event of the executor, nor
+-- did the last wait of the thread begin before it.
+spinning AS (
+    SELECT DISTINCT i.thread_id
+    FROM store.callback_instance AS i
+    JOIN (SELECT thread_id, max(start_ns) AS start_ns FROM wait GROUP BY thread_id) AS w
+        ON i.thread_id = w.thread_id AND i.start_ns <= w.start_ns
+    ANTI JOIN store.executor_state AS s
+        ON i.callback_instance_id = s.callback_instance_id AND i.end_ns <= s.end_ns
+    WHERE i.depth = 1 AND i.end_ns > i.start_ns
 ),
 own AS (
     SELECT w.run_id, w.executor_id, w.start_ns, w.end_ns
     FROM wait AS w
-    ASOF LEFT JOIN derive.executor_run AS r
-        ON w.thread_id = r.thread_id AND w.start_ns >= r.start_ns
+    ANTI JOIN spinning AS s ON w.thread_id = s.thread_id
+    UNION ALL
+    SELECT w.run_id, w.executor_id, w.start_ns, w.end_ns
+    FROM (SELECT * FROM wait SEMI JOIN spinning USING (thread_id)) AS w
+    ASOF LEFT JOIN (
+        SELECT thread_id, start_ns, end_ns
+        FROM derive.executor_run
+        SEMI JOIN spinning USING (thread_id)
+    ) AS r ON w.thread_id = r.thread_id AND w.start_ns >= r.start_ns
     WHERE r.end_ns IS NULL OR r.end_ns <= w.start_ns
 )
 SELECT

@@ -1,0 +1,77 @@
+-- name: main.end_to_end_flow
+-- kind: macro
+-- description: The flows that arrived (main.end_to_end), of one case, with a number each. The
+--     first of three steps of main.end_to_end_part, which need less memory one by one: keep its
+--     rows as a table, then those of main.end_to_end_trail, and ask main.end_to_end_piece.
+-- grain: one row per flow that reached the sink
+-- param: runs BIGINT[]  Runs to look at
+-- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas; NULL: any
+-- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
+-- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
+--     'publish'; others are an error
+-- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
+--     'callback_end'; others are an error
+-- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
+-- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
+--     NULL: any
+-- param: flow_case VARCHAR = 'first'  Pairs of root and arrival: 'first', 'last', 'newest',
+--     'every_pair', or
+--     'longest', the one flow of all that took longest
+-- param: sink_take_id BIGINT = NULL  Only flows that end with this take
+-- param: max_depth INTEGER = 32  Longest chain, in topics
+-- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
+--     chains of each length
+-- param: most_flows INTEGER = 1  Of 'longest', how many
+-- param: at_quantile DOUBLE = NULL  Of 'longest', in its place the flow with this quantile of the
+--     latency, 0 to 1
+-- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
+-- column: flow_id BIGINT  Number of the flow in this result
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: take_id BIGINT  Take at the end of the path
+-- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
+-- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- needs: derive.known_word, main.end_to_end
+CREATE OR REPLACE MACRO main.end_to_end_flow(
+    runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
+    to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
+    flow_case := 'first', sink_take_id := NULL, max_depth := 32, max_paths := 1000, most_flows := 1,
+    at_quantile := NULL, path_ids := NULL
+) AS TABLE
+SELECT
+    row_number() OVER (
+        ORDER BY e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id
+    ) AS flow_id,
+    e.run_id, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event, e.sink_ns,
+    e.latency_ns
+FROM main.end_to_end(
+    runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+    max_depth := max_depth, max_paths := max_paths
+) AS e
+WHERE derive.known_word(
+        'flow_case', flow_case, ['first', 'last', 'newest', 'every_pair', 'longest']
+    )
+    AND e.status = 'reached'
+    AND coalesce(e.take_id = sink_take_id, true)
+    AND CASE flow_case
+        WHEN 'first' THEN e.is_first
+        WHEN 'last' THEN e.is_last
+        WHEN 'newest' THEN e.is_newest
+        ELSE true
+    END
+    AND (path_ids IS NULL OR list_contains(path_ids, e.path_id))
+-- The quantile is one that occurred: so many flows took no longer.
+QUALIFY CASE
+    WHEN flow_case <> 'longest' THEN true
+    WHEN at_quantile IS NULL THEN row_number() OVER (
+        ORDER BY e.latency_ns DESC, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+    ) <= most_flows
+    ELSE row_number() OVER (
+        ORDER BY e.latency_ns, e.path_id, e.root_ns, e.root_kind, e.root_id, e.take_id
+    ) = greatest(1, ceil(at_quantile * count(*) OVER ()))
+END
