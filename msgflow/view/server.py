@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
 # Enough for most of what pages ask of ten million events. What needs more gets it, alone.
-USUAL_MEMORY = "180MB"
+USUAL_MEMORY = "164MB"
 # By how much its limit grows: a little at first, as that mostly suffices and decides how large the
 # server gets; then a lot, as each try works nearly to its end before it fails.
 _GROWTH = (1.3, 2.6)

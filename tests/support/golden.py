@@ -11,13 +11,9 @@
                              arguments of the macro, as JSON
         == TABLE             rows of store.TABLE as CSV; columns left out are NULL, or where it
                              forbids NULL 1 for a key, else 0, false or an empty text
-<<<<<<< HEAD
-        == scratch TABLE     of page queries over what pages compute once per run: its rows
-        == staging TABLE     of what was read: the columns of staging.TABLE that are needed
-=======
         == scratch TABLE     of page queries over what pages compute once per run, and of macros
                              over a table that they are given: its rows
->>>>>>> 44366c9 (Less memory for path-breakdown: queries may go in steps; what flows are made of is stored; executor_wait looks up only where something ran)
+        == staging TABLE     of what was read: the columns of staging.TABLE that are needed
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
@@ -45,13 +41,9 @@ import duckdb
 import pyarrow as pa
 import pytest
 
-<<<<<<< HEAD
 from msgflow.db import objects
-from msgflow.db.derive import derive
-from msgflow.db.diagnostic import diagnostics, statement
-=======
 from msgflow.db.derive import derive, derive_flows
->>>>>>> 44366c9 (Less memory for path-breakdown: queries may go in steps; what flows are made of is stored; executor_wait looks up only where something ran)
+from msgflow.db.diagnostic import diagnostics, statement
 from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
@@ -337,21 +329,14 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
 
 def _make_scratch(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
     for table, text in case.scratch.items():
-<<<<<<< HEAD
         _create(connection, f"TEMP TABLE {table}", text)
-    _stage(connection, case)
-=======
-        with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
-            file.write(text)
-            file.flush()
-            connection.execute(f"CREATE TEMP TABLE {table} AS FROM read_csv(?)", [file.name])
 
 
 def _program_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     _make_scratch(connection, case)
->>>>>>> 44366c9 (Less memory for path-breakdown: queries may go in steps; what flows are made of is stored; executor_wait looks up only where something ran)
+    _stage(connection, case)
     return program().run(connection, name, _FRAME | given).to_arrow_table()
 
 
