@@ -17,6 +17,7 @@ those of DAILY, and all recordings; `--system all` is every one there is.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import shlex
@@ -59,6 +60,13 @@ ARGUMENTS = {
         for share in (0, 0.3, 0.6)
     ],
     "arrivals": ["[]::BIGINT[][]"],
+    # Names of tables.
+    "flows": ["'same_flows'"],
+    "trail": ["'same_trail'"],
+}
+TABLES = {
+    "same_flows": "main.end_to_end_flow([1])",
+    "same_trail": "main.end_to_end_trail('same_flows', [1])",
 }
 ROWS_SHOWN = 3
 
@@ -173,6 +181,10 @@ def read_all() -> None:
 
     database, folder = Path(sys.argv[2]), Path(sys.argv[3])
     with duckdb.connect(str(database), read_only=True) as connection:
+        for table, rows in TABLES.items():
+            # An older checkout has none of these.
+            with contextlib.suppress(duckdb.CatalogException):
+                connection.execute(f"CREATE TEMP TABLE {table} AS FROM {rows}")
         for name, source in sources(connection):
             connection.execute(
                 f"COPY (SELECT * FROM {source} ORDER BY ALL) TO '{folder}/{name}.parquet'"
