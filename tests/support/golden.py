@@ -196,8 +196,9 @@ def evaluate(path: Path, empty: Path) -> str:
         shutil.copyfile(empty, database)
         with duckdb.connect(str(database)) as connection:
             case = fill_case(connection, path)
-            for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-                (derive if case.derives else derive_flows)(connection, run_id)
+            if case.derives:
+                for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
+                    derive(connection, run_id)
             result = _result(connection, path.parent.name, case)
     stream = io.BytesIO()
     write_result(result, Format.CSV, stream)
@@ -205,11 +206,14 @@ def evaluate(path: Path, empty: Path) -> str:
 
 
 def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
-    """Insert the rows of a case and of its system, and the rows of BASE; return the case."""
+    """Insert the rows of a case and of its system, of BASE, and of flows; return the case."""
     case = read_case(path)
     fill(connection, case.tables)
     if case.system and (script := SYSTEMS / f"{case.system}.sql").exists():
         connection.execute(script.read_text())
+    if not case.derives:
+        for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
+            derive_flows(connection, run_id)
     return case
 
 
