@@ -5,6 +5,7 @@ from pathlib import Path
 import duckdb
 import pytest
 
+from msgflow.db import objects
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.run import bind, run_query
 from msgflow.query.selection import make_selection
@@ -49,6 +50,9 @@ def connection() -> duckdb.DuckDBPyConnection:
         "(1, '/c', 400, NULL), (2, '/a', 1000000000, false), (2, '/a', 2500000000, false)"
         ") AS t (run_id, topic, start_ns, is_internal)"
     )
+    con.execute("CREATE SCHEMA derive")
+    (together,) = (each for each in objects.views() if each.name == "derive.clock_group_id")
+    con.execute(together.body)
     return con
 
 
@@ -390,3 +394,37 @@ def test_parameters_that_do_not_fit(given: dict[str, Value], message: str, hint:
         bind(header(PARAMS), given)
     assert message in raised.value.message
     assert hint in (raised.value.hint or "")
+
+
+STEPS = """\
+-- name: example
+-- description: An example.
+-- param: least VARCHAR = '/a'  Topics from here on
+-- column: run_id BIGINT  Run
+-- column: topic VARCHAR  Topic
+CREATE TEMP TABLE example_message AS
+SELECT run_id, topic FROM message WHERE list_contains($runs, run_id) AND start_ns >= $start_ns;
+
+-- A comment.
+CREATE TEMP TABLE example_topic AS
+SELECT DISTINCT run_id, topic FROM example_message WHERE topic >= $least;
+
+SELECT run_id, topic FROM example_topic WHERE topic < '/r' ORDER BY topic
+"""
+
+
+def test_a_query_goes_in_steps(connection: duckdb.DuckDBPyConnection) -> None:
+    asked = header(STEPS)
+    assert [step.table for step in asked.steps] == ["example_message", "example_topic"]
+    assert asked.has_window
+    for _ in range(2):  # What was made on the way is gone.
+        result = run_query(connection, asked, {"least": "/b"}, run="first")
+        assert result.to_arrow()["topic"].to_pylist() == ["/b", "/c"]
+    assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
+
+
+def test_a_step_that_fails_leaves_nothing(connection: duckdb.DuckDBPyConnection) -> None:
+    asked = header(STEPS.replace("DISTINCT run_id", "DISTINCT error('no') AS run_id"))
+    with pytest.raises(QueryError, match="no"):
+        run_query(connection, asked, {}, run="first")
+    assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
