@@ -46,7 +46,7 @@
 -- needs: main.end_to_end_flow, main.end_to_end_trail, main.end_to_end_piece, main.executor_wait,
 --     main.flow_path, main.callback_instance, main.callback_label, main.publisher, main.node,
 --     main.process
-CREATE TEMP TABLE breakdown_flow AS
+CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
 FROM main.end_to_end_flow(
@@ -54,13 +54,13 @@ FROM main.end_to_end_flow(
     max_depth := $max_depth, max_paths := $max_paths
 );
 
-CREATE TEMP TABLE breakdown_trail AS
+CREATE OR REPLACE TEMP TABLE breakdown_trail AS
 SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
 FROM main.end_to_end_trail(
     'breakdown_flow', $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
 );
 
-CREATE TEMP TABLE breakdown_part AS
+CREATE OR REPLACE TEMP TABLE breakdown_part AS
 SELECT
     e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_instance_id,
     i.callback_id
@@ -68,7 +68,7 @@ FROM main.end_to_end_piece('breakdown_flow', 'breakdown_trail', $runs) AS e
 LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id;
 
 -- How long the executor was busy before each take.
-CREATE TEMP TABLE breakdown_wait AS
+CREATE OR REPLACE TEMP TABLE breakdown_wait AS
 SELECT callback_instance_id, busy_min_ns, busy_max_ns
 FROM main.executor_wait
 WHERE callback_instance_id IN (

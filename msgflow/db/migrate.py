@@ -105,7 +105,7 @@ def upgrade(path: Path) -> Upgrade:
             before = None if is_empty(con) else require_known(con, path)
             if before is not None:
                 views_changed = not _has_our_views(con, path)
-                _bring_to_head(con)
+                _bring_to_head(con, path)
         if before is None:
             # One of our own, as its format depends on who made it.
             _replace_by_new(path)
@@ -127,9 +127,11 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
     return True
 
 
-def _bring_to_head(con: duckdb.DuckDBPyConnection) -> None:
+def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     if recorded_revision(con) != objects.head_revision():
         _migrate(con)
+    # Views over tables that are not there cannot be made.
+    require_ours(con, path, only_tables=True)
     con.begin()
     try:
         objects.apply(con)

@@ -115,13 +115,15 @@ def run_query(
         require_names(connection, runs, kind, names)
     values = reserved | own
     bindings = {name: values[name] for name in used[-1]} | chosen
+    is_last = False
     try:
         with _steps(connection, header, used, values):
+            is_last = True
             table = connection.sql(sql, params=bindings).to_arrow_table()
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
-        if selection.where is not None and isinstance(error, _OF_CONDITIONS):
+        if is_last and selection.where is not None and isinstance(error, _OF_CONDITIONS):
             raise UsageError(
                 f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
             ) from error
@@ -161,7 +163,9 @@ def _steps(
         yield
     finally:
         for step in header.steps:
-            connection.execute(f"DROP TABLE IF EXISTS temp.{step.table}")
+            # What interrupted the query may interrupt this, too; the next one replaces the table.
+            with contextlib.suppress(duckdb.Error):
+                connection.execute(f"DROP TABLE IF EXISTS temp.{step.table}")
 
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:

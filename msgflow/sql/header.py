@@ -28,7 +28,7 @@ they come from, a `cause` and a `cure`, in place of which a diagnostic may name 
 has them.
 
 What a statement looks up stays in memory until it ends. A query may therefore go in steps: before
-its own statement stand others, each of the form `CREATE TEMP TABLE name AS SELECT …;`.
+its own statement stand others, each of the form `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,9 @@ _CHOICES = r"(?: +\{(?P<choices>[^{}]+)\})?"
 _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
-_STEP = re.compile(r"(?:--[^\n]*\n)*CREATE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+", re.DOTALL)
+_STEP = re.compile(
+    r"(?:--[^\n]*\n)*CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+", re.DOTALL
+)
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (

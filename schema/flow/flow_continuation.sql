@@ -1,7 +1,7 @@
 -- name: derive.flow_continuation
 -- description: How flows go on through a node: from the take of a message to the publications
 --     that the callback of this take led to. It may have led to them by calling services: then
---     the route to the publication is given (store.flow_caller), else an empty one.
+--     the route to the publication is given (derive.flow_caller), else an empty one.
 -- grain: one row per take, publication that it led to, and way it did so
 -- needs: store.link_causal, store.publisher, store.flow_call
 SELECT

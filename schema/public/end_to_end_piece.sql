@@ -37,7 +37,7 @@ WITH RECURSIVE flow AS NOT MATERIALIZED (
         latency_ns
     FROM query_table(flows)
 ),
-hop AS NOT MATERIALIZED (
+passed AS NOT MATERIALIZED (
     SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
     FROM query_table(trail)
 ),
@@ -61,7 +61,7 @@ roundabout AS MATERIALIZED (
         FROM store.link_causal
         WHERE list_contains(runs, run_id) AND kind = 'direct'
     ) AS d ON c.publication_id = d.publication_id AND c.entered_id = d.callback_instance_id
-    SEMI JOIN hop AS h ON c.publication_id = h.publication_id
+    SEMI JOIN passed AS h ON c.publication_id = h.publication_id
     WHERE c.entered_id IS NOT NULL
     QUALIFY row_number() OVER (
         PARTITION BY c.publication_id, c.entered_id
@@ -145,7 +145,7 @@ between AS MATERIALIZED (
 ),
 turn AS MATERIALIZED (
     SELECT h.flow_id, h.hop, w.moments
-    FROM hop AS h
+    FROM passed AS h
     JOIN between AS w ON h.publication_id = w.publication_id
     JOIN flow AS f ON h.flow_id = f.flow_id
     LEFT JOIN store.callback_instance AS i ON h.previous_take_id = i.take_id
@@ -171,7 +171,7 @@ message AS (
         + (b.dds_ns IS NOT NULL)::INTEGER AS layer_count,
         h.hop > 1 OR f.root_kind = 'callback_instance' AS is_entered,
         coalesce(w.moments, []) AS turn
-    FROM hop AS h
+    FROM passed AS h
     JOIN flow AS f ON h.flow_id = f.flow_id
     JOIN main.publication AS b ON h.publication_id = b.publication_id
     JOIN main.take AS t ON h.take_id = t.take_id
@@ -261,8 +261,8 @@ followed AS (
             WHEN slot = 6 THEN start_ns
             WHEN slot = 7 THEN
                 coalesce(least(intra_ns, rclcpp_ns, rcl_ns, rmw_ns, dds_ns), end_ns)
-            WHEN slot = 8 THEN CASE WHEN is_end AND NOT is_called THEN sink_ns ELSE taken_ns END
-            WHEN slot = 9 THEN CASE WHEN is_end AND NOT is_finished THEN sink_ns ELSE called_ns END
+            WHEN slot = 8 THEN taken_ns
+            WHEN slot = 9 THEN called_ns
             WHEN slot = 10 THEN sink_ns
             WHEN slot = 10 + len(turn) THEN start_ns
             ELSE turn[slot - 9].at_ns

@@ -26,7 +26,7 @@
 -- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- needs: derive.callback_ready, derive.executor_busy, derive.executor_poll,
---     derive.executor_blocked, derive.callback_exclusion, store.executor_state, store.thread,
+--     derive.executor_blocked, derive.callback_exclusion, store.thread,
 --     derive.process_clock, derive.corrected_ns
 WITH stretch AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns, callback_instance_id, previous_end_ns
@@ -45,7 +45,14 @@ ready AS MATERIALIZED (
         CASE WHEN r.latest_ns >= coalesce(b.previous_end_ns, r.latest_ns) THEN b.before_ns END
             AS latest_busy_ns
     FROM derive.callback_ready AS r
-    LEFT JOIN stretch AS b ON r.callback_instance_id = b.callback_instance_id
+    -- What may be excluded by others needs all its moments.
+    LEFT JOIN (
+        SELECT callback_instance_id, before_ns, previous_end_ns
+        FROM stretch
+        WHERE callback_instance_id IS NOT NULL
+    ) AS b
+        ON r.callback_instance_id = b.callback_instance_id
+        AND r.callback_id NOT IN (SELECT callback_id FROM derive.callback_exclusion)
 ),
 -- How much of each kind of time there was up to other moments: the difference of two such sums is
 -- what there was between them.
@@ -114,7 +121,8 @@ idle AS (
     FROM drowsy AS m
     ASOF LEFT JOIN (
         SELECT executor_id, start_ns, end_ns, before_ns
-        FROM derive.executor_poll((SELECT coalesce(list(DISTINCT executor_id), []) FROM drowsy))
+        FROM derive.executor_poll
+        WHERE executor_id IN (SELECT executor_id FROM drowsy)
     ) AS w ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
 ),
 until AS (
@@ -138,10 +146,15 @@ passed AS (
     FROM until
     GROUP BY callback_instance_id
 ),
+-- Whether an executor waits at all is looked up where none of its callbacks shows it.
 waiting AS (
-    SELECT DISTINCT executor_id
-    FROM store.executor_state
-    WHERE state = 'wait' AND end_ns IS NOT NULL
+    SELECT executor_id FROM ready WHERE wait_start_ns IS NOT NULL
+    UNION
+    SELECT executor_id
+    FROM derive.executor_poll
+    WHERE executor_id IN (
+        SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
+    )
 ),
 told AS (
     SELECT

@@ -34,13 +34,16 @@ def test_each_table_is_derived_after_those_that_it_reads() -> None:
     order = derive.derived_tables()
     assert set(order) == {
         "stamp_clock", "nearest_message", "link_transport", "link_causal", "orphan_take",
-        "undelivered",
+        "undelivered", "flow_call", "flow_root", "flow_hop",
     }  # fmt: skip
     for later, earlier in (
         ("nearest_message", "stamp_clock"),
         ("link_transport", "nearest_message"),
         ("orphan_take", "link_transport"),
         ("undelivered", "link_transport"),
+        ("flow_call", "link_causal"),
+        ("flow_root", "flow_call"),
+        ("flow_hop", "flow_root"),
     ):
         assert order.index(later) > order.index(earlier), later
 

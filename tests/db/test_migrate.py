@@ -230,6 +230,17 @@ def test_upgrade_derives_stale_runs_anew(database: Path) -> None:
     assert derive.stale_runs(con) == []
 
 
+def test_upgrade_of_other_tables_is_refused(database: Path) -> None:
+    with duckdb.connect(str(database)) as con:
+        con.execute("DROP TABLE store.flow_hop CASCADE")
+        con.execute("UPDATE store.definition SET hash = 'of before' WHERE name = 'views'")
+    before = database.read_bytes()
+    with pytest.raises(DatabaseError, match="lacks a table") as raised:
+        migrate.upgrade(database)
+    assert raised.value.hint == "ingest the traces into a new file"
+    assert database.read_bytes() == before
+
+
 def test_upgrade_of_an_empty_database_file(tmp_path: Path) -> None:
     path = tmp_path / "empty.duckdb"
     duckdb.connect(str(path)).close()

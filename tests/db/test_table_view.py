@@ -17,8 +17,8 @@ VIEWS = table_views()
 AHEAD_NS = 1_000
 # Tables that nobody sees but through the rules that read them.
 INNER = {
-    "definition", "nearest_message", "orphan_take", "packet", "ring_buffer_event", "stamp_clock",
-    "undelivered",
+    "definition", "flow_call", "flow_hop", "flow_root", "nearest_message", "orphan_take", "packet",
+    "ring_buffer_event", "stamp_clock", "undelivered",
 }  # fmt: skip
 
 
@@ -36,6 +36,7 @@ def filled(
                     "BOOLEAN": "true",
                     "TIMESTAMP": "now()",
                     "VARCHAR[]": "['a=b']",
+                    "BIGINT[]": "[1]",
                     "BLOB": "'a'::BLOB",
                 }.get(kind, "'1'" if kind == "VARCHAR" else "1")
                 for kind in (column.type.compile() for column in table.columns)

@@ -402,11 +402,11 @@ STEPS = """\
 -- param: least VARCHAR = '/a'  Topics from here on
 -- column: run_id BIGINT  Run
 -- column: topic VARCHAR  Topic
-CREATE TEMP TABLE example_message AS
+CREATE OR REPLACE TEMP TABLE example_message AS
 SELECT run_id, topic FROM message WHERE list_contains($runs, run_id) AND start_ns >= $start_ns;
 
 -- A comment.
-CREATE TEMP TABLE example_topic AS
+CREATE OR REPLACE TEMP TABLE example_topic AS
 SELECT DISTINCT run_id, topic FROM example_message WHERE topic >= $least;
 
 SELECT run_id, topic FROM example_topic WHERE topic < '/r' ORDER BY topic

@@ -37,7 +37,7 @@ polled AS (
         p.callback_instance_id, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
         w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
     FROM picked AS p
-    ASOF JOIN derive.executor_poll() AS w
+    ASOF JOIN derive.executor_poll AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
 ),
 broken AS (

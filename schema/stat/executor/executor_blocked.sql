@@ -3,7 +3,7 @@
 --     executor was free, because a callback of one excludes that of the other. With the sum of
 --     all such time before.
 -- grain: one row per callback instance in an executor of several threads that excludes some
--- needs: derive.executor_run, derive.callback_exclusion, derive.executor_full
+-- needs: derive.executor_run, derive.callback_exclusion, derive.executor_busy
 WITH run AS (
     SELECT
         r.run_id, r.executor_id, e.kind, e.exclusion_id, r.callback_instance_id, r.start_ns,
@@ -18,7 +18,7 @@ started AS (
         r.end_ns,
         coalesce(b.before_ns + least(r.start_ns, b.end_ns) - b.start_ns, 0) AS start_busy_ns
     FROM run AS r
-    ASOF LEFT JOIN derive.executor_full AS b
+    ASOF LEFT JOIN derive.executor_busy AS b
         ON r.executor_id = b.executor_id AND r.start_ns >= b.start_ns
 ),
 ended AS (
@@ -27,7 +27,7 @@ ended AS (
         r.start_busy_ns,
         coalesce(b.before_ns + least(r.end_ns, b.end_ns) - b.start_ns, 0) AS end_busy_ns
     FROM started AS r
-    ASOF LEFT JOIN derive.executor_full AS b
+    ASOF LEFT JOIN derive.executor_busy AS b
         ON r.executor_id = b.executor_id AND r.end_ns >= b.start_ns
 )
 SELECT
