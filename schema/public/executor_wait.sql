@@ -45,14 +45,11 @@ ready AS MATERIALIZED (
         CASE WHEN r.latest_ns >= coalesce(b.previous_end_ns, r.latest_ns) THEN b.before_ns END
             AS latest_busy_ns
     FROM derive.callback_ready AS r
-    -- What may be excluded by others needs all its moments.
-    LEFT JOIN (
-        SELECT callback_instance_id, before_ns, previous_end_ns
-        FROM stretch
-        WHERE callback_instance_id IS NOT NULL
-    ) AS b
-        ON r.callback_instance_id = b.callback_instance_id
-        AND r.callback_id NOT IN (SELECT callback_id FROM derive.callback_exclusion)
+    -- What others may exclude needs all its moments.
+    LEFT JOIN (SELECT DISTINCT callback_id FROM derive.callback_exclusion) AS e
+        ON r.callback_id = e.callback_id
+    LEFT JOIN stretch AS b
+        ON r.callback_instance_id = b.callback_instance_id AND e.callback_id IS NULL
 ),
 -- How much of each kind of time there was up to other moments: the difference of two such sums is
 -- what there was between them.
