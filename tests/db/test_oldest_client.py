@@ -22,8 +22,6 @@ views = con.execute(
 ).fetchall()
 for (view,) in views:
     con.execute(f"SELECT * FROM main.{view}").fetchall()
-# Macros over parts of a query.
-con.execute("SELECT * FROM main.end_to_end_part([1])").fetchall()
 print(json.dumps([duckdb.__version__, len(views)]))
 """
 
