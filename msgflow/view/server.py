@@ -7,6 +7,7 @@ the host is still this machine.
 
 from __future__ import annotations
 
+import ctypes
 import hmac
 import html
 import ipaddress
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
 # Enough for most of what pages ask of ten million events. What needs more gets it, alone.
-USUAL_MEMORY = "164MB"
+USUAL_MEMORY = "160MB"
 # By how much its limit grows: a little at first, as that mostly suffices and decides how large the
 # server gets; then a lot, as each try works nearly to its end before it fails.
 _GROWTH = (1.3, 2.6)
@@ -107,6 +108,7 @@ class Turns:
             return answer
         with self._turn(alone=True), self._memory.one_thread():
             try:
+                give_back_freed_memory()
                 steps = chain(_GROWTH, repeat(_GROWTH[-1]))
                 while (answer := _if_memory_suffices(question)) is None:
                     if not self._memory.grow(next(steps)):
@@ -114,6 +116,7 @@ class Turns:
                             "this takes more memory than the server may use",
                             "start it with more: msgflow ui --memory-limit 2GB",
                         )
+                    give_back_freed_memory()
             finally:
                 self._memory.reset()
         return answer
@@ -131,6 +134,12 @@ class Turns:
                 self._running -= 1
                 self._is_alone = False
                 self._changed.notify_all()
+
+
+def give_back_freed_memory() -> None:
+    """Let the C library return what it keeps of freed memory, where it can."""
+    with suppress(AttributeError, OSError, TypeError):  # no glibc, or Windows
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 class Ahead:
