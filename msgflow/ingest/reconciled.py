@@ -88,7 +88,7 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
         con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
         _make(con, "left_out")
         con.execute("DROP VIEW thread_event")
-        con.execute("INSERT INTO staging.left_out\n" + statements().text("left_out_between"))
+        con.execute("INSERT INTO staging.left_out\n" + statements().header("left_out_between").body)
         left_out = con.execute("SELECT event_id FROM left_out ORDER BY ALL").fetchnumpy()[
             "event_id"
         ]
