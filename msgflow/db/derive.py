@@ -21,8 +21,6 @@ _CLOCKS = {"store.clock", "store.clock_uncertainty"}
 _TOPIC_OWNERS = ("publisher", "subscription")
 _TOPICS = "derive.topic_learned"
 
-_FLOW_TABLES = ("flow_call", "flow_root", "flow_hop")
-
 
 def derive(
     con: duckdb.DuckDBPyConnection,
@@ -42,7 +40,7 @@ def derive(
     _learn_topics(con, run_id)
     for name in derived_tables():
         if not _reads_clocks(name):
-            _store(con, name, run_id)
+            derive_table(con, name, run_id)
     if synchronise is not None:
         synchronise()
     derive_from_clocks(con, run_id)
@@ -54,18 +52,11 @@ def derive(
     )
 
 
-def derive_flows(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Derive anew what the graph of flows makes of links, inside the open transaction."""
-    for name in derived_tables():
-        if name in _FLOW_TABLES:
-            _store(con, name, run_id)
-
-
 def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Derive anew what depends on the correction of clocks, inside the open transaction."""
     for name in derived_tables():
         if _reads_clocks(name):
-            _store(con, name, run_id)
+            derive_table(con, name, run_id)
 
 
 @cache
@@ -99,7 +90,8 @@ def derivation_hash() -> str:
     )
 
 
-def _store(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
+def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
+    """Derive one of `derived_tables` anew, inside the open transaction."""
     columns = ", ".join(metadata.tables[f"{SCHEMA}.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     con.execute(

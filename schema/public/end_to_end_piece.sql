@@ -198,22 +198,13 @@ placed AS (
     WINDOW in_order AS (PARTITION BY flow_id ORDER BY hop)
 ),
 -- The moments at which a part begins: those that any hop may have, then those of its turn. A row of
--- a hop is taken apart only here, since to sort a row of each moment takes several times the memory.
+-- a hop is taken apart only here: to sort a row of each moment takes several times the memory.
 slot AS (
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, sink_ns, hop,
-        publication_id, taken_ns, called_ns, callback_instance_id, is_end, start_ns, intra_ns,
-        rclcpp_ns, rcl_ns, rmw_ns, dds_ns, end_ns, is_vague, is_called, is_finished, turn,
-        layer_count, is_entered, entered_ns, entered_id, place,
-        unnest(range(1, 11 + len(turn))) AS slot
-    FROM placed
+    SELECT *, unnest(range(1, 11 + len(turn))) AS slot FROM placed
 ),
 moment AS (
     SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, sink_ns, hop,
-        publication_id, taken_ns, called_ns, callback_instance_id, is_end, start_ns, intra_ns,
-        rclcpp_ns, rcl_ns, rmw_ns, dds_ns, end_ns, is_vague, is_called, is_finished, turn,
-        layer_count, entered_id, place, slot,
+        *,
         CASE slot
             WHEN 1 THEN intra_ns
             WHEN 2 THEN rclcpp_ns
@@ -250,7 +241,9 @@ followed AS (
             WHEN slot <= 5 THEN coalesce(
                 least(
                     CASE WHEN intra_ns > at_ns THEN intra_ns END,
-                    CASE WHEN rclcpp_ns > at_ns OR rclcpp_ns = at_ns AND slot < 2 THEN rclcpp_ns END,
+                    CASE
+                        WHEN rclcpp_ns > at_ns OR rclcpp_ns = at_ns AND slot < 2 THEN rclcpp_ns
+                    END,
                     CASE WHEN rcl_ns > at_ns OR rcl_ns = at_ns AND slot < 3 THEN rcl_ns END,
                     CASE WHEN rmw_ns > at_ns OR rmw_ns = at_ns AND slot < 4 THEN rmw_ns END,
                     CASE WHEN dds_ns > at_ns OR dds_ns = at_ns AND slot < 5 THEN dds_ns END

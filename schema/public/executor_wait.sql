@@ -110,17 +110,22 @@ drowsy AS MATERIALIZED (
     UNION ALL
     SELECT callback_instance_id, executor_id, 'start', start_ns FROM ready WHERE thread_count > 1
 ),
+-- Whether an executor waits at all is looked up where none of its callbacks shows it.
+silent AS (
+    SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
+),
+poll AS MATERIALIZED (
+    SELECT executor_id, start_ns, end_ns, before_ns
+    FROM derive.executor_poll
+    WHERE executor_id IN (SELECT executor_id FROM drowsy UNION SELECT executor_id FROM silent)
+),
 idle AS (
     SELECT
         m.callback_instance_id,
         m.which,
         coalesce(w.before_ns + least(m.at_ns, w.end_ns) - w.start_ns, 0) AS until_ns
     FROM drowsy AS m
-    ASOF LEFT JOIN (
-        SELECT executor_id, start_ns, end_ns, before_ns
-        FROM derive.executor_poll
-        WHERE executor_id IN (SELECT executor_id FROM drowsy)
-    ) AS w ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
+    ASOF LEFT JOIN poll AS w ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
 ),
 until AS (
     SELECT callback_instance_id, 'busy_' || which AS what, until_ns FROM busy
@@ -143,15 +148,10 @@ passed AS (
     FROM until
     GROUP BY callback_instance_id
 ),
--- Whether an executor waits at all is looked up where none of its callbacks shows it.
 waiting AS (
     SELECT executor_id FROM ready WHERE wait_start_ns IS NOT NULL
     UNION
-    SELECT executor_id
-    FROM derive.executor_poll
-    WHERE executor_id IN (
-        SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
-    )
+    SELECT executor_id FROM poll
 ),
 told AS (
     SELECT

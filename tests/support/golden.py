@@ -42,7 +42,7 @@ import pyarrow as pa
 import pytest
 
 from msgflow.db import objects
-from msgflow.db.derive import derive, derive_flows
+from msgflow.db.derive import derive, derive_table, derived_tables
 from msgflow.db.diagnostic import diagnostics, statement
 from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
@@ -64,6 +64,7 @@ BASE: dict[str, dict[str, str]] = {
     "thread": {"thread_id": "1", "tid": "1", "name": "thread"},
 }
 SYSTEMS = Path(__file__).parent / "systems"
+FLOW = {header.name for header in objects.load("flow")}
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SELECTION = ("run", "start", "end", "skip_first", "internal")
 _PAGE_QUERY = "view."
@@ -213,7 +214,9 @@ def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
         connection.execute(script.read_text())
     if not case.derives:
         for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-            derive_flows(connection, run_id)
+            for name in derived_tables():
+                if f"derive.{name}" in FLOW:
+                    derive_table(connection, name, run_id)
     return case
 
 
