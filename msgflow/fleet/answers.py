@@ -1,0 +1,90 @@
+"""What a lake holds of every run: answers, each a table whose rows are those of a query."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from msgflow.db.finding import Finding, find
+from msgflow.query.catalogue import load_query
+from msgflow.query.run import run_query
+from msgflow.sql.statement import program
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import duckdb
+    import pyarrow as pa
+
+FLOW = "flow"
+DISTRIBUTION = "distribution"
+FINDING = "finding"
+# Named queries with their defaults and the rows of ROS itself, each under its own name.
+QUERIES = (
+    "e2e-latency",
+    "callback-duration",
+    "executor-wait",
+    "executor-usage",
+    "transport-latency",
+    "delivery",
+    "publication-rate",
+    "timers",
+    "service-latency",
+    "data-quality",
+    "info-diagnostics",
+)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A table of the lake.
+
+    Attributes:
+        table: its name.
+        read: returns the rows of a run, with a column `run_id`, in an order of their own.
+        meaning: what it is, for docs.
+    """
+
+    table: str
+    read: Callable[[duckdb.DuckDBPyConnection, int], pa.Table]
+    meaning: str
+
+
+def answers() -> tuple[Answer, ...]:
+    """Return the answers that a lake holds, in the order in which they are computed."""
+    return (
+        Answer(FLOW, _statement("fleet_flow"), "one row per flow of every path"),
+        Answer(
+            DISTRIBUTION,
+            _statement("fleet_distribution"),
+            "durations, periods, waits and latencies of transport in buckets that can be added up",
+        ),
+        Answer(FINDING, _findings, "what is wrong with the recording, with cause and cure"),
+        *(Answer(name.replace("-", "_"), _query(name), f"the query {name}") for name in QUERIES),
+    )
+
+
+def _statement(name: str) -> Callable[[duckdb.DuckDBPyConnection, int], pa.Table]:
+    def read(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
+        return program().run(con, name, {"runs": [run_id]}).to_arrow_table()
+
+    return read
+
+
+def _query(name: str) -> Callable[[duckdb.DuckDBPyConnection, int], pa.Table]:
+    def read(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
+        return run_query(con, load_query(name), {}, run=run_id, internal=True).to_arrow()
+
+    return read
+
+
+def _findings(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
+    import pyarrow as pa
+
+    kinds = {"int": pa.int64(), "str": pa.string()}
+    schema = pa.schema(
+        [(field.name, kinds[str(field.type)]) for field in dataclasses.fields(Finding)]
+    )
+    rows = [dataclasses.asdict(finding) for finding in find(con, [run_id])]
+    return pa.Table.from_pylist(rows, schema=schema)

@@ -1,0 +1,136 @@
+"""What lies where in a lake, and the columns of its table of runs.
+
+The names are an interface: people read them with DuckDB, Spark and others, see docs/fleet.md.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import TYPE_CHECKING
+
+from msgflow.errors import DatabaseError
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+LAKE_REVISION = 1
+ABOUT = "lake.json"
+RUN = "run"
+FAILURE = "fleet_failure"
+VIEWS = "view"
+DATABASE = "database"
+FILE_NAME = "data.parquet"
+DATABASE_NAME = "msgflow.duckdb.zst"
+_FORMAT = "msgflow lake"
+
+
+def about() -> bytes:
+    """Return the file that says what the folder is, and of which revision."""
+    text = json.dumps({"format": _FORMAT, "revision": LAKE_REVISION})
+    return f"{text}\n".encode()
+
+
+def require_readable(content: bytes, url: str) -> None:
+    """Raise unless a lake has a revision that this msgflow reads.
+
+    Raises:
+        DatabaseError: it is newer, or no lake at all.
+    """
+    try:
+        read = json.loads(content)
+        revision = read["revision"]
+        is_ours = read["format"] == _FORMAT and isinstance(revision, int)
+    except (ValueError, TypeError, KeyError):
+        is_ours, revision = False, 0
+    if not is_ours:
+        raise DatabaseError(f"its {ABOUT} is not that of a lake — {url}", "give another --lake")
+    if revision > LAKE_REVISION:
+        raise DatabaseError(
+            f"the lake has revision {revision}, newer than this msgflow knows ({LAKE_REVISION})"
+            f" — {url}",
+            "upgrade msgflow, or give another --lake",
+        )
+
+
+def part_path(table: str, part: str) -> str:
+    """Return where the rows of a table lie that were written together."""
+    return f"{table}/part={part}/{FILE_NAME}"
+
+
+def view_path(view: str, part: str) -> str:
+    """Return where the rows of a public view of one run lie."""
+    return part_path(f"{VIEWS}/{view}", part)
+
+
+def database_path(part: str) -> str:
+    """Return where the database of one run lies, compressed with Zstandard."""
+    return f"{DATABASE}/part={part}/{DATABASE_NAME}"
+
+
+def metadata(table: str, schema_revision: str) -> dict[str, str]:
+    """Return the metadata of a Parquet file in a lake."""
+    return {
+        "msgflow.table": table,
+        "msgflow.version": __version__,
+        "msgflow.schema_revision": schema_revision,
+        "msgflow.lake_revision": str(LAKE_REVISION),
+    }
+
+
+@cache
+def run_schema() -> pa.Schema:
+    """Return the columns of the table `run`, each with its meaning."""
+    import pyarrow as pa
+
+    columns = [
+        ("run", pa.string(), "Key of the run, made of the identity of its packets"),
+        ("generation", pa.int64(), "The row with the highest counts; earlier ones are history"),
+        ("is_removed", pa.bool_(), "The run was taken out of the lake"),
+        ("part", pa.string(), "Where its answers lie: TABLE/part=…"),
+        ("view_part", pa.string(), "Where its public views lie: view/VIEW/part=…; NULL: nowhere"),
+        ("database_part", pa.string(), "Where its database lies: database/part=…; NULL: nowhere"),
+        ("name", pa.string(), "Name of the run, from that of its source"),
+        ("source", pa.string(), "Path or address that it was read from"),
+        ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
+        ("labels", pa.map_(pa.string(), pa.string()), "What was said of it: robot, version, …"),
+        ("start_ns", pa.int64(), "First event of any trace but kernel traces [epoch ns]"),
+        ("end_ns", pa.int64(), "Last event of any trace but kernel traces [epoch ns]"),
+        ("event_count", pa.int64(), "Events read"),
+        ("source_bytes", pa.int64(), "Size of the source"),
+        ("options", pa.string(), "Options of the ingest, as JSON"),
+        ("msgflow_version", pa.string(), "Version of msgflow that read it"),
+        ("schema_revision", pa.string(), "Revision of the tables and views"),
+        ("lake_revision", pa.int32(), "Revision of the layout of the lake"),
+        ("seconds", pa.float64(), "How long fetching, ingesting and writing took"),
+        ("tries", pa.int32(), "How often it was tried"),
+        ("worker", pa.string(), "Machine that did it"),
+        ("committed_ns", pa.int64(), "When this row was written [epoch ns]"),
+    ]
+    return pa.schema(
+        [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
+    )
+
+
+@cache
+def failure_schema() -> pa.Schema:
+    """Return the columns of the table `fleet_failure`, each with its meaning."""
+    import pyarrow as pa
+
+    columns = [
+        ("source", pa.string(), "Path or address of the recording"),
+        ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
+        ("labels", pa.map_(pa.string(), pa.string()), "What was said of it"),
+        ("reason", pa.string(), "What kind of failure, see docs/fleet.md"),
+        ("stage", pa.string(), "What was being done"),
+        ("error", pa.string(), "What went wrong, in words"),
+        ("hint", pa.string(), "What to do about it; NULL: nothing is known"),
+        ("tries", pa.int32(), "How often it was tried"),
+        ("worker", pa.string(), "Machine of the last try"),
+        ("msgflow_version", pa.string(), "Version of msgflow that tried"),
+        ("failed_ns", pa.int64(), "When the last try failed [epoch ns]"),
+    ]
+    return pa.schema(
+        [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
+    )

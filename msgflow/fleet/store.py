@@ -1,0 +1,289 @@
+"""Where files of a lake and recordings lie: a folder, or a bucket of an S3-compatible store.
+
+Both are reached through pyarrow. Credentials come from the environment alone, as the libraries of
+AWS look for them; they are never written, and never part of an address.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from msgflow.errors import DatabaseError, UsageError
+from msgflow.owner import mark
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+S3 = "s3://"
+_CHUNK = 8 * 1024 * 1024
+# Of each request, by the client of AWS, which waits longer each time.
+_MOST_ATTEMPTS = 10
+_CONNECT_SECONDS = 10
+_REQUEST_SECONDS = 60
+# What the environment may name an endpoint by, first the more special one.
+_ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
+_USERINFO = re.compile(r"//[^/@]*@")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file below a store's root.
+
+    Attributes:
+        path: from the root, with `/`.
+        size: bytes.
+        changed_ns: when it was written [epoch ns].
+    """
+
+    path: str
+    size: int
+    changed_ns: int
+
+
+class Store:
+    """Files below one address.
+
+    A file appears whole or not at all: in a folder by renaming, in a bucket since the store shows
+    an object when all of it is there.
+
+    Attributes:
+        url: the address: an absolute path, or `s3://BUCKET/PREFIX`.
+    """
+
+    def __init__(self, url: str | Path) -> None:
+        """Reach a store; nothing is read yet.
+
+        Raises:
+            UsageError: an address of another kind, or with a name or password in it.
+        """
+        self.url = normal_url(url)
+        self.is_local = not self.url.startswith(S3)
+        self._root = self.url if self.is_local else self.url.removeprefix(S3)
+        self._system: Any = None
+
+    @property
+    def filesystem(self) -> Any:
+        """Return the `pyarrow.fs.FileSystem`; paths of it begin with `full`."""
+        if self._system is None:
+            self._system = _local() if self.is_local else _s3()
+        return self._system
+
+    def full(self, path: str = "") -> str:
+        """Return the path of a file as the file system wants it."""
+        return f"{self._root}/{path}" if path else self._root
+
+    def url_of(self, path: str) -> str:
+        """Return the address of a file, as DuckDB, Spark and people read it."""
+        return f"{self.url}/{path}"
+
+    def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
+        """Return the files below a path, sorted; none where there is no such path.
+
+        Raises:
+            DatabaseError: the store cannot be reached or read.
+        """
+        from pyarrow.fs import FileSelector, FileType
+
+        selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
+        with _reaching(self.url):
+            found = self.filesystem.get_file_info(selector)
+        files = [info for info in found if info.type == FileType.File]
+        return sorted(
+            (
+                Entry(info.path[len(self._root) + 1 :], info.size, info.mtime_ns or 0)
+                for info in files
+            ),
+            key=lambda entry: entry.path,
+        )
+
+    def folders(self, path: str = "") -> list[str]:
+        """Return the names of the folders directly below a path, sorted.
+
+        Raises:
+            DatabaseError: the store cannot be reached or read.
+        """
+        from pyarrow.fs import FileSelector, FileType
+
+        with _reaching(self.url):
+            found = self.filesystem.get_file_info(
+                FileSelector(self.full(path), allow_not_found=True)
+            )
+        return sorted(info.base_name for info in found if info.type == FileType.Directory)
+
+    def entry(self, path: str = "") -> Entry | None:
+        """Return what is known of one file, None where it is none.
+
+        Raises:
+            DatabaseError: the store cannot be reached or read.
+        """
+        from pyarrow.fs import FileType
+
+        with _reaching(self.url):
+            info = self.filesystem.get_file_info(self.full(path))
+        if info.type != FileType.File:
+            return None
+        return Entry(path, info.size, info.mtime_ns or 0)
+
+    def read(self, path: str) -> bytes | None:
+        """Return a small file, None where it is none.
+
+        Raises:
+            DatabaseError: the store cannot be reached or read.
+        """
+        if self.entry(path) is None:
+            return None
+        with _reaching(self.url), self.filesystem.open_input_stream(self.full(path)) as stream:
+            return bytes(stream.read())
+
+    def fetch(self, path: str, target: Path) -> None:
+        """Copy a file into a new one of this machine.
+
+        Raises:
+            DatabaseError: the store cannot be reached or read.
+            OSError: the new file cannot be written.
+        """
+        with (
+            _reaching(self.url),
+            self.filesystem.open_input_stream(self.full(path)) as stream,
+        ):
+            file = target.open("wb")
+            with file:
+                while chunk := stream.read(_CHUNK):
+                    file.write(chunk)
+
+    def put(self, path: str, content: bytes | Path) -> None:
+        """Write a file, in place of one that is there.
+
+        Args:
+            path: from the root.
+            content: its bytes, or a file of this machine.
+
+        Raises:
+            DatabaseError: the store cannot be reached or written.
+        """
+        with _reaching(self.url, writing=True):
+            if self.is_local:
+                self._put_locally(Path(self.full(path)), content)
+            elif isinstance(content, bytes):
+                with self.filesystem.open_output_stream(self.full(path)) as stream:
+                    stream.write(content)
+            else:
+                with (
+                    content.open("rb") as source,
+                    self.filesystem.open_output_stream(self.full(path)) as stream,
+                ):
+                    while chunk := source.read(_CHUNK):
+                        stream.write(chunk)
+
+    def _put_locally(self, target: Path, content: bytes | Path) -> None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        # No reader takes it for a file of the lake: those end with .parquet.
+        temporary = target.with_name(f".{target.name}.{mark()}.part")
+        try:
+            with temporary.open("wb") as file:
+                if isinstance(content, bytes):
+                    file.write(content)
+                else:
+                    with content.open("rb") as source:
+                        shutil.copyfileobj(source, file, _CHUNK)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    def delete(self, path: str) -> None:
+        """Remove a file; nothing happens where there is none.
+
+        Raises:
+            DatabaseError: the store cannot be reached or written.
+        """
+        with _reaching(self.url, writing=True):
+            if self.is_local:
+                file = Path(self.full(path))
+                file.unlink(missing_ok=True)
+                # In a bucket there are no folders that could be left over.
+                folder = file.parent
+                while folder != Path(self._root) and not any(folder.iterdir()):
+                    folder.rmdir()
+                    folder = folder.parent
+            elif self.entry(path) is not None:
+                self.filesystem.delete_file(self.full(path))
+
+
+def normal_url(url: str | Path) -> str:
+    """Return an address in its one form: an absolute path, or `s3://BUCKET/PREFIX`.
+
+    Raises:
+        UsageError: an address of another kind, or with a name or password in it.
+    """
+    text = str(url)
+    scheme, separator, rest = text.partition("://")
+    if not separator:
+        return os.path.abspath(text)
+    if scheme == "file":
+        return os.path.abspath(rest)
+    if _USERINFO.search(text):
+        raise UsageError(
+            f"no credentials in an address — {_USERINFO.sub('//…@', text)}",
+            "give them in the environment: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY",
+        )
+    if scheme != "s3":
+        raise UsageError(
+            f"neither a folder nor a bucket — {text}", "give a path, or s3://BUCKET/PREFIX"
+        )
+    if "?" in rest or not rest.partition("/")[0]:
+        raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
+    return S3 + re.sub("/+", "/", rest).rstrip("/")
+
+
+def endpoint() -> str | None:
+    """Return the address of the store that the environment names, None for that of AWS."""
+    return next((os.environ[name] for name in _ENDPOINTS if os.environ.get(name)), None)
+
+
+def _local() -> Any:
+    from pyarrow.fs import LocalFileSystem
+
+    return LocalFileSystem()
+
+
+def _s3() -> Any:
+    from pyarrow.fs import AwsStandardS3RetryStrategy, S3FileSystem
+
+    options: dict[str, Any] = {}
+    if (url := endpoint()) is not None:
+        parts = urlsplit(url)
+        options = {"endpoint_override": parts.netloc, "scheme": parts.scheme}
+    region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION")
+    if region:
+        options["region"] = region
+    return S3FileSystem(
+        retry_strategy=AwsStandardS3RetryStrategy(max_attempts=_MOST_ATTEMPTS),
+        connect_timeout=_CONNECT_SECONDS,
+        request_timeout=_REQUEST_SECONDS,
+        **options,
+    )
+
+
+@contextmanager
+def _reaching(url: str, *, writing: bool = False) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        words = str(error.strerror or error).strip().splitlines()[0]
+        verb = "write to" if writing else "read"
+        hint = "check that it exists and that its permissions allow it"
+        if url.startswith(S3):
+            hint = (
+                "check the bucket, AWS_ENDPOINT_URL and AWS_REGION, and the credentials in the"
+                " environment"
+            )
+        raise DatabaseError(f"cannot {verb} the store: {words} — {url}", hint) from error
