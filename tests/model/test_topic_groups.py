@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -65,3 +66,20 @@ def test_contradictions_teach_nothing(system: RosSystem, analyse: Analyse) -> No
     model = analyse(system)
     assert model.rows(TOPICS) == [(0x10, None)]
     assert model.rows(LINKS) == [(1, 1, "exact_stamp"), (2, 2, "exact_stamp")]
+
+
+@pytest.mark.parametrize(
+    ("of_publisher", "of_reader", "topic"), [(10, 11, None), (11, 10, None), (11, 11, "/a")]
+)
+def test_less_than_a_tenth_on_both_sides_is_chance(
+    system: RosSystem, analyse: Analyse, of_publisher: int, of_reader: int, topic: str | None
+) -> None:
+    """One message to a reader of another topic: of so many to its own, of so many it has there."""
+    system.publisher(TALKER, 0x11, "/b")
+    system.subscription(LISTENER, 0x20, "/a")
+    system.subscription(LISTENER, 0x21, "/b")
+    pairs = [(0x10, 0x20)] * of_publisher + [(0x10, 0x21)] + [(0x11, 0x21)] * of_reader
+    for stamp, (publisher, reader) in enumerate(pairs, start=1):
+        system.publish(TALKER, publisher, stamp)
+        system.take(LISTENER, reader, stamp)
+    assert analyse(system).rows(TOPICS) == [(0x10, topic), (0x11, "/b")]
