@@ -7,11 +7,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import duckdb
+import pyarrow.compute as pc
 import pytest
 from analysis import Analysis
+from golden import SYSTEMS, fill
 from ros_system import RosSystem
 from staged_events import Thread
 
+from msgflow.database import Database
+from msgflow.db.derive import derive
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
 
@@ -421,3 +426,27 @@ def test_roots_without_a_callback_are_publications(analysis: Analysis) -> None:
         ("publication", begun, chain.times["11 end"]),
         ("callback_instance", chain.times["A start"], chain.times["12 end"]),
     ]
+
+
+def test_the_flow_at_a_quantile(fresh_database: Path) -> None:
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill(connection)
+        connection.execute((SYSTEMS / "many_messages.sql").read_text())
+        derive(connection, 1)
+    with Database(fresh_database) as database:
+        (expected,) = (
+            database.sql(
+                "SELECT quantile_disc(latency_ns, [0.5, 0.9, 0.95, 0.99, 1]) AS quantiles "
+                "FROM end_to_end([1], to_topic := '/b')"
+            )
+            .to_arrow()
+            .to_pylist()
+        )
+        found = [
+            database.query("critical-path", at=at, by="part", to="/b").to_arrow()
+            for at in ("median", "p90", "p95", "p99", "max")
+        ]
+    latencies = [pc.max(table["latency_ns"]).as_py() for table in found]
+    assert latencies == expected["quantiles"]
+    assert latencies == [pc.sum(table["duration_ns"]).as_py() for table in found]
+    assert len(set(latencies)) == 5
