@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -224,6 +225,19 @@ def test_parameters_and_columns_of_a_public_macro_are_declared(
                 cursor.execute(f"CREATE TEMP TABLE {name} AS FROM {rows_of}")
             output = described(cursor.sql(f"FROM {file.header.name}({arguments})"))
         assert output == declared(file)
+
+
+@pytest.mark.parametrize("file", MACROS, ids=str)
+def test_defaults_of_a_public_macro_are_those_that_it_declares(
+    file: SqlFile, connection: duckdb.DuckDBPyConnection
+) -> None:
+    signature, _, _ = file.header.body.partition(") AS")
+    given = dict(re.findall(r"(\w+) := ([^,\s]+)", signature))
+    declared = {param.name: param for param in file.header.params if param.has_default}
+    assert given.keys() == declared.keys()
+    for name, default in given.items():
+        typed = f"SELECT CAST({default} AS {declared[name].type})"
+        assert connection.execute(typed).fetchone() == (declared[name].default,)
 
 
 @pytest.mark.parametrize("file", [*VIEWS, *MACROS], ids=str)
