@@ -63,10 +63,12 @@ ARGUMENTS = {
     # Names of tables.
     "flows": ["'same_flows'"],
     "trail": ["'same_trail'"],
+    "vertices": ["'same_vertices'"],
 }
 TABLES = {
     "same_flows": "main.end_to_end_flow([1])",
     "same_trail": "main.end_to_end_trail('same_flows', [1])",
+    "same_vertices": "(SELECT 0 AS key, 'take' AS kind, take_id AS id, 0 AS depth FROM main.take)",
 }
 ROWS_SHOWN = 3
 

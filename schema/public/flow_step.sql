@@ -41,13 +41,11 @@
 -- column: reason VARCHAR  Why it is missing, as far as known
 -- column: cut_count BIGINT  Links that lead on from here beyond the limits
 -- column: internal_count BIGINT  Effects on ROS's own topics and services that are left out
--- needs: store.publication, store.take, store.callback_instance, store.link_causal,
---     store.link_transport, store.publisher, store.subscription, store.node, store.process,
---     store.thread, store.host, store.callback, store.request, store.response, store.client,
---     store.service, store.link_request, derive.vertex_key, derive.vertex_kind,
---     derive.flow_link, derive.flow_cause, derive.flow_end, derive.node_label,
---     main.publication, main.take, main.callback_instance, main.callback_label, main.request,
---     main.response
+-- needs: derive.vertex_key, derive.flow_link, derive.vertex_kind, derive.flow_cause,
+--     derive.node_label, derive.flow_end, main.flow_vertex, store.publication, store.take,
+--     store.callback_instance, store.request, store.response, store.link_causal, store.publisher,
+--     store.link_request, store.client, store.link_transport, store.thread, store.process,
+--     store.host, store.subscription, store.node
 CREATE OR REPLACE MACRO main.flow_step(
     start_kind, start_id, direction := 'both', max_depth := 96, max_vertices := 1000,
     internal := false
@@ -149,120 +147,7 @@ left_out AS (
     GROUP BY s.key
 ),
 described AS MATERIALIZED (
-    SELECT
-        v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
-        b.process_id,
-        derive.node_label(n.full_name, o.name, o.pid) AS node,
-        coalesce(p.topic_name, '?') AS label,
-        p.topic_name,
-        NULL::VARCHAR AS symbol,
-        NULL::VARCHAR AS missing,
-        NULL::VARCHAR AS reason
-    FROM vertex AS v
-    JOIN main.publication AS b ON v.id = b.publication_id
-    JOIN store.process AS o ON b.process_id = o.process_id
-    LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-    LEFT JOIN store.node AS n ON p.node_id = n.node_id
-    WHERE v.kind = 'publication'
-    UNION ALL
-    SELECT
-        v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
-        t.process_id,
-        derive.node_label(n.full_name, o.name, o.pid),
-        coalesce(s.topic_name, '?'),
-        s.topic_name,
-        NULL,
-        CASE
-            WHEN x.id IS NOT NULL THEN 'publication'
-            WHEN i.take_id IS NULL AND y.take_id IS NULL AND z.take_id IS NOT NULL THEN 'copy'
-            WHEN i.take_id IS NULL AND y.take_id IS NULL THEN 'callback'
-        END,
-        x.reason
-    FROM vertex AS v
-    JOIN main.take AS t ON v.id = t.take_id
-    JOIN store.process AS o ON t.process_id = o.process_id
-    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
-    LEFT JOIN store.node AS n ON s.node_id = n.node_id
-    LEFT JOIN derive.flow_end AS x ON x.kind = 'take' AND t.take_id = x.id
-    LEFT JOIN store.callback_instance AS i ON t.take_id = i.take_id
-    LEFT JOIN (
-        SELECT DISTINCT take_id FROM store.link_causal WHERE kind = 'take_adjacent'
-    ) AS y
-        ON t.take_id = y.take_id
-    LEFT JOIN (
-        SELECT DISTINCT l.take_id
-        FROM store.link_transport AS l
-        JOIN store.link_transport AS b
-            ON l.publication_id = b.publication_id AND l.subscription_id = b.subscription_id
-        WHERE l.method <> 'ring_buffer' AND b.method = 'ring_buffer'
-    ) AS z
-        ON t.take_id = z.take_id
-    WHERE v.kind = 'take'
-    UNION ALL
-    SELECT
-        v.key, v.kind, v.id, v.depth, i.run_id, i.start_ns, i.end_ns, i.thread_id,
-        i.process_id, c.node, c.label, s.topic_name, k.symbol,
-        CASE
-            WHEN k.kind = 'subscription' AND i.take_id IS NULL THEN 'take'
-            WHEN i.end_ns IS NULL THEN 'end'
-        END,
-        NULL
-    FROM vertex AS v
-    JOIN main.callback_instance AS i ON v.id = i.callback_instance_id
-    JOIN store.callback AS k ON i.callback_id = k.callback_id
-    JOIN main.callback_label AS c ON i.callback_id = c.callback_id
-    LEFT JOIN store.subscription AS s ON k.subscription_id = s.subscription_id
-    WHERE v.kind = 'callback_instance'
-    UNION ALL
-    SELECT
-        v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
-        coalesce(q.sender_thread_id, q.receiver_thread_id),
-        h.process_id,
-        CASE WHEN c.client_id IS NULL THEN '?'
-            ELSE derive.node_label(n.full_name, o.name, o.pid) END,
-        coalesce(c.service_name, s.service_name, '?'),
-        NULL,
-        NULL,
-        CASE
-            WHEN q.sent_ns IS NULL THEN 'sending'
-            WHEN q.taken_ns IS NULL THEN 'take'
-            WHEN q.callback_instance_id IS NULL THEN 'callback'
-            WHEN r.request_id IS NULL THEN 'response'
-        END,
-        NULL
-    FROM vertex AS v
-    JOIN main.request AS q ON v.id = q.request_id
-    JOIN store.thread AS h ON coalesce(q.sender_thread_id, q.receiver_thread_id) = h.thread_id
-    LEFT JOIN store.client AS c ON q.client_id = c.client_id
-    LEFT JOIN store.service AS s ON q.service_id = s.service_id
-    LEFT JOIN store.process AS o ON c.process_id = o.process_id
-    LEFT JOIN store.node AS n ON c.node_id = n.node_id
-    LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
-        ON q.request_id = r.request_id
-    WHERE v.kind = 'request'
-    UNION ALL
-    SELECT
-        v.key, v.kind, v.id, v.depth, r.run_id, coalesce(r.sent_ns, r.taken_ns), r.taken_ns,
-        coalesce(r.receiver_thread_id, r.sender_thread_id),
-        h.process_id,
-        CASE WHEN c.client_id IS NULL THEN '?'
-            ELSE derive.node_label(n.full_name, o.name, o.pid) END,
-        coalesce(c.service_name, s.service_name, '?'),
-        NULL,
-        NULL,
-        CASE
-            WHEN r.sent_ns IS NULL THEN 'sending'
-            WHEN r.taken_ns IS NULL THEN 'take'
-        END,
-        NULL
-    FROM vertex AS v
-    JOIN main.response AS r ON v.id = r.response_id
-    JOIN store.thread AS h ON coalesce(r.receiver_thread_id, r.sender_thread_id) = h.thread_id
-    LEFT JOIN store.client AS c ON r.client_id = c.client_id
-    LEFT JOIN store.service AS s ON r.service_id = s.service_id
-    LEFT JOIN store.process AS o ON c.process_id = o.process_id
-    LEFT JOIN store.node AS n ON c.node_id = n.node_id
-    WHERE v.kind = 'response'
+    FROM main.flow_vertex('vertex')
 ),
 arrow AS MATERIALIZED (
     SELECT

@@ -24,7 +24,11 @@ QUERIES = [file for file in FILES if file.layer == "queries"]
 VIEWS = [file for file in FILES if file.layer in objects.VIEW_LAYERS and file.header.kind == "view"]
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
 # Parameters that name a table, and what the rows of it are.
-TABLES = {"flows": "main.end_to_end_flow([1])", "trail": "main.end_to_end_trail('flows', [1])"}
+TABLES = {
+    "flows": "main.end_to_end_flow([1])",
+    "trail": "main.end_to_end_trail('flows', [1])",
+    "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
+}
 PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 LAYER_OF |= {

@@ -1,0 +1,58 @@
+"""The bootstrap by itself: what it draws, and by how much it widens what it draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import duckdb
+import pytest
+from rules import derived
+
+# A hundred values of side a, of side b all the same.
+STAGE = """
+CREATE SCHEMA derive;
+CREATE TABLE measure AS
+SELECT
+    'a' AS side, 'x' AS subject, 100 AS number, [50, 95, 99] AS quantiles, 50.5 AS mean_ns,
+    list_transform(range(100), lambda i: i * 37 % 100 + 1) AS series
+UNION ALL
+SELECT 'b', 'x', 100, [7, 7, 7], 7, list_transform(range(100), lambda i: 7);
+"""
+
+
+@pytest.fixture
+def con() -> Iterator[duckdb.DuckDBPyConnection]:
+    with derived(STAGE, ("bootstrap_interval",)) as con:
+        yield con
+
+
+def ends(
+    con: duckdb.DuckDBPyConnection, block_length: int, widenings: list[float]
+) -> dict[str, list[float]]:
+    con.execute(
+        "CREATE OR REPLACE TEMP TABLE block AS "
+        "SELECT side, subject, $length::BIGINT AS block_length, $widenings::DOUBLE[] AS widenings "
+        "FROM measure",
+        {"length": block_length, "widenings": widenings},
+    )
+    found = con.execute(
+        "SELECT statistic, ends FROM derive.bootstrap_interval('measure', 'block', 400, 0.95, 0)"
+    )
+    return dict(found.fetchall())
+
+
+def test_blocks_of_all_values_hold_every_value_equally_often(
+    con: duckdb.DuckDBPyConnection,
+) -> None:
+    assert ends(con, 100, [1, 1, 1, 1]) == {
+        statistic: [0, 0] for statistic in ("median", "mean", "p95", "p99")
+    }
+
+
+def test_intervals_are_as_much_wider_as_blocks_are_few(con: duckdb.DuckDBPyConnection) -> None:
+    drawn = ends(con, 5, [1, 1, 1, 1])
+    wider = ends(con, 5, [2, 3, 1.5, 4])
+    for statistic, widening in zip(("median", "mean", "p95", "p99"), (2, 3, 1.5, 4), strict=True):
+        low, high = drawn[statistic]
+        assert low < high
+        assert wider[statistic] == pytest.approx([widening * low, widening * high])
