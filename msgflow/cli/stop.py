@@ -12,6 +12,7 @@ import contextlib
 import os
 import signal
 import sys
+import threading
 from typing import TYPE_CHECKING
 
 from msgflow.errors import ExitCode
@@ -19,6 +20,9 @@ from msgflow.sql.interrupt import Terminated
 
 if TYPE_CHECKING:
     from types import FrameType
+
+# Until a signal is raised again that came at a moment at which it cannot be dealt with.
+_PATIENCE_S = 0.02
 
 _WORDS = {ExitCode.INTERRUPTED: b"interrupted", ExitCode.TERMINATED: b"terminated"}
 
@@ -62,6 +66,11 @@ class Stop:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Raise, or end the process."""
+        if _is_importing_duckdb(frame):
+            again = threading.Timer(_PATIENCE_S, signal.raise_signal, [number])
+            again.daemon = True
+            again.start()
+            return
         code = ExitCode.TERMINATED if number == signal.SIGTERM else ExitCode.INTERRUPTED
         if not self._is_command_running or self._came is not None:
             self._leave(code)
@@ -87,6 +96,15 @@ class Stop:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is self:
                 signal.signal(number, signal.SIG_IGN)
+
+
+def _is_importing_duckdb(frame: FrameType | None) -> bool:
+    """Tell whether its C++ code is being set up, which aborts the process at any exception."""
+    while frame is not None:
+        if frame.f_code.co_name == "<module>" and frame.f_globals.get("__name__") == "duckdb":
+            return True
+        frame = frame.f_back
+    return False
 
 
 STOP = Stop()

@@ -70,6 +70,29 @@ def test_at_any_moment_a_signal_ends_the_program_cleanly(
     assert ended == {_ENDINGS[number]}
 
 
+_IMPORTING = """
+import signal, sys
+import msgflow.cli.root, msgflow.cli.stop
+from msgflow.cli.app import app
+
+def called(frame, event, argument):
+    if event == "call" and "_create_" in frame.f_code.co_name and "_duckdb" in sys.modules:
+        sys.setprofile(None)
+        signal.raise_signal(int(sys.argv[1]))
+
+msgflow.cli.stop.STOP.install()
+sys.setprofile(called)
+app(["sql", "SELECT sum(i) FROM range(1_000_000_000_000) AS r (i)", "--db", sys.argv[2]])
+"""
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_a_signal_while_duckdb_is_imported(small_database: Path, number: signal.Signals) -> None:
+    """Its C++ code would abort the process at an exception."""
+    done = python(_IMPORTING, int(number), small_database)
+    assert (done.returncode, done.stderr) == _ENDINGS[number]
+
+
 _EARLY = """
 import os, signal, sys
 import msgflow.__main__

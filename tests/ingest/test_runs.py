@@ -31,6 +31,14 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
                 continue
             columns = []
             for column in table.columns:
+                if column.name == "root_id":  # of the table that its kind names
+                    columns.append(
+                        "root_id - CASE root_kind WHEN 'publication' THEN "
+                        "(SELECT min(publication_id) FROM store.publication WHERE run_id = $run) "
+                        "ELSE (SELECT min(callback_instance_id) FROM store.callback_instance "
+                        "WHERE run_id = $run) END + 1"
+                    )
+                    continue
                 key = (column.info.get("references") or f"{table.name}.{column.name}").split(".")
                 base = ""
                 if column.name != "run_id" and key[1] == f"{key[0]}_id":
