@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db.change import change_runs
 from msgflow.db.derive import derive_from_clocks
-from msgflow.db.diagnostic import forget, note
+from msgflow.db.noted import forget, note
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:

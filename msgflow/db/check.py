@@ -60,29 +60,31 @@ def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[Chec
 
 
 def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
-    relations = [
-        (table, column, reference)
+    relations = {
+        table: [
+            (column.name, reference)
+            for column in table.columns
+            if (reference := column.info.get("references")) is not None
+            and reference != f"{table.name}.{column.name}"
+        ]
         for table in metadata.tables.values()
-        for column in table.columns
-        if (reference := column.info.get("references")) not in (None, f"{table.name}.{column.name}")
-    ]
-    blocks = _blocks(con, {reference for _, _, reference in relations})
-    of_run = "" if run_id is None else f"AND child.run_id = {run_id:d}"
-    counts = con.execute(
-        " UNION ALL ".join(
-            f"SELECT {number}, count(*) FROM {table.fullname} AS child "
-            f"{_is_broken(column.name, reference, blocks[reference])} {of_run}"
-            for number, (table, column, reference) in enumerate(relations)
+    }
+    blocks = _blocks(con, {reference for each in relations.values() for _, reference in each})
+    for table, references in relations.items():
+        if not references:
+            continue
+        of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
+        counts = ", ".join(
+            _broken(column, reference, blocks[reference]) for column, reference in references
         )
-    ).fetchall()
-    for number, row_count in sorted(counts):
-        table, column, reference = relations[number]
-        yield CheckResult(
-            f"relation.{table.name}.{column.name}",
-            RELATION_SEVERITY,
-            row_count,
-            f"Every {column.name} of {table.name} is a row of {reference.partition('.')[0]}.",
-        )
+        rows = con.execute(f"SELECT {counts} FROM {table.fullname} AS child{of_run}").fetchall()
+        for (column, reference), row_count in zip(references, rows[0], strict=True):
+            yield CheckResult(
+                f"relation.{table.name}.{column}",
+                RELATION_SEVERITY,
+                row_count,
+                f"Every {column} of {table.name} is a row of {reference.partition('.')[0]}.",
+            )
 
 
 def _blocks(
@@ -103,19 +105,16 @@ def _blocks(
     }
 
 
-def _is_broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
-    """Return the clauses that keep the children without a parent.
+def _broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
+    """Return the expression that counts the children without a parent.
 
     A whole block of ids, which is what ingests write, makes that a comparison; an id used twice
     would pass it, and fails `identity_is_unique`.
     """
     if block is not None:
-        return f"WHERE (child.{column} < {block[0]} OR child.{column} > {block[1]})"
+        return f"count_if(child.{column} < {block[0]} OR child.{column} > {block[1]})"
     table, _, key = reference.partition(".")
-    return (
-        f"ANTI JOIN {SCHEMA}.{table} AS parent ON child.{column} = parent.{key} "
-        f"WHERE child.{column} IS NOT NULL"
-    )
+    return f"count_if(child.{column} NOT IN (SELECT {key} FROM {SCHEMA}.{table}))"
 
 
 def _count(con: duckdb.DuckDBPyConnection, query: str) -> int:

@@ -6,7 +6,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.diagnostic import forget, note
+from msgflow.db.conditions import has_no_row
+from msgflow.db.noted import forget, note
 from msgflow.db.tables import SCHEMA, metadata
 
 if TYPE_CHECKING:
@@ -94,6 +95,8 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     """Derive one of `derived_tables` anew, inside the open transaction."""
     columns = ", ".join(metadata.tables[f"{SCHEMA}.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
+    if has_no_row(con, f"derive.{name}", run_id):
+        return
     con.execute(
         f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_source(name)}",
         [run_id],

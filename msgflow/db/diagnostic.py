@@ -12,7 +12,7 @@ Statements of one phase are one, with the parts that they share.
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header
@@ -21,8 +21,7 @@ from msgflow.sql.statement import Statements
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import duckdb
-
+STAGED = "staging.diagnostic"
 _STAGED = ("reading", "model")
 _OF_LINKS = "links"
 SEVERITIES = ("info", "warning", "data_loss", "error")
@@ -38,13 +37,7 @@ def diagnostics() -> tuple[Header, ...]:
 def composed(layer: str) -> tuple[Header, ...]:
     """Return the objects of a layer of `schema/` that diagnostics are put together to."""
     if layer == "model":
-        return (
-            _object(
-                "staging.diagnostic",
-                "What was found in the input while it was read and the model was built.",
-                [header for header in diagnostics() if header.phase in _STAGED],
-            ),
-        )
+        return (staged(of_model()),)
     if layer == "stat":
         return (
             _object(
@@ -56,29 +49,23 @@ def composed(layer: str) -> tuple[Header, ...]:
     return ()
 
 
-def forget(con: duckdb.DuckDBPyConnection, run_id: int, phase: str) -> None:
-    """Delete what was stored of a run in this phase, inside the open transaction."""
-    con.execute(
-        "DELETE FROM store.diagnostic WHERE run_id = ? AND list_contains(?, name)",
-        [run_id, [_short(header) for header in _stored(phase)]],
+def of_model() -> tuple[Header, ...]:
+    """Return the diagnostics that are asked of what was read and built."""
+    return tuple(header for header in diagnostics() if header.phase in _STAGED)
+
+
+def staged(headers: Sequence[Header]) -> Header:
+    """Return the object of the model that these diagnostics are put together to, if any."""
+    return _object(
+        STAGED,
+        "What was found in the input while it was read and the model was built.",
+        headers,
     )
 
 
-def note(con: duckdb.DuckDBPyConnection, run_id: int, phase: str, **values: Any) -> None:
-    """Store what there is to tell of a run in this phase, inside the open transaction.
-
-    Args:
-        con: a writable connection to a database with current views.
-        run_id: the run.
-        phase: 'clocks', 'links' or 'database'.
-        values: parameters of the diagnostics of this phase, besides the run.
-    """
-    con.execute(
-        "INSERT INTO store.diagnostic (run_id, trace_id, name, severity, count, detail) "
-        "SELECT $run_id, trace_id, name, severity, count, detail "
-        f"FROM (\n{statement(_stored(phase))})",
-        {"run_id": run_id} | values,
-    )
+def text(header: Header) -> str:
+    """Return the SQL of a diagnostic, with the parts that it needs in front."""
+    return _statements().text(short_name(header))
 
 
 def statement(headers: Sequence[Header]) -> str:
@@ -89,20 +76,16 @@ def statement(headers: Sequence[Header]) -> str:
     keys = ["run_id", "trace_id"] if _is_asked_again(headers[0]) else ["trace_id"]
     typed = ", ".join(f"{key}::BIGINT AS {key}" for key in keys)
     selects = "\nUNION ALL\n".join(
-        f"SELECT {typed}, '{_short(header)}' AS name, '{header.severity}' AS severity, "
+        f"SELECT {typed}, '{short_name(header)}' AS name, '{header.severity}' AS severity, "
         f"count::BIGINT AS count, detail\nFROM (\n{header.body})"
         for header in headers
     )
-    parts = ",\n".join(_statements().parts(_short(header) for header in headers))
+    parts = ",\n".join(_statements().parts(short_name(header) for header in headers))
     return f"WITH {parts}\n{selects}\n" if parts else f"{selects}\n"
 
 
 def _is_asked_again(header: Header) -> bool:
     return header.phase == _OF_LINKS and not header.params
-
-
-def _stored(phase: str) -> list[Header]:
-    return [header for header in diagnostics() if header.phase == phase and header.params]
 
 
 def _object(name: str, description: str, headers: Sequence[Header]) -> Header:
@@ -114,7 +97,7 @@ def _object(name: str, description: str, headers: Sequence[Header]) -> Header:
         kind="view",
         params=(),
         columns=(),
-        needs=_statements().sources(_short(header) for header in headers),
+        needs=_statements().sources(short_name(header) for header in headers),
         severity=None,
         cause=None,
         cure=None,
@@ -124,7 +107,8 @@ def _object(name: str, description: str, headers: Sequence[Header]) -> Header:
     )
 
 
-def _short(header: Header) -> str:
+def short_name(header: Header) -> str:
+    """Return the name of a diagnostic as people see it."""
     return header.name.partition(".")[2]
 
 

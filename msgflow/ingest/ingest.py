@@ -19,8 +19,8 @@ from msgflow.db import migrate
 from msgflow.db.check import run_checks
 from msgflow.db.connection import attach
 from msgflow.db.derive import derivation_hash, derive
-from msgflow.db.diagnostic import note
 from msgflow.db.memory import Memory
+from msgflow.db.noted import note
 from msgflow.db.opening import open_memory, shut_in
 from msgflow.db.runs import require_run_name
 from msgflow.db.spill import most_spilled

@@ -7,9 +7,14 @@ import re
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
+from msgflow.db.conditions import conditions_of_diagnostics, conditions_of_model, is_empty
+from msgflow.db.diagnostic import STAGED, of_model, staged
 from msgflow.db.tables import metadata
+from msgflow.ingest import staging
 from msgflow.ingest.catalogue import load
+from msgflow.ingest.outline import creating, empty_tables
 from msgflow.ingest.reported import restore
+from msgflow.sql.emptiness import NEVER
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -42,23 +47,57 @@ def build(
     """
     restore(con)
     headers = objects.load("model")
+    growing = Growing(con)
+    staging.narrow(con, growing.empty)
     dropped: set[str] = set()
     for position, header in enumerate(headers):
-        memory.run(functools.partial(con.execute, statement(header)))
+        memory.run(functools.partial(growing.add, header))
         if not keep:
-            for name in _finished(headers, position) - dropped:
+            # A table without rows is no burden.
+            for name in _finished(headers, position) - dropped - growing.empty:
                 con.execute(f"DROP TABLE {name}")
                 dropped.add(name)
         if built is not None:
             built(header.name)
 
 
-def statement(header: Header) -> str:
-    """Return the statement that creates an object of the model."""
-    if header.kind == "macro":
-        return header.body
-    kind = "VIEW" if header.kind == "inline" else "TABLE"
-    return f"CREATE {kind} {header.name} AS\n{header.body}"
+class Growing:
+    """The model while it is built.
+
+    Attributes:
+        empty: the tables of `raw` and `staging` without a row, as far as they are built.
+    """
+
+    def __init__(self, con: duckdb.DuckDBPyConnection) -> None:
+        self._con = con
+        of_diagnostics = conditions_of_diagnostics()
+        self._conditions = {**conditions_of_model(), **of_diagnostics}
+        self._conditions[STAGED] = ["all", *(of_diagnostics.get(d.name, NEVER) for d in of_model())]
+        self.empty = {
+            name
+            for (name,) in con.execute(
+                "SELECT database_name || '.' || table_name FROM duckdb_tables() "
+                "WHERE database_name IN ('raw', 'staging') AND estimated_size = 0"
+            ).fetchall()
+        }
+
+    def add(self, header: Header) -> None:
+        """Create an object of the model, after all that it needs."""
+        if header.kind != "view":
+            self._con.execute(creating(header))
+            return
+        if header.name == STAGED and not self._is_empty(STAGED):
+            header = staged([each for each in of_model() if not self._is_empty(each.name)])
+        if self._is_empty(header.name):
+            self._con.execute(f"CREATE TABLE {header.name} AS {empty_tables()[header.name]}")
+            self.empty.add(header.name)
+            return
+        ((count,),) = self._con.execute(creating(header)).fetchall()
+        if not count:
+            self.empty.add(header.name)
+
+    def _is_empty(self, name: str) -> bool:
+        return is_empty(name, self._conditions, self.empty.__contains__)
 
 
 def _finished(headers: tuple[Header, ...], position: int) -> set[str]:

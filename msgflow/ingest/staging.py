@@ -16,10 +16,10 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
-from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Tracepoint, load
+from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
     from pathlib import Path
 
     import duckdb
@@ -94,11 +94,18 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     # What is staged is of no use after a crash.
     con.execute(f"ATTACH '{_quoted(path)}' AS raw (RECOVERY_MODE no_wal_writes)")
     con.execute("ATTACH ':memory:' AS staging")
+    for statement in statements():
+        con.execute(statement)
+
+
+def statements() -> tuple[str, ...]:
+    """Return what creates all that is staged before the model is built, in `raw` and `staging`."""
     catalogue = load()
-    tracepoints = list(catalogue.tracepoints.values())
-    for tracepoint in tracepoints:
-        con.execute(tracepoint.create_table_sql("raw", catalogue.labels))
-    for statement in (
+    return (
+        *(
+            each.create_table_sql("raw", catalogue.labels)
+            for each in catalogue.tracepoints.values()
+        ),
         _PACKET_TABLE,
         _THREAD_TABLES,
         _SOURCE_TABLE,
@@ -109,10 +116,18 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
         _PACKET_READ_ONCE_TABLE,
         _IMPLAUSIBLE_TABLE,
         _DAMAGE_TABLE,
-    ):
-        con.execute(statement)
-    con.execute(_event_view(catalogue.of_threads))
-    con.execute(_predecessor_view(catalogue.of_threads))
+        _event_view(catalogue.of_threads),
+        _predecessor_view(catalogue.of_threads),
+    )
+
+
+def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
+    """Let the views of all events be over fewer tables: these are empty, and take long to plan."""
+    left = [each for each in load().of_threads if f"raw.{each.table}" not in empty]
+    if left:
+        con.execute(_event_view(left))
+    if any(map(_event_predecessors, left)):
+        con.execute(_predecessor_view(left))
 
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
@@ -149,7 +164,7 @@ def _event_view(tracepoints: Sequence[Tracepoint]) -> str:
     selects = "\nUNION ALL\n".join(
         f"SELECT {columns} FROM raw.{tracepoint.table}" for tracepoint in tracepoints
     )
-    return f"CREATE VIEW staging.event AS\n{selects}"
+    return f"CREATE OR REPLACE VIEW staging.event AS\n{selects}"
 
 
 def _predecessor_view(tracepoints: Sequence[Tracepoint]) -> str:
@@ -158,10 +173,13 @@ def _predecessor_view(tracepoints: Sequence[Tracepoint]) -> str:
         f"SELECT {columns}, '{before.sequence}' AS sequence, {before.column} AS previous_event_id "
         f"FROM raw.{tracepoint.table}"
         for tracepoint in tracepoints
-        for before in tracepoint.predecessors
-        if before.origin is Origin.EVENT_ID
+        for before in _event_predecessors(tracepoint)
     )
-    return f"CREATE VIEW staging.predecessor AS\n{selects}"
+    return f"CREATE OR REPLACE VIEW staging.predecessor AS\n{selects}"
+
+
+def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
+    return [each for each in tracepoint.predecessors if each.origin is Origin.EVENT_ID]
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:

@@ -16,7 +16,9 @@
     -- needs: flow_path, stat_end_to_end
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
-`note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ.
+`note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ,
+`note: gate` that something is mostly empty, and soon found to be: it is asked for a row before what
+is made of it is planned.
 `brief` names the columns that a narrow terminal is to show, the most important first, `answer`
 those that stay where they are 0 in all rows, since this is what people ask for, `heading` those
 that stand above a table on a terminal, once for each value of the first, on which the others
@@ -61,7 +63,7 @@ _SINGLE = (
     "finding", "note", "needs", "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks",)
+_NOTES = ("clocks", "gate")
 # Of an ingest, in their order: where what is found comes from.
 PHASES = ("reading", "model", "clocks", "links", "database")
 
@@ -141,7 +143,8 @@ class Header:
         severity: of a check, finding or diagnostic, else None.
         cause: where a finding comes from, else None.
         cure: what to do about a finding, else None.
-        note: 'clocks' where rows compare times of several hosts, else None.
+        note: 'clocks' where rows compare times of several hosts, 'gate' where it is asked for a row
+            before what is made of it, else None.
         body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.

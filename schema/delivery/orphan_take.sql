@@ -10,7 +10,7 @@
 --     senders had ended says nothing where a publisher whose topic is not known published at that
 --     moment.
 -- grain: one row per take whose publication is not known
--- needs: store.take, store.link_transport, store.subscription, store.publisher, store.node,
+-- needs: store.take, derive.unlinked_take, store.subscription, store.publisher, store.node,
 --     store.publication, store.process, store.trace, derive.stamp_shift, derive.process_gap,
 --     derive.process_presence, derive.take_candidate, store.nearest_message,
 --     derive.delivery_limit
@@ -19,8 +19,8 @@ WITH orphan AS MATERIALIZED (
     SELECT
         t.take_id, t.subscription_id, t.process_id, t.method, t.taken_ns, t.is_loss_affected,
         t.source_timestamp_ns AS stamp_ns, s.topic_name, s.created_ns
-    FROM (SELECT * FROM store.take WHERE run_id = only_run) AS t
-    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
+    FROM derive.unlinked_take(only_run) AS u
+    JOIN store.take AS t ON u.take_id = t.take_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
 ),
 presence AS MATERIALIZED (

@@ -44,6 +44,7 @@ class Analysis:
         self._tables = self._tables_of("raw"), self._tables_of("staging")
         self._views = self._views_of_staging()
         self._built: set[str] | None = None
+        self._growing: model.Growing | None = None
         self._is_derived = False
 
     @property
@@ -57,7 +58,7 @@ class Analysis:
         self._clear()
         events.write(self._connection)
         restore(self._connection)
-        self._built = set()
+        self._built, self._growing = set(), None
         self._is_derived = False
         return self
 
@@ -103,8 +104,11 @@ class Analysis:
         ]
         if not missing:
             return
+        if self._growing is None:
+            self._growing = model.Growing(self._connection)
+            staging.narrow(self._connection, self._growing.empty)
         for header in missing:
-            self._connection.execute(model.statement(header))
+            self._growing.add(header)
             self._built.add(header.name)
         self._connection.begin()
         delete(self._connection, [1])

@@ -6,15 +6,8 @@
 -- grain: one row per publication on a known topic, written by a process without stamps
 -- param: only_run BIGINT  Run to look at
 -- needs: store.publication, store.publisher, store.process, store.host,
---     store.thread_break
+--     store.thread_break, derive.unstamped_process
 CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
-WITH unstamped AS (
-    SELECT process_id
-    FROM store.publication
-    WHERE run_id = only_run
-    GROUP BY process_id
-    HAVING count(source_timestamp_ns) = 0
-)
 SELECT
     b.run_id,
     h.clock_id,
@@ -26,7 +19,7 @@ SELECT
     -- While it was not seen, the thread may have gone on earlier, and published more.
     coalesce(k.resumed_ns <= b.next_event_ns, false) AS has_break
 FROM store.publication AS b
-JOIN unstamped AS u ON b.process_id = u.process_id
+JOIN derive.unstamped_process(only_run) AS u ON b.process_id = u.process_id
 JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
 JOIN store.process AS o ON b.process_id = o.process_id
 JOIN store.host AS h ON o.host_id = h.host_id
