@@ -105,12 +105,12 @@ def _parsed(con: duckdb.DuckDBPyConnection, query: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _scalar_functions(con: duckdb.DuckDBPyConnection) -> frozenset[str]:
-    """Return the functions that are no aggregates, whatever their arguments."""
+    """Return the functions that make no row of nothing."""
     rows = con.execute(
         "SELECT function_name FROM duckdb_functions() GROUP BY function_name "
         "HAVING bool_and(internal AND function_type = 'scalar')"
     ).fetchall()
-    return frozenset(name for (name,) in rows)
+    return frozenset(name for (name,) in rows) | {"unnest"}
 
 
 def _all(conditions: list[Condition]) -> Condition:

@@ -49,7 +49,7 @@ INSERT INTO store.process (process_id) VALUES (1), (2), (9);
 INSERT INTO store.trace (start_ns) VALUES ({100 * MS});
 INSERT INTO store.trace (domain, start_ns) VALUES ('kernel', 0);
 """
-RULES = ("delivery_limit", "orphan_take")
+RULES = ("delivery_limit", "unlinked_take", "orphan_take")
 TAKE = "INSERT INTO store.take (take_id) VALUES (1)"
 SENDER = "INSERT INTO store.publisher (process_id) VALUES (1)"
 RECORDED = "INSERT INTO derive.process_presence (process_id) VALUES (1)"

@@ -23,7 +23,7 @@ CREATE TABLE store.thread_break (thread_id BIGINT, resumed_ns BIGINT);
     [(100, 1, False), (101, 1, True), (200, 1, True), (201, 1, False), (150, 2, False)],
 )
 def test_the_next_event_behind_a_gap(resumed: int, thread: int, has_break: bool) -> None:
-    with derived(STAGE, {"unstamped_publication"}) as con:
+    with derived(STAGE, {"unstamped_publication", "unstamped_process"}) as con:
         con.execute("INSERT INTO store.thread_break VALUES (?, ?)", [thread, resumed])
         assert con.sql(
             "SELECT next_event_ns, has_break FROM derive.unstamped_publication(1)"

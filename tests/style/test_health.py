@@ -58,7 +58,7 @@ def test_diagnostics_are_written_in_one_place() -> None:
     """By their declared names: nothing else puts rows into their table."""
     writing = re.compile(r"INSERT INTO (?:store|staging)\.diagnostic\b|CREATE .*\bdiagnostic\b")
     found = {path.name for path in CODE if writing.search(path.read_text(encoding="utf-8"))}
-    assert found == {"diagnostic.py"}
+    assert found == {"noted.py"}
 
 
 @pytest.mark.parametrize("file", READERS, ids=str)
