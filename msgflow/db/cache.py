@@ -33,6 +33,16 @@ def read(kind: str, made_by: str) -> bytes | None:
     return content if hashlib.sha256(content).hexdigest().encode() == digest else None
 
 
+def is_usable() -> bool:
+    """Tell whether something can be kept, so that what only saves time is worth its making."""
+    try:
+        directory = _file("", "").parent
+        directory.mkdir(parents=True, exist_ok=True)
+        return os.access(directory, os.W_OK)
+    except (OSError, RuntimeError):
+        return False
+
+
 def keep(kind: str, made_by: str, content: bytes) -> None:
     """Keep something, if possible."""
     with contextlib.suppress(OSError, RuntimeError):

@@ -89,12 +89,17 @@ def is_empty(
 
 
 def _kept(headers: tuple[Header, ...]) -> dict[str, Condition]:
-    """Return the conditions from the user's cache: to parse all takes as long as a small ingest."""
+    """Return the conditions from the user's cache, none where there cannot be one.
+
+    To parse all statements takes as long as a small ingest.
+    """
     made_by = objects.hash_of(
         [Path(emptiness.__file__).read_text(encoding="utf-8"), *(header.body for header in headers)]
     )
     content = kept.read(_KIND, made_by)
     if content is None:
+        if not kept.is_usable():
+            return {}
         content = json.dumps(_conditions(headers)).encode()
         kept.keep(_KIND, made_by, content)
     found: dict[str, Condition] = json.loads(content)
