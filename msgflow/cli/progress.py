@@ -10,8 +10,11 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from msgflow.fleet.ingest import FleetProgress
     from msgflow.ingest import IngestProgress
     from msgflow.trace import Progress as ReadingProgress
+
+_SECONDS_BETWEEN_LINES = 30.0
 
 
 class _Bar(Protocol):
@@ -47,6 +50,60 @@ def reading_progress() -> Iterator[Callable[[ReadingProgress], None] | None]:
             bar("reading the traces", progress.events, progress.fraction, rate)
 
         yield show
+
+
+@contextmanager
+def fleet_progress(quiet: bool) -> Iterator[Callable[[FleetProgress], None] | None]:
+    """Yield the function that shows how many recordings are done, or None where nobody looks.
+
+    Who does not look at a terminal gets a line every now and then: it goes on for hours.
+    """
+    if quiet or sys.stderr is None:
+        yield None
+        return
+    if not sys.stderr.isatty():
+        last = time.monotonic()
+
+        def print_line(progress: FleetProgress) -> None:
+            nonlocal last
+            if time.monotonic() - last >= _SECONDS_BETWEEN_LINES:
+                last = time.monotonic()
+                print(_fleet_line(progress), file=sys.stderr, flush=True)
+
+        yield print_line
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (BarColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("opening", total=None)
+
+        def show(progress: FleetProgress) -> None:
+            bar.update(
+                task,
+                description=_fleet_line(progress),
+                total=progress.total,
+                completed=progress.done,
+            )
+
+        yield show
+
+
+def _fleet_line(progress: FleetProgress) -> str:
+    words = [f"{progress.done:,} of {progress.total:,}"]
+    if progress.failed:
+        words.append(f"{progress.failed:,} failed")
+    if progress.retried:
+        words.append(f"{progress.retried:,} tried again")
+    if progress.worked and progress.seconds:
+        words.append(f"{60 * progress.worked / progress.seconds:,.1f}/min")
+    if (left := progress.seconds_left) is not None:
+        words.append(
+            f"some {left / 60:,.0f} min left" if left >= 90 else f"some {left:,.0f} s left"
+        )
+    words += [f"{worker}: {number:,}" for worker, number in progress.workers.most_common(3)]
+    return ", ".join(words)
 
 
 @contextmanager

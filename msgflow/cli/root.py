@@ -35,7 +35,8 @@ _LEAKED = (
 )
 COMMANDS = (
     "ingest", "query", "flow", "graph", "ui", "report", "compare", "verify", "sql", "info", "check",
-    "events", "targets", "runs", "links", "paths", "clocks", "export", "db", "mcp", "simulate",
+    "events", "targets", "runs", "links", "paths", "clocks", "export", "db", "fleet", "mcp",
+    "simulate",
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import DatabaseError, UsageError
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+_READ_AT_ONCE = 16
 _LATEST = (("generation", "descending"), ("committed_ns", "descending"), ("part", "descending"))
 
 
@@ -94,6 +96,7 @@ class Lake:
             files: those to read; all when None.
         """
         import pyarrow as pa
+        import pyarrow.parquet as pq
         from pyarrow.dataset import dataset
 
         schema = run_schema()
@@ -102,13 +105,15 @@ class Lake:
         if not files:
             return schema.empty_table()
         try:
-            found = dataset(
-                [self.store.full(path) for path in files],
-                schema=schema,
-                filesystem=self.store.filesystem,
-                format="parquet",
-            )
-            return found.to_table()
+            if self.store.is_local:
+                found = dataset([*map(self.store.full, files)], schema=schema, format="parquet")
+                return found.to_table()
+            with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
+                contents = list(pool.map(self.store.read, files))
+            if None in contents:
+                raise FileNotFoundError
+            buffers = [pa.BufferReader(content) for content in contents]
+            return pa.concat_tables([pq.read_table(buffer, schema=schema) for buffer in buffers])
         except FileNotFoundError:
             # Compaction has put them into another file since they were listed.
             return self.rows()
@@ -140,15 +145,24 @@ class Lake:
         What the rows name has to be in the lake already.
 
         Args:
-            rows: values of columns of `run_schema`; `generation` higher than what counts so far.
+            rows: values of columns of `run_schema`. A higher `generation` takes the place of what
+                counts so far, whatever else is written at the same time; an equal one only where
+                nothing else is.
 
         Raises:
             DatabaseError: the lake cannot be written.
         """
         import pyarrow as pa
 
-        now = {"lake_revision": LAKE_REVISION, "committed_ns": time.time_ns()}
-        whole = [dict.fromkeys(run_schema().names) | dict(row) | now for row in rows]
+        now = time.time_ns()
+        whole = [
+            dict.fromkeys(run_schema().names)
+            | dict(row)
+            # Later than the row that it comes from, whatever the clocks of machines say.
+            | {"committed_ns": max(now, (row.get("committed_ns") or 0) + 1)}
+            | {"lake_revision": LAKE_REVISION}
+            for row in rows
+        ]
         if not whole:
             return
         table = pa.Table.from_pylist(whole, schema=run_schema())

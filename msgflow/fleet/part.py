@@ -196,7 +196,7 @@ class _Writer:
         """Write the database, compressed."""
         import pyarrow as pa
 
-        file = self._scratch / "database.zst"
+        file = self._scratch / "compressed"
         with (
             database.open("rb") as source,
             pa.CompressedOutputStream(str(file), "zstd") as target,

@@ -6,20 +6,25 @@ AWS look for them; they are never written, and never part of an address.
 
 from __future__ import annotations
 
+import errno
 import os
+import random
 import re
 import shutil
+import time
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.owner import mark
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+_T = TypeVar("_T")
 
 S3 = "s3://"
 _CHUNK = 8 * 1024 * 1024
@@ -29,6 +34,9 @@ _CONNECT_SECONDS = 10
 _REQUEST_SECONDS = 60
 # What the environment may name an endpoint by, first the more special one.
 _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
+# Seconds between tries.
+_PAUSES = (0.1, 0.3, 1.0, 3.0)
+_OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
 _USERINFO = re.compile(r"//[^/@]*@")
 
 
@@ -82,6 +90,13 @@ class Store:
     def url_of(self, path: str) -> str:
         """Return the address of a file, as DuckDB, Spark and people read it."""
         return f"{self.url}/{path}"
+
+    def _reading(self, path: str) -> Any:
+        # Without this pyarrow unpacks what is called .gz or .zst, and packs it once more.
+        return self.filesystem.open_input_stream(self.full(path), compression=None)
+
+    def _writing(self, path: str) -> Any:
+        return self.filesystem.open_output_stream(self.full(path), compression=None)
 
     def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
         """Return the files below a path, sorted; none where there is no such path.
@@ -139,8 +154,16 @@ class Store:
         """
         if self.entry(path) is None:
             return None
-        with _reaching(self.url), self.filesystem.open_input_stream(self.full(path)) as stream:
-            return bytes(stream.read())
+
+        def read() -> bytes | None:
+            try:
+                with self._reading(path) as stream:
+                    return bytes(stream.read())
+            except FileNotFoundError:  # deleted meanwhile
+                return None
+
+        with _reaching(self.url):
+            return self._patiently(read)
 
     def fetch(self, path: str, target: Path) -> None:
         """Copy a file into a new one of this machine.
@@ -149,14 +172,30 @@ class Store:
             DatabaseError: the store cannot be reached or read.
             OSError: the new file cannot be written.
         """
-        with (
-            _reaching(self.url),
-            self.filesystem.open_input_stream(self.full(path)) as stream,
-        ):
-            file = target.open("wb")
-            with file:
+
+        def copy() -> None:
+            with self._reading(path) as stream, target.open("wb") as file:
                 while chunk := stream.read(_CHUNK):
                     file.write(chunk)
+
+        with _reaching(self.url):
+            self._patiently(copy)
+
+    def _patiently(self, work: Callable[[], _T]) -> _T:
+        """Return what `work` returns, which a bucket may refuse now and then.
+
+        The client of AWS tries again by itself, but not where it was about to read.
+        """
+        for pause in () if self.is_local else _PAUSES:
+            try:
+                return work()
+            except FileNotFoundError:
+                raise
+            except OSError as error:
+                if error.errno is not None and error.errno in _OF_THIS_MACHINE:
+                    raise
+                time.sleep(pause * random.uniform(0.5, 1.5))
+        return work()
 
     def put(self, path: str, content: bytes | Path) -> None:
         """Write a file, in place of one that is there.
@@ -172,12 +211,12 @@ class Store:
             if self.is_local:
                 self._put_locally(Path(self.full(path)), content)
             elif isinstance(content, bytes):
-                with self.filesystem.open_output_stream(self.full(path)) as stream:
+                with self._writing(path) as stream:
                     stream.write(content)
             else:
                 with (
                     content.open("rb") as source,
-                    self.filesystem.open_output_stream(self.full(path)) as stream,
+                    self._writing(path) as stream,
                 ):
                     while chunk := source.read(_CHUNK):
                         stream.write(chunk)

@@ -1,0 +1,204 @@
+"""The process that does one recording: `python -m msgflow.fleet.child DIRECTORY`.
+
+It reads its task from stdin, and ends as soon as that is closed: nobody waits for it any more. What
+it is doing, and what came of it, stands in files of the directory, which its parent removes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from msgflow.fleet.task import Outcome, Task
+
+STAGE, RESULT = "stage", "result.json"
+_ORPHAN = 1
+
+
+def main() -> None:
+    """Do what stdin says."""
+    directory = Path(sys.argv[1])
+    text = sys.stdin.readline()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    from msgflow.fleet.task import Task
+
+    outcome = do(Task(**json.loads(text)), directory)
+    aside = directory / "result.part"
+    aside.write_text(json.dumps(outcome.as_dict()), encoding="utf-8")
+    aside.replace(directory / RESULT)
+
+
+def _end_with_parent() -> None:
+    with contextlib.suppress(OSError, ValueError):
+        os.read(0, 1)
+    os._exit(_ORPHAN)
+
+
+def do(task: Task, directory: Path) -> Outcome:
+    """Fetch, ingest, check and write one recording; commit nothing.
+
+    Args:
+        task: what is to be done.
+        directory: an empty one for all that is needed meanwhile.
+    """
+    from msgflow.fleet.task import Outcome
+
+    begin = time.monotonic()
+    stage = _Stage(directory / STAGE)
+    try:
+        values = _values(task, directory, stage.enter)
+        return Outcome(
+            values=values,
+            signature=values["source_signature"],
+            seconds=time.monotonic() - begin,
+        )
+    except Exception as error:
+        return _failed(error, stage.name, time.monotonic() - begin)
+
+
+class _Stage:
+    """What is being done, for whoever finds the process hanging or gone."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.name = ""
+
+    def enter(self, name: str) -> None:
+        """Begin with something else."""
+        self.name = name
+        self._file.write_text(name, encoding="utf-8")
+
+
+def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
+    from msgflow.database import Database
+    from msgflow.fleet.lake import Lake
+    from msgflow.fleet.part import Content, write_part
+    from msgflow.fleet.recording import fetch, look_at
+    from msgflow.fleet.store import S3
+
+    enter("looking at the source")
+    before = look_at(task.source)
+    _require_space(task, directory)
+    path = Path(task.source)
+    if task.source.startswith(S3):
+        enter("fetching")
+        (directory / "source").mkdir()
+        path = fetch(task.source, directory / "source")
+    enter("ingesting")
+    database = directory / "msgflow.duckdb"
+    with Database(database) as opened:
+        opened.ingest(path, **task.options)
+    if task.source.startswith(S3):
+        _rename_paths(database, f"{directory / 'source'}/", f"{task.source.rpartition('/')[0]}/")
+    enter("looking at the source again")
+    if look_at(task.source) != before:
+        raise ChangedError(task.source)
+    enter("opening the lake")
+    lake = Lake.open(task.lake)
+    enter("writing")
+    limit = f"{task.memory}B" if task.memory else None
+    with Database(database, memory_limit=limit) as opened:
+        part = write_part(
+            opened.connection,
+            database,
+            lake.store,
+            directory,
+            source=task.source,
+            options={
+                **task.options,
+                "views": task.views,
+                "database": task.database,
+                "edition": task.edition,
+            },
+            content=Content(views=task.views, database=task.database),
+        )
+    return {
+        **part.values,
+        "source": task.source,
+        "source_signature": before.signature,
+        "source_bytes": before.size,
+        "options": json.dumps(task.options, sort_keys=True),
+    }
+
+
+class ChangedError(Exception):
+    """The source changed while it was read."""
+
+
+def _require_space(task: Task, directory: Path) -> None:
+    import shutil
+
+    free = shutil.disk_usage(directory).free
+    if free < task.disk:
+        raise OSError(
+            28, f"some {task.disk:,} bytes of scratch space are needed, {free:,} are free"
+        )
+
+
+def _rename_paths(database: Path, before: str, after: str) -> None:
+    """Let a database name its source by its own address, wherever it was copied to."""
+    from msgflow.db.connection import connect
+
+    with contextlib.closing(connect(database, read_only=False)) as con:
+        columns = con.execute(
+            "SELECT table_name, column_name FROM duckdb_columns() WHERE data_type = 'VARCHAR' "
+            "AND schema_name = 'store' AND database_name = current_database()"
+        ).fetchall()
+        for table, column in columns:
+            con.execute(
+                f'UPDATE store."{table}" SET "{column}" = replace("{column}", $before, $after) '
+                f'WHERE contains("{column}", $before)',
+                {"before": before, "after": after},
+            )
+
+
+def _failed(error: Exception, stage: str, seconds: float) -> Outcome:
+    from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
+    from msgflow.fleet.task import Outcome, Reason, without_secrets
+
+    message = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    hint = None
+    if isinstance(error, MsgflowError):
+        message, hint = error.message, error.hint
+    reason = Reason.ERROR
+    if isinstance(error, ChangedError):
+        reason = Reason.CHANGED
+        message = f"the recording changed while it was read — {error}"
+        hint = "ingest it again when it is complete"
+    elif _is_full(error, message):
+        reason = Reason.NO_SPACE
+    elif isinstance(error, MemoryError) or "out of memory" in message.lower():
+        reason = Reason.TOO_LARGE
+        hint = "give its worker more memory"
+    elif isinstance(error, TraceError | UsageError):
+        reason = Reason.BROKEN
+    elif isinstance(error, DatabaseError) and "the store" in message:
+        reason = Reason.UNREACHABLE
+    return Outcome(
+        reason=reason,
+        stage=stage,
+        error=without_secrets(message),
+        hint=hint and without_secrets(hint),
+        seconds=seconds,
+    )
+
+
+def _is_full(error: Exception, message: str) -> bool:
+    if isinstance(error, OSError) and error.errno in (28, 122):
+        return True
+    return any(
+        words in message.lower() for words in ("no space left", "not enough free", "disk quota")
+    )
+
+
+if __name__ == "__main__":
+    main()

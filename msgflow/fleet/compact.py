@@ -1,0 +1,244 @@
+"""Fewer, larger files in a lake, and none that nobody needs; also while it is read and written."""
+
+from __future__ import annotations
+
+import itertools
+import secrets
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.fleet.answers import answers
+from msgflow.fleet.lake import Lake, visible
+from msgflow.fleet.layout import DATABASE, RUN, VIEWS, metadata, part_path
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pyarrow as pa
+
+    from msgflow.fleet.store import Entry
+
+PACK = "pack"
+# Of one pack: what is held in memory at once, and written again when a run of it is removed.
+_MOST_RUNS = 1_000
+_MOST_BYTES = 50_000_000
+# Small groups of rows, run after run: who wants a few of the runs reads only theirs.
+_ROW_GROUP = 20_000
+_READ_AT_ONCE = 16
+DAY = 86_400.0
+
+
+@dataclass(frozen=True)
+class Compaction:
+    """What was done.
+
+    Attributes:
+        packed: runs whose answers lie in a new part now.
+        packs: new parts.
+        deleted: files that were deleted.
+        size: their bytes.
+    """
+
+    packed: int
+    packs: int
+    deleted: int
+    size: int
+
+
+def compact(lake: Lake, *, older_than: float = DAY) -> Compaction:
+    """Put the answers of many runs together, and delete files that no row of `run` needs.
+
+    Readers and writers need not stop: what they may still use stays for `older_than`.
+
+    Args:
+        lake: the lake.
+        older_than: seconds for which a file that is not needed stays. It has to be longer than
+            reading takes, and than the ingest of one recording.
+
+    Raises:
+        DatabaseError: the lake cannot be read or written.
+    """
+    rows = lake.rows()
+    sizes = Counter[str]()
+    for answer in answers():
+        for entry in lake.store.entries(answer.table):
+            sizes[_part_of(entry) or ""] += entry.size
+    packed, packs = 0, 0
+    for chosen in _groups(rows, sizes):
+        _pack(lake, chosen)
+        packed += len(chosen)
+        packs += 1
+    deleted = _clean_up(lake, older_than)
+    return Compaction(packed, packs, len(deleted), sum(entry.size for entry in deleted))
+
+
+def _groups(rows: pa.Table, sizes: Mapping[str, int]) -> list[list[dict[str, Any]]]:
+    """Return the runs whose answers are to lie together, as they do not yet."""
+    runs = visible(rows).to_pylist()
+    living = Counter(row["part"] for row in runs)
+    named = Counter(part for _, part in {(row["run"], row["part"]) for row in rows.to_pylist()})
+    full = {
+        part
+        for part in living
+        if part.startswith(PACK)
+        and living[part] == named[part]
+        and (living[part] > _MOST_RUNS // 2 or sizes[part] > _MOST_BYTES // 2)
+    }
+    loose = [row for row in runs if row["part"] not in full]
+    loose.sort(key=lambda row: (row["schema_revision"], row["start_ns"] or 0, row["run"]))
+    groups: list[list[dict[str, Any]]] = [[]]
+    size = 0.0
+    for row in loose:
+        share = sizes[row["part"]] / living[row["part"]]
+        if groups[-1] and (size + share > _MOST_BYTES or len(groups[-1]) == _MOST_RUNS):
+            groups.append([])
+            size = 0.0
+        groups[-1].append(row)
+        size += share
+    return [group for group in groups if _is_worth_it(group, living, named)]
+
+
+def _is_worth_it(
+    group: Sequence[Mapping[str, Any]], living: Mapping[str, int], named: Mapping[str, int]
+) -> bool:
+    """Tell whether runs lie in several parts, or with some that are gone."""
+    parts = {row["part"] for row in group}
+    return len(parts) > 1 or any(
+        part.startswith(PACK) and named[part] > living[part] for part in parts
+    )
+
+
+def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> None:
+    part = f"{PACK}-{secrets.token_hex(8)}"
+    revision = max(row["schema_revision"] or "" for row in rows)
+    for answer in answers():
+        table = _together(lake, answer.table, rows)
+        if table is not None:
+            _write(lake, answer.table, part, table, revision)
+    # Of the same generation: a run that is replaced or removed meanwhile stays so.
+    lake.commit({**row, "part": part} for row in rows)
+
+
+def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.Table | None:
+    """Return the answers of some runs, run after run; None where no part has the table."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    wanted: dict[str, list[str]] = {}
+    for row in rows:
+        wanted.setdefault(row["part"], []).append(row["run"])
+    with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
+        found = [
+            read
+            for read in pool.map(lambda part: _read(lake, table, part, wanted[part]), wanted)
+            if read is not None
+        ]
+    if not found:
+        return None
+    whole = pa.concat_tables(found, promote_options="permissive")
+    # Stable: the rows of a run keep their order.
+    return whole.take(pc.sort_indices(whole["run"]))
+
+
+def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | None:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+    import pyarrow.parquet
+
+    content = lake.store.read(part_path(table, part))
+    # One that an earlier msgflow wrote may lack it.
+    if content is None:
+        return None
+    # Not by its path, whose `part=` would become a column.
+    read = pyarrow.parquet.read_table(pa.BufferReader(content)).replace_schema_metadata()
+    return read.filter(pc.is_in(read["run"], value_set=pa.array(runs, pa.string())))
+
+
+def _write(lake: Lake, name: str, part: str, table: pa.Table, revision: str) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    sink = pa.BufferOutputStream()
+    pyarrow.parquet.write_table(
+        table.replace_schema_metadata(metadata(name, revision)),
+        sink,
+        compression="zstd",
+        row_group_size=_ROW_GROUP,
+    )
+    lake.store.put(part_path(name, part), sink.getvalue().to_pybytes())
+
+
+def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
+    """Delete what no row needs that counts, or has counted within that time."""
+    before_ns = time.time_ns() - round(older_than * 1e9)
+    # Rows are read first: a part that is written meanwhile is younger.
+    files = {path: lake.rows([path]).to_pylist() for path in lake.run_files()}
+    latest: dict[str, dict[str, Any]] = {}
+    for row in itertools.chain.from_iterable(files.values()):
+        if row["run"] not in latest or _order(row) > _order(latest[row["run"]]):
+            latest[row["run"]] = row
+
+    def is_over(row: Mapping[str, Any]) -> bool:
+        """Tell whether another row has counted for so long that nobody goes by this one."""
+        newest = latest[row["run"]]
+        return _order(row) != _order(newest) and newest["committed_ns"] < before_ns
+
+    living = [
+        row
+        for row in itertools.chain.from_iterable(files.values())
+        if not is_over(row) and not (row["is_removed"] and row["committed_ns"] < before_ns)
+    ]
+    needed = {
+        **{answer.table: {row["part"] for row in living} for answer in answers()},
+        VIEWS: {row["view_part"] for row in living},
+        DATABASE: {row["database_part"] for row in living},
+    }
+    unneeded = [
+        entry
+        for folder, parts in needed.items()
+        for entry in lake.store.entries(folder)
+        if entry.changed_ns < before_ns and _part_of(entry) not in parts
+    ]
+    entries = {entry.path: entry for entry in lake.store.entries(RUN, recursive=False)}
+    rest = dict(files)
+    while True:
+        # A removal is said until nothing else says that the run is there.
+        said = Counter(row["run"] for row in itertools.chain.from_iterable(rest.values()))
+        over = [
+            path
+            for path, rows in rest.items()
+            if all(
+                is_over(row)
+                or (row["is_removed"] and said[row["run"]] == 1 and row["committed_ns"] < before_ns)
+                for row in rows
+            )
+        ]
+        if not over:
+            break
+        unneeded += [entries[path] for path in over if path in entries]
+        for path in over:
+            del rest[path]
+    return [entry for entry in unneeded if _delete(lake, entry)]
+
+
+def _delete(lake: Lake, entry: Entry) -> bool:
+    """Delete a file, unless somebody has written it again meanwhile."""
+    now = lake.store.entry(entry.path)
+    if now is None or now.changed_ns != entry.changed_ns:
+        return False
+    lake.store.delete(entry.path)
+    return True
+
+
+def _order(row: Mapping[str, Any]) -> tuple[int, int, str]:
+    return row["generation"], row["committed_ns"], row["part"]
+
+
+def _part_of(entry: Entry) -> str | None:
+    for segment in entry.path.split("/"):
+        if segment.startswith("part="):
+            return segment.removeprefix("part=")
+    return None

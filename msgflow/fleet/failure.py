@@ -1,0 +1,65 @@
+"""Recordings that did not go in: the table `fleet_failure` of a lake."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import DatabaseError
+from msgflow.fleet.layout import FAILURE, failure_schema
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pyarrow as pa
+
+    from msgflow.fleet.lake import Lake
+
+
+def read_failures(lake: Lake) -> pa.Table:
+    """Return the recordings that did not go in: one row each, columns of `failure_schema`.
+
+    Raises:
+        DatabaseError: the lake cannot be read.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    schema = failure_schema()
+    tables = [schema.empty_table()]
+    for entry in lake.store.entries(FAILURE, recursive=False):
+        # One that went in meanwhile is gone.
+        if entry.path.endswith(".parquet") and (content := lake.store.read(entry.path)):
+            try:
+                tables.append(pyarrow.parquet.read_table(pa.BufferReader(content), schema=schema))
+            except (pa.ArrowInvalid, OSError) as error:
+                raise DatabaseError(
+                    f"cannot read a failure of the lake — {lake.store.url_of(entry.path)}",
+                    "delete this file; its recording will be tried again",
+                ) from error
+    return pa.concat_tables(tables).sort_by("source")
+
+
+def write_failure(lake: Lake, values: Mapping[str, Any]) -> None:
+    """Note that a recording did not go in, in place of what was noted of it before.
+
+    Raises:
+        DatabaseError: the lake cannot be written.
+    """
+    import pyarrow as pa
+
+    row = dict.fromkeys(failure_schema().names) | dict(values)
+    row |= {"msgflow_version": __version__, "failed_ns": time.time_ns()}
+    table = pa.Table.from_pylist([row], schema=failure_schema())
+    lake.put_table(_path(row["source"]), FAILURE, table, "")
+
+
+def forget_failure(lake: Lake, source: str) -> None:
+    """Forget a failure: the recording went in."""
+    lake.store.delete(_path(source))
+
+
+def _path(source: str) -> str:
+    return f"{FAILURE}/{hashlib.sha256(source.encode(errors='replace')).hexdigest()[:24]}.parquet"

@@ -1,0 +1,431 @@
+"""Many recordings into one lake: gives out the work, commits what was done, notes what was not."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import json
+import random
+import secrets
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import MsgflowError, TraceError
+from msgflow.fleet.failure import forget_failure, read_failures, write_failure
+from msgflow.fleet.lake import Lake, visible
+from msgflow.fleet.recording import is_archive_name, look_at
+from msgflow.fleet.sources import find_recordings
+from msgflow.fleet.store import S3
+from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
+from msgflow.fleet.workers import make_workers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from msgflow.fleet.recording import Recording, State
+    from msgflow.fleet.workers import Workers
+
+_LOOKING_AT_ONCE = 8
+_SECONDS_BETWEEN_LOOKS = 0.5
+_LONGEST_PAUSE = 60.0
+
+
+@dataclass(frozen=True)
+class Options:
+    """How each recording is to be done.
+
+    Attributes:
+        ingest: options of the ingest: reader, strict, ignore, clock_sync.
+        views: write the public views, too.
+        database: write the database, too.
+        replace: do those again that the lake has already.
+        retry_failed: do those again that failed before.
+        tries: how often, where the next one may go better.
+        pause: seconds before the second try; twice as many before each further one.
+        timeout: seconds that one may take.
+        memory: most bytes that one may take.
+        scratch: folder of each worker for what is needed meanwhile.
+    """
+
+    ingest: Mapping[str, Any] = field(default_factory=dict)
+    views: bool = True
+    database: bool = True
+    replace: bool = False
+    retry_failed: bool = False
+    tries: int = 3
+    pause: float = 2.0
+    timeout: float = 3600.0
+    memory: int | None = None
+    scratch: str | None = None
+
+
+@dataclass
+class FleetProgress:
+    """How far it has come.
+
+    Attributes:
+        total: recordings given.
+        added: went in.
+        replaced: took the place of what was there.
+        there: were in the lake already, as they are.
+        same: have the packets of another recording that is in the lake, and the same labels.
+        failed: did not go in.
+        failed_before: failed at an earlier time, and were left alone.
+        retried: tries after a first one.
+        events: events of those that went in.
+        seconds: since the begin.
+        workers: how many each worker did.
+        failures: (source, reason, error) of those that failed now.
+    """
+
+    total: int
+    added: int = 0
+    replaced: int = 0
+    there: int = 0
+    same: int = 0
+    failed: int = 0
+    failed_before: int = 0
+    retried: int = 0
+    events: int = 0
+    seconds: float = 0.0
+    workers: Counter[str] = field(default_factory=Counter)
+    failures: list[tuple[str, str, str]] = field(default_factory=list)
+
+    @property
+    def done(self) -> int:
+        """Recordings of which the end is known."""
+        return self.in_lake + self.failed + self.failed_before
+
+    @property
+    def in_lake(self) -> int:
+        """Recordings that the lake has."""
+        return self.added + self.replaced + self.there + self.same
+
+    @property
+    def worked(self) -> int:
+        """Recordings that somebody worked on to the end."""
+        return self.added + self.replaced + self.same + self.failed
+
+    @property
+    def seconds_left(self) -> float | None:
+        """How long the rest will take, if it goes on like that; None: nobody knows yet."""
+        if not self.worked:
+            return None
+        return self.seconds / self.worked * (self.total - self.done)
+
+
+def fleet_ingest(
+    sources: Sequence[str],
+    lake: str | Path,
+    *,
+    ray: str | None = None,
+    options: Options | None = None,
+    labels: Mapping[str, str] | None = None,
+    progress: Callable[[FleetProgress], None] | None = None,
+) -> FleetProgress:
+    """Ingest recordings into a lake, each as one run; what fails does not end the rest.
+
+    Args:
+        sources: directories, archives, patterns or manifests, in folders or buckets.
+        lake: address of the lake; a new one where there is nothing yet.
+        ray: address of a Ray cluster, 'auto', 'local' for one of this machine, or None: this
+            process does one after the other.
+        options: how each recording is to be done.
+        labels: of all recordings; what a manifest says comes first.
+        progress: called whenever something has ended.
+
+    Raises:
+        UsageError: sources, labels or an address that cannot be one; Ray is not there.
+        DatabaseError: the lake cannot be written, is none, or newer than this msgflow.
+    """
+    recordings = find_recordings(sources, labels)
+    opened = Lake.open_or_create(lake)
+    return _Ingest(opened, recordings, options or Options(), progress).run(ray)
+
+
+@dataclass
+class _Item:
+    """A recording on its way."""
+
+    index: int
+    recording: Recording
+    state: State | None = None
+    tries: int = 0
+
+
+class _Ingest:
+    """One call: what the lake has, what is to be done, and what came of it."""
+
+    def __init__(
+        self,
+        lake: Lake,
+        recordings: Sequence[Recording],
+        options: Options,
+        progress: Callable[[FleetProgress], None] | None,
+    ) -> None:
+        self._lake = lake
+        self._options = options
+        self._recordings = recordings
+        self._report = progress
+        self._begin = time.monotonic()
+        # What is there stays as it is, for those who read it, until the new part is committed.
+        self._edition = secrets.token_hex(4) if options.replace else ""
+        self._progress = FleetProgress(len(recordings))
+        rows = lake.rows()
+        self._runs = {row["run"]: row for row in visible(rows).to_pylist()}
+        self._sources = {row["source"]: key for key, row in self._runs.items()}
+        self._generations: dict[str, int] = {}
+        for key, generation in zip(
+            rows["run"].to_pylist(), rows["generation"].to_pylist(), strict=True
+        ):
+            self._generations[key] = max(generation, self._generations.get(key, 0))
+        self._failed = {row["source"]: row for row in read_failures(lake).to_pylist()}
+        # (when, tie, item): what is tried again after a pause.
+        self._paused: list[tuple[float, int, _Item]] = []
+        self._ties = itertools.count()
+
+    def run(self, ray: str | None) -> FleetProgress:
+        """Do all that is left."""
+        workers: Workers | None = None
+        with ThreadPoolExecutor(_LOOKING_AT_ONCE) as pool:
+            looked = pool.map(_look, self._recordings)
+            fresh = (
+                item
+                for index, (recording, found) in enumerate(
+                    zip(self._recordings, looked, strict=True)
+                )
+                if (item := self._new(index, recording, found)) is not None
+            )
+            try:
+                running: dict[int, _Item] = {}
+                while True:
+                    while workers is None or workers.has_room():
+                        item = self._next(fresh)
+                        if item is None:
+                            break
+                        # Where nothing is left to do, no cluster is needed.
+                        workers = workers or make_workers(ray)
+                        self._submit(workers, item, running)
+                    if not running and not self._paused:
+                        break
+                    if running and workers is not None:
+                        for task, outcome in workers.wait(_SECONDS_BETWEEN_LOOKS):
+                            self._ended(running.pop(task.index), outcome)
+                    else:
+                        time.sleep(min(_SECONDS_BETWEEN_LOOKS, self._until_next()))
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+                if workers is not None:
+                    workers.close()
+        self._tell()
+        return self._progress
+
+    def _next(self, fresh: Iterator[_Item]) -> _Item | None:
+        """Return what is to be done next: first what has waited long enough."""
+        if self._paused and self._until_next() <= 0:
+            return heapq.heappop(self._paused)[2]
+        return next(fresh, None)
+
+    def _until_next(self) -> float:
+        return self._paused[0][0] - time.monotonic()
+
+    def _new(self, index: int, recording: Recording, found: State | MsgflowError) -> _Item | None:
+        """Return what is to be done of a recording; None where nothing is."""
+        item = _Item(index, recording)
+        if isinstance(found, MsgflowError):
+            item.tries = 1
+            reason = Reason.BROKEN if isinstance(found, TraceError) else Reason.UNREACHABLE
+            self._failed_now(
+                item,
+                Outcome(
+                    reason=reason,
+                    stage="looking at the source",
+                    error=without_secrets(found.message),
+                    hint=found.hint,
+                ),
+            )
+            return None
+        item.state = found
+        run = self._runs.get(self._sources.get(recording.source, ""))
+        if run is not None and self._is_there(run, found):
+            self._relabel(run, recording)
+            self._progress.there += 1
+            self._tell()
+            return None
+        failure = self._failed.get(recording.source)
+        if (
+            failure is not None
+            and not self._options.retry_failed
+            and failure["source_signature"] == found.signature
+        ):
+            self._progress.failed_before += 1
+            self._tell()
+            return None
+        return item
+
+    def _is_there(self, run: Mapping[str, Any], state: State) -> bool:
+        options = self._options
+        return (
+            not options.replace
+            and run["source_signature"] == state.signature
+            and run["options"] == json.dumps(dict(options.ingest), sort_keys=True)
+            and (run["view_part"] is not None or not options.views)
+            and (run["database_part"] is not None or not options.database)
+        )
+
+    def _relabel(self, run: Mapping[str, Any], recording: Recording) -> None:
+        """Say of a run what is said of its recording now; its answers stay as they are."""
+        if recording.labels and dict(run["labels"] or ()) != dict(recording.labels):
+            self._commit([{**run, "labels": dict(recording.labels)}])
+
+    def _submit(self, workers: Workers, item: _Item, running: dict[int, _Item]) -> None:
+        options = self._options
+        source = item.recording.source
+        assert item.state is not None
+        memory, disk = needs(
+            item.state.size,
+            is_archive=item.state.is_archive and is_archive_name(source),
+            is_remote=source.startswith(S3),
+        )
+        task = Task(
+            item.index,
+            source,
+            self._lake.store.url,
+            dict(options.ingest),
+            options.views,
+            options.database,
+            options.timeout,
+            options.memory,
+            options.scratch,
+            memory=min(memory, options.memory or memory),
+            disk=disk,
+            edition=self._edition,
+        )
+        item.tries += 1
+        if (words := workers.is_too_large(task)) is not None:
+            self._failed_now(
+                item,
+                Outcome(
+                    reason=Reason.TOO_LARGE,
+                    stage="giving it to a worker",
+                    error=words,
+                    hint="a machine that has it, or --memory if it needs less",
+                    signature=item.state.signature,
+                ),
+            )
+            return
+        running[item.index] = item
+        workers.submit(task)
+
+    def _ended(self, item: _Item, outcome: Outcome) -> None:
+        if outcome.worker:
+            self._progress.workers[outcome.worker.partition(":")[0]] += 1
+        if outcome.values is None:
+            self._failed_now(item, outcome)
+            return
+        key = outcome.values["run"]
+        there = self._runs.get(key)
+        is_other = there is not None and there["source"] != item.recording.source
+        if there is not None and is_other and not self._options.replace:
+            self._same_packets(item, there, outcome)
+            return
+        row = {
+            **outcome.values,
+            "labels": dict(item.recording.labels),
+            "seconds": outcome.seconds,
+            "tries": item.tries,
+            "worker": outcome.worker,
+        }
+        before = self._sources.get(item.recording.source)
+        # What the same source gave before, when it held something else.
+        gone = [{**self._runs[before], "is_removed": True}] if before not in (None, key) else []
+        self._commit([row, *gone])
+        self._forget(item)
+        if there is not None or gone:
+            self._progress.replaced += 1
+        else:
+            self._progress.added += 1
+        self._progress.events += row["event_count"] or 0
+        self._tell()
+
+    def _same_packets(self, item: _Item, there: Mapping[str, Any], outcome: Outcome) -> None:
+        labels = dict(item.recording.labels)
+        if not labels or labels == dict(there["labels"] or ()):
+            self._forget(item)
+            self._progress.same += 1
+            self._tell()
+            return
+        self._failed_now(
+            item,
+            Outcome(
+                reason=Reason.SAME_PACKETS,
+                stage="committing",
+                error=f"its packets are in the lake already, with other labels, from"
+                f" {there['source']} (run {there['run']})",
+                hint="leave out one of the two, or give --replace",
+                signature=outcome.signature,
+                worker=outcome.worker,
+            ),
+        )
+
+    def _commit(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        numbered = []
+        for row in rows:
+            key = row["run"]
+            self._generations[key] = self._generations.get(key, 0) + 1
+            numbered.append({**row, "generation": self._generations[key]})
+        self._lake.commit(numbered)
+        for row in numbered:
+            if row["is_removed"]:
+                self._runs.pop(row["run"], None)
+            else:
+                self._runs[row["run"]] = row
+                self._sources[row["source"]] = row["run"]
+
+    def _forget(self, item: _Item) -> None:
+        if self._failed.pop(item.recording.source, None) is not None:
+            forget_failure(self._lake, item.recording.source)
+
+    def _failed_now(self, item: _Item, outcome: Outcome) -> None:
+        """Try again later where that may help; else note the failure."""
+        if outcome.reason in PASSING and item.tries < self._options.tries and item.state:
+            pause = min(self._options.pause * 2 ** (item.tries - 1), _LONGEST_PAUSE)
+            # Not all at once, where many failed for one reason.
+            when = time.monotonic() + pause * random.uniform(0.5, 1.5)
+            heapq.heappush(self._paused, (when, next(self._ties), item))
+            self._progress.retried += 1
+            return
+        source = item.recording.source
+        signature = outcome.signature or (item.state.signature if item.state else None)
+        row = {
+            "source": source,
+            "source_signature": signature,
+            "labels": dict(item.recording.labels),
+            "reason": str(outcome.reason),
+            "stage": outcome.stage,
+            "error": outcome.error,
+            "hint": outcome.hint,
+            "tries": item.tries,
+            "worker": outcome.worker or None,
+        }
+        write_failure(self._lake, row)
+        self._failed[source] = row
+        self._progress.failed += 1
+        self._progress.failures.append((source, str(outcome.reason), outcome.error))
+        self._tell()
+
+    def _tell(self) -> None:
+        self._progress.seconds = time.monotonic() - self._begin
+        if self._report is not None:
+            self._report(self._progress)
+
+
+def _look(recording: Recording) -> State | MsgflowError:
+    try:
+        return look_at(recording.source)
+    except MsgflowError as error:
+        return error

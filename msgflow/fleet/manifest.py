@@ -1,0 +1,169 @@
+"""Manifests: lists of recordings with what is said of each, as CSV, JSONL or Parquet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.db.runs import require_label
+from msgflow.errors import UsageError
+from msgflow.fleet.recording import Recording
+from msgflow.fleet.store import Store, normal_url
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SUFFIXES = (".csv", ".jsonl", ".parquet")
+PATH = "path"
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One row: where it stands, for people, and its values as text."""
+
+    place: str
+    values: dict[str, str | None]
+
+
+def is_manifest(source: str) -> bool:
+    """Tell whether a source is a manifest, by its name."""
+    return source.lower().endswith(SUFFIXES)
+
+
+def read_manifest(source: str) -> list[Recording]:
+    """Return the recordings of a manifest, in its order.
+
+    Each has a path; relative ones begin where the manifest lies. All other columns are labels:
+    texts, as they stand there; an empty one is none. Equal rows count once.
+
+    Raises:
+        UsageError: it does not exist, is no such file, or a row of it cannot be one.
+        DatabaseError: its store cannot be reached.
+    """
+    url = normal_url(source)
+    folder, _, name = url.rpartition("/")
+    content = Store(folder or "/").read(name)
+    if content is None:
+        raise UsageError(f"no such manifest — {source}", "check the path")
+    rows = list(_rows(content, source))
+    if not rows:
+        raise UsageError(f"the manifest is empty — {source}", "a column path, and a row for each")
+    found: dict[str, tuple[Recording, str]] = {}
+    for row in rows:
+        recording = _recording(row, folder, source)
+        earlier, place = found.setdefault(recording.source, (recording, row.place))
+        if earlier != recording:
+            raise UsageError(
+                f"the manifest says two things of one recording, in {place} and {row.place}"
+                f" — {row.values[PATH]}",
+                "leave out one of the two",
+            )
+    return [recording for recording, _ in found.values()]
+
+
+def _recording(row: _Row, folder: str, source: str) -> Recording:
+    path = row.values.get(PATH)
+    if not path:
+        raise UsageError(f"a row without a path, in {row.place} — {source}", f"fill in {PATH}")
+    labels = {key: value for key, value in row.values.items() if key != PATH and value}
+    try:
+        for key, value in labels.items():
+            require_label(key, value)
+    except UsageError as error:
+        raise UsageError(f"{error.message}, in {row.place} — {source}", error.hint) from error
+    is_whole = "://" in path or path.startswith("/")
+    return Recording(normal_url(path if is_whole else f"{folder}/{path}"), labels)
+
+
+def _rows(content: bytes, source: str) -> Iterator[_Row]:
+    if source.lower().endswith(".parquet"):
+        yield from _parquet(content, source)
+        return
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UsageError(f"the manifest is not UTF-8 — {source}", "save it as UTF-8") from error
+    yield from (_jsonl if source.lower().endswith(".jsonl") else _csv)(text, source)
+
+
+def _csv(text: str, source: str) -> Iterator[_Row]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        names = next(reader, [])
+        _require_columns(names, source)
+        for values in reader:
+            place = f"line {reader.line_num}"
+            if not values:
+                continue
+            if len(values) != len(names):
+                raise UsageError(
+                    f"{len(values)} values for {len(names)} columns, in {place} — {source}",
+                    "put values with commas or line breaks between quotes",
+                )
+            yield _Row(place, dict(zip(names, values, strict=True)))
+    except csv.Error as error:
+        raise UsageError(
+            f"cannot read the manifest: {error}, in line {reader.line_num} — {source}",
+            "a quote inside of quotes is written twice",
+        ) from error
+
+
+def _jsonl(text: str, source: str) -> Iterator[_Row]:
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.strip():
+            continue
+        try:
+            values = json.loads(line)
+        except ValueError as error:
+            raise UsageError(
+                f"cannot read the manifest: {error}, in line {number} — {source}",
+                "one JSON object a line",
+            ) from error
+        if not isinstance(values, dict):
+            raise UsageError(f"no object, in line {number} — {source}", '{"path": "…", …}')
+        _require_columns(list(values), source)
+        yield _Row(f"line {number}", {key: _text(value, key) for key, value in values.items()})
+
+
+def _parquet(content: bytes, source: str) -> Iterator[_Row]:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    try:
+        table = pyarrow.parquet.read_table(pa.BufferReader(content))
+    except (pa.ArrowInvalid, OSError) as error:
+        raise UsageError(f"cannot read the manifest — {source}", "is it Parquet?") from error
+    _require_columns(table.column_names, source)
+    for number, values in enumerate(table.to_pylist(), 1):
+        yield _Row(f"row {number}", {key: _text(value, key) for key, value in values.items()})
+
+
+def _require_columns(names: list[str], source: str) -> None:
+    if PATH not in names:
+        columns = ", ".join(names) or "none"
+        raise UsageError(
+            f"the manifest has no column {PATH}, its columns are {columns} — {source}",
+            "name the recordings in a column path; all others are labels",
+        )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UsageError(f"the manifest has two columns {twice[0]} — {source}", "rename one")
+    for name in names:
+        if name != PATH:
+            try:
+                require_label(name, None)
+            except UsageError as error:
+                raise UsageError(f"{error.message}, a column of {source}", error.hint) from error
+
+
+def _text(value: Any, key: str) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict | list | bytes):
+        raise UsageError(f"a label is a text or a number — {key}", "give one value")
+    return str(value)

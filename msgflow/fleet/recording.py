@@ -1,0 +1,105 @@
+"""A recording of a fleet: where it lies, what is said of it, and whether it is still the same."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError
+from msgflow.fleet.store import Store
+from msgflow.trace.archive import SUFFIXES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What becomes one run.
+
+    Attributes:
+        source: absolute path, or `s3://…`: a directory with traces, or an archive.
+        labels: what is said of it.
+    """
+
+    source: str
+    labels: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class State:
+    """What a source looks like from outside.
+
+    Attributes:
+        signature: hash of names, sizes and times of all its files.
+        size: their bytes.
+        is_archive: it is one file.
+    """
+
+    signature: str
+    size: int
+    is_archive: bool
+
+
+def look_at(source: str) -> State:
+    """Return what a source looks like, without reading its files.
+
+    Raises:
+        TraceError: there is nothing, or it cannot be read.
+        DatabaseError: its store cannot be reached.
+    """
+    store = Store(source)
+    file = store.entry()
+    if file is not None:
+        files = [(source.rpartition("/")[2], file.size, file.changed_ns)]
+    elif store.is_local:
+        files = sorted(_local_files(source))
+    else:
+        # Times in a bucket are those of the upload: another one is taken for another recording.
+        files = [(entry.path, entry.size, entry.changed_ns) for entry in store.entries()]
+    if not files:
+        raise TraceError(f"no such recording — {source}", "check the path")
+    text = "\n".join(f"{name}\t{size}\t{time}" for name, size, time in files)
+    digest = hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
+    return State(digest[:32], sum(size for _, size, _ in files), file is not None)
+
+
+def fetch(source: str, directory: Path) -> Path:
+    """Copy a source from a bucket into a directory of this machine, under its own name.
+
+    Raises:
+        DatabaseError: the store cannot be reached or read.
+        OSError: the directory cannot be written.
+    """
+    store = Store(source)
+    target = directory / source.rpartition("/")[2]
+    if store.entry() is not None:
+        store.fetch("", target)
+        return target
+    for entry in store.entries():
+        place = target / entry.path
+        # A name in a bucket may be anything.
+        if not place.resolve().is_relative_to(target.resolve()):
+            raise TraceError(f"a name that leads out of the recording — {entry.path}", None)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        store.fetch(entry.path, place)
+    return target
+
+
+def is_archive_name(source: str) -> bool:
+    """Tell whether a source is an archive, by its name."""
+    return source.lower().endswith(SUFFIXES)
+
+
+def _local_files(source: str) -> Iterator[tuple[str, int, int]]:
+    for directory, _, names in os.walk(source, followlinks=True):
+        for name in names:
+            path = Path(directory, name)
+            try:
+                status = path.stat()
+            except FileNotFoundError:  # a link that leads nowhere, or gone meanwhile
+                continue
+            yield str(path.relative_to(source)), status.st_size, status.st_mtime_ns

@@ -1,0 +1,179 @@
+"""Who does the tasks: this process one after the other, or the nodes of a Ray cluster."""
+
+from __future__ import annotations
+
+import logging
+import os
+from typing import TYPE_CHECKING, Any, Protocol
+
+from msgflow.errors import UsageError
+from msgflow.fleet.task import Outcome, Reason, Task
+from msgflow.fleet.work import run_task
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+LOCAL = "local"
+_SCRATCH = "scratch"
+# How many tasks wait at the workers, beside those that are being done, for each of them.
+_WAITING = 1
+
+
+class Workers(Protocol):
+    """Does tasks, and tells what came of them."""
+
+    def has_room(self) -> bool:
+        """Tell whether another task would be begun soon."""
+
+    def is_too_large(self, task: Task) -> str | None:
+        """Say why no worker can ever do a task; None where one can."""
+
+    def submit(self, task: Task) -> None:
+        """Take a task."""
+
+    def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
+        """Yield what has ended; wait for the first, no longer than `seconds`."""
+
+    def close(self) -> None:
+        """End all that is being done."""
+
+
+class OneProcess:
+    """Does one task after the other."""
+
+    def __init__(self) -> None:
+        self._tasks: list[Task] = []
+
+    def has_room(self) -> bool:
+        """Tell whether there is nothing to do."""
+        return not self._tasks
+
+    def is_too_large(self, task: Task) -> str | None:
+        """Say so where this machine has less memory than the task needs."""
+        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        return _too_much("memory", task.memory, total)
+
+    def submit(self, task: Task) -> None:
+        """Take a task, which `wait` does."""
+        self._tasks.append(task)
+
+    def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
+        """Do the tasks; they do not end before they are done."""
+        while self._tasks:
+            task = self._tasks.pop(0)
+            yield task, Outcome(**run_task(task.as_dict()))
+
+    def close(self) -> None:
+        """Forget what is to be done."""
+        self._tasks.clear()
+
+
+class RayWorkers:
+    """The nodes of a Ray cluster, which ask for the memory and scratch space of each task."""
+
+    def __init__(self, address: str) -> None:
+        """Connect to a cluster, or start one of this machine where the address is 'local'.
+
+        Raises:
+            UsageError: Ray is not installed, or the cluster cannot be reached.
+        """
+        # Nobody is told that this is used.
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        try:
+            import ray
+        except ImportError as error:
+            raise UsageError(
+                "Ray is not installed", "pip install 'ros2-msgflow[fleet]', or leave out --ray"
+            ) from error
+        self._ray: Any = ray
+        self._is_ours = not ray.is_initialized()
+        if self._is_ours:
+            more = (
+                {"include_dashboard": False, "object_store_memory": 100_000_000}
+                if address == LOCAL
+                else {"address": address}
+            )
+            try:
+                ray.init(
+                    logging_level=logging.ERROR,
+                    log_to_driver=False,
+                    configure_logging=False,
+                    **more,
+                )
+            except Exception as error:
+                line = (str(error).strip().splitlines() or [type(error).__name__])[0]
+                raise UsageError(
+                    f"cannot reach the Ray cluster: {line} — {address}",
+                    "ray status --address ADDRESS; --ray local starts one of this machine",
+                ) from error
+        # A worker that was lost is tried again by whoever counts the tries.
+        self._run = ray.remote(max_retries=0)(run_task)
+        self._running: dict[Any, Task] = {}
+
+    def has_room(self) -> bool:
+        """Tell whether fewer tasks wait than there are workers."""
+        workers = int(self._ray.cluster_resources().get("CPU", 1))
+        return len(self._running) < max(1, workers) * (1 + _WAITING)
+
+    def is_too_large(self, task: Task) -> str | None:
+        """Say so where no node has what the task needs."""
+        nodes = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
+        for name, needed in (("memory", task.memory), (_SCRATCH, task.disk)):
+            most = max((node.get(name, 0) for node in nodes), default=0)
+            if most and (words := _too_much(name, needed, int(most))):
+                return words
+        return None
+
+    def submit(self, task: Task) -> None:
+        """Hand a task to the cluster."""
+        resources = self._ray.cluster_resources()
+        # Only clusters that say how much scratch space they have can be asked for some.
+        more = {"resources": {_SCRATCH: task.disk}} if resources.get(_SCRATCH) else {}
+        ask = self._run.options(num_cpus=1, memory=task.memory, **more)
+        self._running[ask.remote(task.as_dict())] = task
+
+    def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
+        """Yield what has ended."""
+        if not self._running:
+            return
+        done, _ = self._ray.wait(list(self._running), num_returns=1, timeout=seconds)
+        for reference in done:
+            task = self._running.pop(reference)
+            try:
+                yield task, Outcome(**self._ray.get(reference))
+            except self._ray.exceptions.RayError as error:
+                line = (str(error).strip().splitlines() or [""])[0]
+                yield (
+                    task,
+                    Outcome(
+                        reason=Reason.WORKER_LOST,
+                        stage="on a worker",
+                        error=f"its worker is gone ({type(error).__name__}): {line}",
+                    ),
+                )
+
+    def close(self) -> None:
+        """End all tasks; leave the cluster."""
+        for reference in self._running:
+            self._ray.cancel(reference, force=True)
+        self._running.clear()
+        if self._is_ours:
+            self._ray.shutdown()
+
+
+def make_workers(ray: str | None) -> Workers:
+    """Return the workers of a Ray cluster, or of this process where none is named.
+
+    Args:
+        ray: address of a cluster, 'auto', 'local', or None.
+
+    Raises:
+        UsageError: Ray is not installed, or the cluster cannot be reached.
+    """
+    return OneProcess() if ray is None else RayWorkers(ray)
+
+
+def _too_much(what: str, needed: int, most: int) -> str | None:
+    if needed <= most:
+        return None
+    return f"it needs some {needed:,} bytes of {what}, the largest worker has {most:,}"
