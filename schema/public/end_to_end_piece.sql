@@ -103,30 +103,29 @@ cached AS (
     LEFT JOIN main.callback_instance AS s ON d.callback_instance_id = s.callback_instance_id
     WHERE c.kind IN ('periodic_async', 'partial_sync')
 ),
--- The moments at which a part begins. Those of a hop are in the order of `section`, then `rank`.
+-- The moments at which a part begins. Those of a hop are in the order of `rank`.
 detour AS (
     SELECT
-        publication_id, entered_id, 2 AS section, -3 * level AS rank, 'request_to_take' AS part,
-        sent_ns AS at_ns, callback_instance_id, NULL::BIGINT AS about_id
+        publication_id, entered_id, -3 * level AS rank, 'request_to_take' AS part, sent_ns AS at_ns,
+        callback_instance_id, NULL::BIGINT AS about_id
     FROM call
     WHERE sent_ns IS NOT NULL
     UNION ALL
     SELECT
-        publication_id, entered_id, 2, 1 - 3 * level, 'take_to_callback', taken_ns,
+        publication_id, entered_id, 1 - 3 * level, 'take_to_callback', taken_ns,
         callback_instance_id, NULL
     FROM call
     WHERE taken_ns IS NOT NULL
     UNION ALL
     SELECT
-        publication_id, entered_id, 2, 2 - 3 * level, 'service', start_ns, callback_instance_id,
-        NULL
+        publication_id, entered_id, 2 - 3 * level, 'service', start_ns, callback_instance_id, NULL
     FROM call
     UNION ALL
     SELECT
-        publication_id, entered_id, 3, 0, 'cache', stored_ns, callback_instance_id, publication_id
+        publication_id, entered_id, 0, 'cache', stored_ns, callback_instance_id, publication_id
     FROM cached
     UNION ALL
-    SELECT publication_id, entered_id, 4, 0, 'callback', start_ns, callback_instance_id, NULL
+    SELECT publication_id, entered_id, 1, 'callback', start_ns, callback_instance_id, NULL
     FROM cached
     WHERE callback_instance_id IS NOT NULL
 ),
@@ -138,7 +137,7 @@ between AS MATERIALIZED (
                 'at_ns': at_ns, 'rank': rank, 'part': part,
                 'callback_instance_id': callback_instance_id, 'publication_id': about_id
             }
-            ORDER BY section, rank
+            ORDER BY rank
         ) AS moments
     FROM detour
     GROUP BY publication_id, entered_id

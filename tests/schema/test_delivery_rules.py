@@ -334,6 +334,18 @@ def test_an_attempt_failed_before_a_later_message_was_taken(
     assert delivery.reason(missing) == reason
 
 
+def test_a_gap_leaves_open_whether_the_attempt_that_failed_was_the_only_one(
+    delivery: Delivery,
+) -> None:
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(310 * MS, 320 * MS)
+    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [305 * MS])
+    delivery.misses(306 * MS, 307 * MS)
+    assert delivery.reason(missing) == "receiver_gap"
+
+
 def test_a_take_without_a_message_leaves_open_what_failed(delivery: Delivery) -> None:
     """Either may have been the attempt that took it."""
     delivery.lives()
