@@ -49,6 +49,8 @@ RULES = (
     ("delivery/orphan_take.sql", ("test_orphan_rules", "test_delivery_rules")),
     ("clock/clock_hull.sql", ("test_clock_hull", "test_clock_pair")),
     ("clock/clock_pair.sql", ("test_clock_pair", "test_clock_hull")),
+    ("clock/clock_line.sql", ("test_clock_pair", "test_clock_hull")),
+    ("clock/clock_line_error.sql", ("test_clock_pair", "test_clock_hull")),
     ("clock/clock_sync.sql", ("test_clock_chain", "test_clock_pair")),
 )
 

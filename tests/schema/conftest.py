@@ -43,7 +43,7 @@ CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHER
 CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
 """
 # Likewise of what messages say of two clocks.
-CLOCKS = ("clock_drift_limit", "clock_hull", "clock_pair")
+CLOCKS = ("clock_drift_limit", "clock_hull", "clock_line", "clock_line_error", "clock_pair")
 CLOCK_STAGE = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;
