@@ -217,7 +217,8 @@ class _Reading:
 
     def _function(self, function: dict[str, Any], scope: _Scope) -> Condition:
         name = ".".join(function["qualified_name"]["path"])
-        given = [_text(argument["expression"], scope) for argument in function["arguments"]]
+        arguments = function["arguments"]
+        given = [_text(argument["expression"], scope) for argument in arguments]
         if name == "query_table" and len(given) == 1 and given[0] is not None:
             return self._named(given[0], scope)
         if name not in self._macros:
@@ -225,8 +226,13 @@ class _Reading:
         if not any(given):
             return name
         called = self._macros[name]
-        texts = {f"${param}": text for param, text in zip(called.params, given, strict=False)}
-        return self.node(called.node, scope | texts)
+        outside = {key: value for key, value in scope.items() if not key.startswith("$")}
+        params = [
+            argument["name"] or param
+            for argument, param in zip(arguments, called.params, strict=False)
+        ]
+        texts = {f"${param}": text for param, text in zip(params, given, strict=False)}
+        return self.node(called.node, outside | texts)
 
     def _may_aggregate(self, tree: Any) -> bool:
         """Tell whether something in an expression makes one row of all."""

@@ -13,6 +13,10 @@ TABLES = ("a", "b", "c")
 MACROS = (
     "CREATE OR REPLACE MACRO pairs_of(name) AS TABLE SELECT x.i FROM query_table(name) AS x "
     "JOIN query_table('a' || '') AS y USING (i)",
+    "CREATE OR REPLACE MACRO of_two(name, other := 'c') AS TABLE SELECT x.i FROM query_table(name) "
+    "AS x JOIN query_table(other) AS y USING (i)",
+    "CREATE OR REPLACE MACRO of_other(other) AS TABLE FROM of_two('a') "
+    "UNION ALL FROM of_two(other)",
     "CREATE OR REPLACE MACRO one() AS 1",
     "CREATE OR REPLACE MACRO total(x) AS sum(x)",
 )
@@ -61,6 +65,9 @@ QUERIES: dict[str, tuple[str, ...]] = {
     "SELECT r.i FROM range(3) AS r (i)": (),
     "FROM (VALUES (1)) AS v (i)": (),
     "FROM pairs_of('b')": ("a", "b"),
+    "FROM of_two('a', other := 'b')": ("a", "b"),
+    # A parameter that is left out is not the one of that name outside.
+    "FROM of_other('b')": ("a+b",),
     "WITH w AS (SELECT i FROM a) SELECT i FROM w JOIN b USING (i)": ("a", "b"),
     "WITH w AS MATERIALIZED (FROM a), v AS (FROM w UNION ALL FROM b) FROM pairs_of('v')": ("a",),
     # In a WITH RECURSIVE every UNION looks like a recursion.
@@ -75,6 +82,8 @@ QUERIES: dict[str, tuple[str, ...]] = {
 @pytest.fixture(scope="module")
 def con() -> Iterator[duckdb.DuckDBPyConnection]:
     with duckdb.connect() as connection:
+        for table in TABLES:
+            connection.execute(f"CREATE TABLE {table} AS SELECT 1 AS i")
         for each in MACROS:
             connection.execute(each)
         yield connection
