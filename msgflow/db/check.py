@@ -112,9 +112,9 @@ def _broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
     would pass it, and fails `identity_is_unique`.
     """
     if block is not None:
-        return f"count_if(child.{column} < {block[0]} OR child.{column} > {block[1]})"
+        return f"count(*) FILTER (child.{column} < {block[0]} OR child.{column} > {block[1]})"
     table, _, key = reference.partition(".")
-    return f"count_if(child.{column} NOT IN (SELECT {key} FROM {SCHEMA}.{table}))"
+    return f"count(*) FILTER (child.{column} NOT IN (SELECT {key} FROM {SCHEMA}.{table}))"
 
 
 def _count(con: duckdb.DuckDBPyConnection, query: str) -> int:
