@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake, visible
 from msgflow.fleet.layout import DATABASE, RUN, VIEWS, metadata, part_path
+from msgflow.fleet.parquet import read_parquet
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -146,14 +147,12 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
 def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | None:
     import pyarrow as pa
     import pyarrow.compute as pc
-    import pyarrow.parquet
 
     content = lake.store.read(part_path(table, part))
     # One that an earlier msgflow wrote may lack it.
     if content is None:
         return None
-    # Not by its path, whose `part=` would become a column.
-    read = pyarrow.parquet.read_table(pa.BufferReader(content)).replace_schema_metadata()
+    read = read_parquet(content)
     return read.filter(pc.is_in(read["run"], value_set=pa.array(runs, pa.string())))
 
 

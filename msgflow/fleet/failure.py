@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import DatabaseError
 from msgflow.fleet.layout import FAILURE, failure_schema
+from msgflow.fleet.parquet import read_parquet
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ def read_failures(lake: Lake) -> pa.Table:
         DatabaseError: the lake cannot be read.
     """
     import pyarrow as pa
-    import pyarrow.parquet
 
     schema = failure_schema()
     tables = [schema.empty_table()]
@@ -33,7 +33,7 @@ def read_failures(lake: Lake) -> pa.Table:
         # One that went in meanwhile is gone.
         if entry.path.endswith(".parquet") and (content := lake.store.read(entry.path)):
             try:
-                tables.append(pyarrow.parquet.read_table(pa.BufferReader(content), schema=schema))
+                tables.append(read_parquet(content, schema))
             except (pa.ArrowInvalid, OSError) as error:
                 raise DatabaseError(
                     f"cannot read a failure of the lake — {lake.store.url_of(entry.path)}",

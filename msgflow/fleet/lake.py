@@ -24,6 +24,7 @@ from msgflow.fleet.layout import (
     run_schema,
     view_path,
 )
+from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.store import Store
 
 if TYPE_CHECKING:
@@ -96,8 +97,6 @@ class Lake:
             files: those to read; all when None.
         """
         import pyarrow as pa
-        import pyarrow.parquet as pq
-        from pyarrow.dataset import dataset
 
         schema = run_schema()
         if files is None:
@@ -105,15 +104,11 @@ class Lake:
         if not files:
             return schema.empty_table()
         try:
-            if self.store.is_local:
-                found = dataset([*map(self.store.full, files)], schema=schema, format="parquet")
-                return found.to_table()
             with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
                 contents = list(pool.map(self.store.read, files))
             if None in contents:
                 raise FileNotFoundError
-            buffers = [pa.BufferReader(content) for content in contents]
-            return pa.concat_tables([pq.read_table(buffer, schema=schema) for buffer in buffers])
+            return pa.concat_tables([read_parquet(content, schema) for content in contents])
         except FileNotFoundError:
             # Compaction has put them into another file since they were listed.
             return self.rows()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.db.runs import require_label
 from msgflow.errors import UsageError
+from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.recording import Recording
 from msgflow.fleet.store import Store, normal_url
 
@@ -130,10 +131,9 @@ def _jsonl(text: str, source: str) -> Iterator[_Row]:
 
 def _parquet(content: bytes, source: str) -> Iterator[_Row]:
     import pyarrow as pa
-    import pyarrow.parquet
 
     try:
-        table = pyarrow.parquet.read_table(pa.BufferReader(content))
+        table = read_parquet(content)
     except (pa.ArrowInvalid, OSError) as error:
         raise UsageError(f"cannot read the manifest — {source}", "is it Parquet?") from error
     _require_columns(table.column_names, source)

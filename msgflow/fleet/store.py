@@ -152,14 +152,12 @@ class Store:
         Raises:
             DatabaseError: the store cannot be reached or read.
         """
-        if self.entry(path) is None:
-            return None
 
         def read() -> bytes | None:
             try:
                 with self._reading(path) as stream:
                     return bytes(stream.read())
-            except FileNotFoundError:  # deleted meanwhile
+            except FileNotFoundError:
                 return None
 
         with _reaching(self.url):

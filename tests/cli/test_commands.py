@@ -31,6 +31,8 @@ COMMANDS = (
     "db upgrade",
     "db check",
     "db schema",
+    "fleet ingest",
+    "fleet compact",
     "simulate",
 )
 

@@ -1,0 +1,41 @@
+"""Small Parquet files of a lake, read as they are: without pandas, and without names of folders."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_LARGE = 1_000_000
+
+
+def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
+    """Return the rows of a file.
+
+    Args:
+        content: its bytes.
+        schema: the columns to return, NULL where the file lacks one; as the file has them when
+            None.
+
+    Raises:
+        pyarrow.ArrowInvalid: it is no such file, or a column is of another type.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    # Not `read_table`: that imports pandas where it is installed.
+    file = pyarrow.parquet.ParquetFile(pa.BufferReader(content))
+    # Most have one row: threads would cost more than they bring.
+    table = file.read(use_threads=len(content) > _LARGE).replace_schema_metadata()
+    if schema is None:
+        return table
+    if table.schema.equals(schema):
+        return table.cast(schema)
+    columns = [
+        table[field.name].cast(field.type)
+        if field.name in table.column_names
+        else pa.nulls(len(table), field.type)
+        for field in schema
+    ]
+    return pa.table(columns, schema=schema)
