@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import posixpath
 import random
 import re
 import shutil
@@ -278,7 +279,11 @@ def normal_url(url: str | Path) -> str:
         )
     if "?" in rest or not rest.partition("/")[0]:
         raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
-    return S3 + re.sub("/+", "/", rest).rstrip("/")
+    # So that `..` in a manifest leads to where it leads in a folder.
+    path = posixpath.normpath(rest)
+    if path.startswith("."):
+        raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
+    return S3 + path
 
 
 def endpoint() -> str | None:

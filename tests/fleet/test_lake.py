@@ -225,6 +225,7 @@ def test_a_damaged_row_of_runs_is_said(lake: Lake) -> None:
         ("s3://key:secret@bucket/lake", "no credentials in an address"),
         ("s3://bucket/lake?secret_key=x", "no address of a bucket"),
         ("s3://", "no address of a bucket"),
+        ("s3://bucket/../../other", "no address of a bucket"),
         ("gs://bucket/lake", "neither a folder nor a bucket"),
     ],
 )

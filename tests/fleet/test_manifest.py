@@ -125,8 +125,11 @@ def test_buckets_have_recordings_too(bucket: ObjectStore, tmp_path: Path) -> Non
         "s3://fleet/night/r1",
         "s3://fleet/night/r2.tar.gz",
     ]
-    (listed, _) = read_manifest("s3://fleet/lists/all.csv")
-    assert (listed.source, listed.labels) == ("s3://fleet/night/r1", {"robot": "r1"})
+    listed = read_manifest("s3://fleet/lists/all.csv")
+    assert [(r.source, r.labels) for r in listed] == [
+        ("s3://fleet/night/r1", {"robot": "r1"}),
+        ("s3://fleet/x", {"robot": "r2"}),
+    ]
     before = look_at("s3://fleet/night/r1")
     assert (before.size, before.is_archive) == (len("night/r1/ust/metadatanight/r1/ust/0"), False)
     copy = fetch("s3://fleet/night/r1", tmp_path)
