@@ -105,8 +105,9 @@ class Lake:
             return schema.empty_table()
         try:
             with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
-                contents = list(pool.map(self.store.read, files))
-            if None in contents:
+                found = list(pool.map(self.store.read, files))
+            contents = [content for content in found if content is not None]
+            if len(contents) < len(files):
                 raise FileNotFoundError
             return pa.concat_tables([read_parquet(content, schema) for content in contents])
         except FileNotFoundError:
