@@ -136,7 +136,8 @@ def test_a_run_without_links(way: str, demo: Path, tmp_path: Path, page: Page) -
     path = tmp_path / "unlinked.duckdb"
     shutil.copyfile(demo, path)
     with duckdb.connect(str(path)) as connection:
-        for table in ("link_transport", "link_causal", "link_request", "link_response"):
+        links = ("link_transport", "link_causal", "link_request", "link_response")
+        for table in (*links, "flow_call", "flow_root", "flow_hop"):
             connection.execute(f"DELETE FROM store.{table}")
         ((number,),) = connection.execute("SELECT min(take_id) FROM store.take").fetchall()
     with shown_as(way, path, page) as address:
