@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 # All options that take a path; others may begin with `~` for their own reasons, as topics do.
 PATH_OPTIONS = {
     "--db", "--output", "-o", "--html", "--file", "-f", "--links", "--keep-staging",
-    "--clock-sync", "--host", "--paths",
+    "--clock-sync", "--host", "--paths", "--lake", "--scratch",
 }  # fmt: skip
 # The name is that of `--host=NAME=~/traces`.
 _JOINED = re.compile(r"(?P<option>--[a-z-]+=|-[a-z])(?P<name>[^=~/]+=)?(?P<path>~.*)", re.DOTALL)

@@ -128,23 +128,24 @@ def read_part(lake: Lake, table: str, part: str, run: str) -> pa.Table | None:
     return read.filter(pa.compute.equal(read["run"], run))
 
 
-def children() -> dict[int, str]:
-    """Return the processes that do recordings, and what each is doing."""
+def children(scratch: Path) -> dict[int, str]:
+    """Return the processes that do recordings in this folder, and what each is doing."""
     found = {}
     for entry in Path("/proc").iterdir():
         with contextlib.suppress(OSError, IndexError):
             words = (entry / "cmdline").read_bytes().split(b"\0")
             if b"msgflow.fleet.child" in words:
                 directory = Path(words[words.index(b"msgflow.fleet.child") + 1].decode())
-                found[int(entry.name)] = (directory / "stage").read_text()
+                if scratch in directory.parents:  # not those of other tests
+                    found[int(entry.name)] = (directory / "stage").read_text()
     return found
 
 
-def wait_for(what: str, seconds: float = 120) -> int:
-    """Return a process that does that just now."""
+def wait_for(what: str, scratch: Path, seconds: float = 120) -> int:
+    """Return a process that does that in this folder just now."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        for process, stage in children().items():
+        for process, stage in children(scratch).items():
             if stage == what:
                 return process
         time.sleep(0.02)
@@ -163,10 +164,10 @@ def test_much_goes_wrong(
     with Watcher() as watcher:
         driver = start(cluster.address, scratch)
         # A worker in the middle of writing, with the process that does it.
-        writing = wait_for("writing")
+        writing = wait_for("writing", scratch)
         os.kill(parent_of(writing), signal.SIGKILL)
         # A node, with all that it was doing.
-        wait_for("ingesting")
+        wait_for("ingesting", scratch)
         cluster.remove_node(sorted(cluster.worker_nodes, key=str)[0], allow_graceful=False)
         # The driver, once something went in.
         end = time.monotonic() + 120
