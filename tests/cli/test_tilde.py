@@ -59,8 +59,8 @@ def test_the_options_that_take_paths_are_known() -> None:
             (found if is_path else others).update(parameter.opts)
     assert found >= PATH_OPTIONS
     assert {option for option in found if option.startswith("-")} == PATH_OPTIONS
-    # That of queries is the name of a host, which never begins with a tilde.
-    assert others & PATH_OPTIONS <= {"--host"}
+    # That of queries is the name of a host, that of a fleet one of two words.
+    assert others & PATH_OPTIONS <= {"--host", "--clock-sync"}
 
 
 def test_a_database_below_the_home_directory(
