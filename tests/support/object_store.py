@@ -82,6 +82,8 @@ def object_store(environment: Any, bucket: str = "fleet") -> Iterator[ObjectStor
     try:
         for name, value in {**KEYS, "AWS_ENDPOINT_URL": store.url}.items():
             environment.setenv(name, value)
+        # What moto keeps belongs to the process, so a server finds what the one before it left.
+        urlopen(Request(f"{store.url}/moto-api/reset", method="POST"), timeout=30).close()
         urlopen(Request(f"{store.url}/{bucket}", method="PUT"), timeout=30).close()
         yield store
     finally:
