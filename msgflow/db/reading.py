@@ -90,12 +90,15 @@ def reading_statements(con: duckdb.DuckDBPyConnection, text: str) -> list[str]:
     return [statement for _, statement in statements]
 
 
-def require_condition(con: duckdb.DuckDBPyConnection, text: str) -> None:
+def require_condition(
+    con: duckdb.DuckDBPyConnection, text: str, hint: str = _CONDITION_HINT
+) -> None:
     """Raise unless `text` is one expression of SQL that only reads.
 
     Args:
-        con: connection to a current msgflow database.
+        con: connection to a current msgflow database, or to one in memory.
         text: what a user gave as a condition.
+        hint: an example of one.
 
     Raises:
         UsageError: it is something else.
@@ -104,15 +107,15 @@ def require_condition(con: duckdb.DuckDBPyConnection, text: str) -> None:
         statements = _split(con, f"SELECT {text}\n")
     except duckdb.Error as error:
         raise UsageError(
-            f"--where is no condition in SQL: {str(error).splitlines()[0]}", _CONDITION_HINT
+            f"--where is no condition in SQL: {str(error).splitlines()[0]}", hint
         ) from error
     except QueryError as error:
-        raise UsageError(f"--where is no condition in SQL — {text}", _CONDITION_HINT) from error
+        raise UsageError(f"--where is no condition in SQL — {text}", hint) from error
     tree = _parse(con, statements[0][1]) if len(statements) == 1 else None
     if tree is None or not _is_expression(tree["node"]):
-        raise UsageError(f"--where is no condition in SQL — {text}", _CONDITION_HINT)
+        raise UsageError(f"--where is no condition in SQL — {text}", hint)
     if any(part.get("class") == "PARAMETER" for part in _parts(tree)):
-        raise UsageError(f"--where takes no parameters — {text}", _CONDITION_HINT)
+        raise UsageError(f"--where takes no parameters — {text}", hint)
     try:
         _require_reading(con, statements[0][1], "SELECT")
     except QueryError as error:

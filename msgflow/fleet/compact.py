@@ -72,6 +72,7 @@ def compact(lake: Lake, *, older_than: float = DAY) -> Compaction:
         _pack(lake, chosen)
         packed += len(chosen)
         packs += 1
+    lake.put_together()
     deleted = _clean_up(lake, older_than)
     return Compaction(packed, packs, len(deleted), sum(entry.size for entry in deleted))
 
@@ -174,7 +175,8 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
     """Delete what no row needs that counts, or has counted within that time."""
     before_ns = time.time_ns() - round(older_than * 1e9)
     # Rows are read first: a part that is written meanwhile is younger.
-    files = {path: lake.rows([path]).to_pylist() for path in lake.run_files()}
+    files = {path: rows.to_pylist() for path, rows in lake.rows_by_file().items()}
+    covered = lake.covered()
     latest: dict[str, dict[str, Any]] = {}
     for row in itertools.chain.from_iterable(files.values()):
         if row["run"] not in latest or _order(row) > _order(latest[row["run"]]):
@@ -202,6 +204,12 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
         if entry.changed_ns < before_ns and _part_of(entry) not in parts
     ]
     entries = {entry.path: entry for entry in lake.store.entries(RUN, recursive=False)}
+    # Who listed them before there was a file that stands for them may still read them.
+    unneeded += [
+        entries[path]
+        for path, by in covered.items()
+        if path in entries and by in entries and entries[by].changed_ns < before_ns
+    ]
     rest = dict(files)
     while True:
         # A removal is said until nothing else says that the run is there.

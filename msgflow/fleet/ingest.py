@@ -221,6 +221,8 @@ class _Ingest:
                 pool.shutdown(wait=False, cancel_futures=True)
                 if workers is not None:
                     workers.close()
+        # Thousands of small files would take seconds to read, every time.
+        self._lake.put_together()
         self._tell()
         return self._progress
 

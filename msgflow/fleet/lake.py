@@ -7,6 +7,7 @@ may hold many rows, which count all at once.
 
 from __future__ import annotations
 
+import json
 import secrets
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -33,6 +34,11 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+COVERED = "msgflow.covered"
+_TOGETHER = "together-"
+# Fewer files are read as fast as one; one of more rows is not written again.
+_WORTH_IT = 8
+_MANY = 10_000
 _READ_AT_ONCE = 16
 _LATEST = (("generation", "descending"), ("committed_ns", "descending"), ("part", "descending"))
 
@@ -90,34 +96,105 @@ class Lake:
             store.delete(probe)
         return cls(store)
 
-    def rows(self, files: Sequence[str] | None = None) -> pa.Table:
+    def rows(self) -> pa.Table:
         """Return all rows of the table `run`, also those that no longer count.
 
-        Args:
-            files: those to read; all when None.
+        Raises:
+            DatabaseError: the lake cannot be read.
         """
         import pyarrow as pa
 
-        schema = run_schema()
-        if files is None:
-            files = self.run_files()
-        if not files:
-            return schema.empty_table()
+        return pa.concat_tables([run_schema().empty_table(), *self.rows_by_file().values()])
+
+    def rows_by_file(self) -> dict[str, pa.Table]:
+        """Return the rows of the table `run` by their files, but of those that another stands for.
+
+        Raises:
+            DatabaseError: the lake cannot be read.
+        """
+        import pyarrow as pa
+
+        files = self.run_files()
         try:
-            with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
-                found = list(pool.map(self.store.read, files))
-            contents = [content for content in found if content is not None]
-            if len(contents) < len(files):
-                raise FileNotFoundError
-            return pa.concat_tables([read_parquet(content, schema) for content in contents])
+            together = [file for file in files if _is_together(file)]
+            found = self._read_runs(together)
+            covered = {path for _, paths in found.values() for path in paths}
+            alone = [file for file in files if not _is_together(file) and file not in covered]
+            found |= self._read_runs(alone)
+            return {path: rows for path, (rows, _) in found.items() if path not in covered}
         except FileNotFoundError:
-            # Compaction has put them into another file since they were listed.
-            return self.rows()
+            # Compaction has deleted them since they were listed: another stands for them.
+            return self.rows_by_file()
         except (pa.ArrowInvalid, OSError) as error:
             raise DatabaseError(
                 f"cannot read the runs of the lake: {_line(error)} — {self.store.url}",
                 "check that nobody else than msgflow has written there",
             ) from error
+
+    def _read_runs(self, files: Sequence[str]) -> dict[str, tuple[pa.Table, list[str]]]:
+        """Return the rows of files of the table `run`, and the files that each stands for."""
+        schema = run_schema()
+        with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
+            contents = list(pool.map(self.store.read, files))
+        found = {}
+        for path, content in zip(files, contents, strict=True):
+            if content is None:
+                raise FileNotFoundError(path)
+            covered = _covered(content) if _is_together(path) else []
+            found[path] = (read_parquet(content, schema), covered)
+        return found
+
+    def put_together(self) -> int:
+        """Write the rows of many small files of the table `run` into one that stands for them.
+
+        It has their very rows, so that nothing changes for anybody, whatever is written at the same
+        time. They stay for those who read them now, until `compact` deletes them.
+
+        Returns:
+            How many files the new one stands for; 0: there are few.
+
+        Raises:
+            DatabaseError: the lake cannot be read or written.
+        """
+        import pyarrow as pa
+
+        rows = {path: table for path, table in self.rows_by_file().items() if len(table) < _MANY}
+        if len(rows) < _WORTH_IT:
+            return 0
+        revisions = {
+            each for table in rows.values() for each in table["schema_revision"].to_pylist()
+        }
+        self.put_table(
+            f"{RUN}/{_TOGETHER}{secrets.token_hex(8)}.parquet",
+            RUN,
+            pa.concat_tables(rows.values()),
+            max((each for each in revisions if each), default=""),
+            {COVERED: json.dumps(sorted(self._covered_by(rows)))},
+        )
+        return len(rows)
+
+    def _covered_by(self, files: Iterable[str]) -> set[str]:
+        """Return files of the table `run`, and those that they stand for as long as these exist."""
+        covered = set(files)
+        there = set(self.run_files())
+        for path in files:
+            content = self.store.read(path) if _is_together(path) else None
+            covered |= there.intersection(_covered(content)) if content else set()
+        return covered
+
+    def covered(self) -> dict[str, str]:
+        """Return the files of the table `run` that another stands for, each with one of these.
+
+        Raises:
+            DatabaseError: the lake cannot be read.
+        """
+        found: dict[str, str] = {}
+        files = self.run_files()
+        for path in files:
+            content = self.store.read(path) if _is_together(path) else None
+            if content is not None:
+                found |= dict.fromkeys(set(files).intersection(_covered(content)), path)
+        return found
 
     def run_files(self) -> list[str]:
         """Return the files of the table `run`."""
@@ -182,8 +259,22 @@ class Lake:
             for key in keys
         )
 
-    def put_table(self, path: str, table_name: str, table: pa.Table, revision: str) -> None:
+    def put_table(
+        self,
+        path: str,
+        table_name: str,
+        table: pa.Table,
+        revision: str,
+        more: Mapping[str, str] | None = None,
+    ) -> None:
         """Write a small table as one file.
+
+        Args:
+            path: from the root of the lake.
+            table_name: name of the table.
+            table: its rows.
+            revision: of the schema that they were made with.
+            more: metadata beside those of every file.
 
         Raises:
             DatabaseError: the lake cannot be written.
@@ -192,7 +283,7 @@ class Lake:
         import pyarrow.parquet
 
         # With the meanings of the columns, which a table that was read may lack.
-        schema = table.schema.with_metadata(metadata(table_name, revision))
+        schema = table.schema.with_metadata(metadata(table_name, revision) | dict(more or {}))
         sink = pa.BufferOutputStream()
         pyarrow.parquet.write_table(table.cast(schema), sink, compression="zstd")
         self.store.put(path, sink.getvalue().to_pybytes())
@@ -227,6 +318,22 @@ def visible(rows: pa.Table) -> pa.Table:
     is_first = pc.not_equal(keys[1:], keys[:-1])
     is_first = pa.concat_arrays([pa.array([True]), is_first])
     return ordered.filter(pc.and_(is_first, pc.invert(ordered["is_removed"])))
+
+
+def _is_together(path: str) -> bool:
+    return path.startswith(f"{RUN}/{_TOGETHER}")
+
+
+def _covered(content: bytes) -> list[str]:
+    """Return the files that a file of the table `run` stands for."""
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    metadata = pyarrow.parquet.read_schema(pa.BufferReader(content)).metadata or {}
+    try:
+        return [str(path) for path in json.loads(metadata.get(COVERED.encode(), b"[]"))]
+    except (ValueError, TypeError) as error:
+        raise pa.ArrowInvalid(f"its metadata {COVERED} are no list") from error
 
 
 def _line(error: Exception) -> str:

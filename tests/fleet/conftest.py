@@ -2,12 +2,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 
+from msgflow import Database
+from msgflow.fleet.answers import answers
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.layout import part_path
+from msgflow.fleet.part import Content, write_part
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
 _LENGTH = 0.05
+COPY = "c" * 20
 
 
 @pytest.fixture(scope="session")
@@ -20,3 +29,58 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         paths.append(directory / f"{name}.duckdb")
         ingest([trace.directory], paths[-1])
     return paths[0], paths[1]
+
+
+@pytest.fixture(scope="session")
+def night(databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Lake:
+    """A lake of three runs, which nobody changes: both databases, and the first once more.
+
+    The copy has a key of its own, and takes twice as long for its flows; it has no views.
+    """
+    folder = tmp_path_factory.mktemp("night")
+    lake = Lake.open_or_create(folder / "lake")
+    rows = []
+    for database, labels in zip(
+        databases,
+        ({"robot": "r1", "software_version": "1.0"}, {"robot": "r2", "soft-ware": "a'b"}),
+        strict=True,
+    ):
+        with Database(database) as opened:
+            part = write_part(
+                opened.connection,
+                database,
+                lake.store,
+                folder,
+                source=f"/recordings/{database.stem}",
+                options={},
+                content=Content(),
+            )
+        rows.append(
+            {
+                **part.values,
+                "generation": 1,
+                "labels": labels,
+                "source": f"/recordings/{database.stem}",
+            }
+        )
+    first = rows[0]
+    copy = {
+        **first,
+        "run": COPY,
+        "part": f"{COPY}-x",
+        "view_part": None,
+        "database_part": None,
+        "name": "copy",
+        "labels": {"robot": "r1", "software_version": "1.1"},
+    }
+    for answer in answers():
+        table = pq.ParquetFile(lake.store.full(part_path(answer.table, first["part"]))).read()
+        table = table.set_column(0, "run", pa.array([COPY] * len(table), pa.string()))
+        if answer.table == "flow":
+            place = table.column_names.index("latency_ns")
+            table = table.set_column(place, "latency_ns", pc.multiply(table["latency_ns"], 2))
+        lake.put_table(
+            part_path(answer.table, copy["part"]), answer.table, table, first["schema_revision"]
+        )
+    lake.commit([*rows, copy])
+    return lake

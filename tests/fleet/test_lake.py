@@ -13,6 +13,7 @@ import pytest
 from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
+from msgflow.fleet.compact import compact
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import run_schema
 from msgflow.fleet.part import Content, Part, part_name, write_part
@@ -249,3 +250,39 @@ def test_a_file_appears_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert [entry.path for entry in store.entries()] == ["a/b"]
     store.delete("a/b")
     assert not (tmp_path / "a").exists()
+
+
+def test_files_of_runs_are_put_together_and_nothing_changes(tmp_path: Path) -> None:
+    lake = Lake.open_or_create(tmp_path / "lake")
+    base = {"generation": 1, "is_removed": False, "schema_revision": "1"}
+    for number in range(9):
+        lake.commit([{**base, "run": f"{number:020}", "part": f"{number}-x"}])
+    lake.remove([f"{3:020}"])
+    before = lake.runs()
+    loose = lake.run_files()
+    assert lake.put_together() == 10
+    assert lake.put_together() == 0
+    # Read by those who know nothing of it, too, and still what counts is read once.
+    assert len(read(lake, "FROM run")) == 8
+    assert lake.runs().equals(before)
+    assert len(lake.rows()) == 10
+    # What the new file stands for is not read any more.
+    lake.store.put(loose[0], b"no parquet")
+    assert lake.runs().equals(before)
+    lake.commit([{**base, "run": f"{0:020}", "part": "again", "generation": 2}])
+    for number in range(20, 28):
+        lake.commit([{**base, "run": f"{number:020}", "part": f"{number}-x"}])
+    assert lake.runs()["part"][0].as_py() == "again"
+    after = lake.runs()
+    lake.put_together()
+    assert lake.runs().equals(after)
+    kept = set(lake.run_files())
+    assert kept > set(loose)
+    compact(lake, older_than=3600)
+    assert kept < set(lake.run_files())
+    compact(lake, older_than=0)
+    assert len(lake.run_files()) < 3
+    assert lake.runs()["run"].equals(after["run"])
+    lake.store.put(lake.run_files()[0].replace("together-", "together-x"), b"no parquet")
+    with pytest.raises(DatabaseError, match="cannot read the runs"):
+        lake.runs()

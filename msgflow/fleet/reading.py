@@ -1,0 +1,285 @@
+"""Opens some runs of a lake for SQL: the runs that a condition chooses, and what is known of them.
+
+One DuckDB connection has a table `run` with the chosen runs, and a view per table of the lake with
+the rows of those runs that count; public views are in the schema `view`. Only files of the chosen
+runs are opened. The connection reaches nothing else: a folder it reads itself, but no other path,
+and a bucket through pyarrow, which alone has the credentials.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import duckdb
+
+from msgflow.db.opening import open_memory, shut_in
+from msgflow.db.reading import require_condition
+from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet.answers import answers
+from msgflow.fleet.compact import PACK
+from msgflow.fleet.layout import RUN, VIEWS, part_path
+from msgflow.nearest import nearest
+from msgflow.query.run import first_line
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import pyarrow as pa
+
+    from msgflow.fleet.lake import Lake
+
+_COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')
+_EXAMPLE = "such as --where \"robot = 'r1' AND software_version >= '2.4'\""
+_NONE_YET = "msgflow fleet ingest SOURCE --lake adds some"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Runs of a lake, some or all.
+
+    Attributes:
+        lake: the lake.
+        runs: the chosen ones: one row each, by key, columns of `run_schema`.
+        labels: keys of labels that any run of the lake has, sorted.
+        total: how many runs the lake has.
+    """
+
+    lake: Lake
+    runs: pa.Table
+    labels: tuple[str, ...]
+    total: int
+
+
+def choose(lake: Lake, where: str | None = None) -> Choice:
+    """Return the runs of a lake that a condition holds for.
+
+    Args:
+        lake: the lake.
+        where: a condition in SQL on columns of the table `run`, and on labels by their keys: each
+            is a text, NULL where a run lacks it. A column has the name before a label does; that
+            one is `labels['KEY']`. All runs when None.
+
+    Raises:
+        UsageError: no condition that only reads, a label that no run has, or no run fits.
+        DatabaseError: the lake cannot be read.
+    """
+    runs = lake.runs()
+    if not len(runs):
+        raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
+    labels = tuple(sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()}))
+    chosen = runs
+    if where is not None:
+        import pyarrow.compute as pc
+
+        with open_memory() as con:
+            shut_in(con)
+            require_condition(con, where, _EXAMPLE)
+            chosen = runs.filter(
+                pc.is_in(runs["run"], value_set=_fitting(con, runs, labels, where))
+            )
+    if not len(chosen):
+        raise UsageError(
+            f"none of the {len(runs):,} runs of the lake fits — --where {where}",
+            f"msgflow fleet runs --lake {lake.store.url}",
+        )
+    return Choice(lake, chosen, labels, len(runs))
+
+
+def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """Return the labels that may stand in SQL by their own names: no column is called so."""
+    taken = {name.lower() for name in columns}
+    lower = [label.lower() for label in labels]
+    return [each for each in labels if each.lower() not in taken and lower.count(each.lower()) == 1]
+
+
+def quoted(name: str) -> str:
+    """Return a name as SQL has it in quotes."""
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _fitting(
+    con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
+) -> pa.Array:
+    """Return the keys of the runs that a condition holds for."""
+    con.register("known_run", runs)
+    named = label_columns(labels, runs.column_names)
+    columns = [f"labels[$label_{n}] AS {quoted(key)}" for n, key in enumerate(named)]
+    # A comment at its end ends with the line.
+    table = f"SELECT {', '.join(['*', *columns])} FROM known_run"
+    text = f"SELECT run FROM ({table}) WHERE (\n{where}\n)"
+    try:
+        found = con.sql(text, params={f"label_{n}": key for n, key in enumerate(named)})
+        return found.to_arrow_table()["run"].combine_chunks()
+    except duckdb.Error as error:
+        match = _COLUMN.search(str(error))
+        if match is None:
+            raise UsageError(
+                f"--where cannot be evaluated: {first_line(error)}", _EXAMPLE
+            ) from error
+        like = [f"labels['{label}']" for label in labels if label.lower() == match[1].lower()]
+        if like:
+            raise UsageError(
+                f"labels of several names are meant — {match[1]}", f"write {' or '.join(like)}"
+            ) from error
+        raise UsageError(
+            f"no run of the lake has such a label — {match[1]}",
+            what_there_is(match[1], labels, runs.column_names),
+        ) from error
+
+
+def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> str:
+    """Return the labels and columns of runs that somebody may have meant."""
+    near = nearest(name, [*labels, *columns])
+    meant = f"did you mean {' or '.join(near)}? " if near else ""
+    have = f"its labels are {', '.join(labels)}" if labels else "its runs have no labels"
+    return f"{meant}{have}; columns of run are {', '.join(columns)}"
+
+
+class Reading:
+    """A connection to chosen runs of a lake. Use it as a context manager, or call `close`.
+
+    Attributes:
+        choice: the runs.
+        connection: with the table `run`, and views of the tables that were asked for, each with the
+            columns of its files but `part`.
+    """
+
+    def __init__(self, choice: Choice, tables: Sequence[str] | None = None) -> None:
+        """Open runs for reading.
+
+        Args:
+            choice: the runs.
+            tables: what is to be read, such as 'flow' or 'view/publication': answers by their name,
+                public views behind 'view/'. All that the lake has of these runs when None.
+
+        Raises:
+            DatabaseError: the lake cannot be read.
+        """
+        self.choice = choice
+        store = choice.lake.store
+        if tables is None:
+            tables = [answer.table for answer in answers()]
+            if any(part is not None for part in choice.runs["view_part"].to_pylist()):
+                tables += [f"{VIEWS}/{name}" for name in store.folders(VIEWS)]
+        self.connection = open_memory()
+        try:
+            with lake_errors(choice.lake):
+                self._fill(tables)
+            shut_in(self.connection, beside=[Path(store.url)] if store.is_local else [])
+            self.connection.execute("SET lock_configuration = true")
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Reading:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.connection.close()
+
+    def _fill(self, tables: Sequence[str]) -> None:
+        con = self.connection
+        # What does not fit into memory fails, instead of growing files where nobody looks for them.
+        con.execute("SET temp_directory = ''")
+        # What a view reads is looked at when it is made, and again when it is asked.
+        con.execute("SET parquet_metadata_cache = true")
+        con.register("chosen_run", self.choice.runs)
+        con.execute(f"CREATE TABLE {RUN} AS SELECT * EXCLUDE (is_removed) FROM chosen_run")
+        con.unregister("chosen_run")
+        con.execute(f"CREATE SCHEMA {quoted(VIEWS)}")
+        for table in tables:
+            is_view = table.startswith(f"{VIEWS}/")
+            key = "view_part" if is_view else "part"
+            found = self._files(table, key)
+            if not found:
+                continue
+            rows = self._scan(table, found)
+            name = ".".join(map(quoted, table.split("/")))
+            con.execute(
+                f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) FROM {rows} AS t "
+                f"SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = r.{key}"
+            )
+
+    def _files(self, table: str, key: str) -> dict[str, list[str]]:
+        """Return the parts with a table, those together whose files have the same columns.
+
+        What an earlier version wrote may lack the table, or columns of it; one part of each tells.
+        """
+        alike: dict[str, list[str]] = {}
+        seen = set()
+        runs = self.choice.runs
+        for part, version in zip(
+            runs[key].to_pylist(), runs["msgflow_version"].to_pylist(), strict=True
+        ):
+            if part is not None and part not in seen:
+                seen.add(part)
+                kind = part if part.startswith(PACK) else f"of {version}"
+                alike.setdefault(kind, []).append(part)
+        store = self.choice.lake.store
+        return {
+            parts[0]: sorted(parts)
+            for parts in alike.values()
+            if store.entry(part_path(table, parts[0])) is not None
+        }
+
+    def _scan(self, table: str, found: dict[str, list[str]]) -> str:
+        """Return what reads the rows of a table in SQL, with a column `part`."""
+        store = self.choice.lake.store
+        name = f"files of {table}"
+        parts = [part for alike in found.values() for part in alike]
+        paths = [store.full(part_path(table, part)) for part in parts]
+        if store.is_local:
+            self.connection.execute(f"SET VARIABLE {quoted(name)} = $paths", {"paths": paths})
+            return (
+                f"read_parquet(getvariable('{name}'), union_by_name = true,"
+                " hive_partitioning = true, hive_types_autocast = false)"
+            )
+        import pyarrow as pa
+        import pyarrow.dataset as ds
+        import pyarrow.parquet as pq
+
+        system = store.filesystem
+        schemas = [
+            pq.read_schema(store.full(part_path(table, part)), filesystem=system) for part in found
+        ]
+        schema = pa.unify_schemas(
+            [each.remove_metadata() for each in schemas], promote_options="permissive"
+        )
+        dataset: Any = ds.FileSystemDataset.from_paths(
+            paths,
+            schema=schema.append(pa.field("part", pa.string())),
+            format=ds.ParquetFileFormat(),
+            filesystem=system,
+            partitions=[ds.field("part") == part for part in parts],
+        )
+        if len(self.choice.runs) < self.choice.total:
+            # Of large files only the groups of rows that have one of the runs.
+            keys = self.choice.runs["run"].combine_chunks()
+            dataset = dataset.filter(ds.field("run").isin(keys))
+        self.connection.register(name, dataset)
+        return quoted(name)
+
+
+@contextmanager
+def lake_errors(lake: Lake) -> Iterator[None]:
+    """Raise what the files of a lake are to blame for as a DatabaseError."""
+    try:
+        yield
+    except (duckdb.IOException, duckdb.InvalidInputException, OSError) as error:
+        raise DatabaseError(
+            f"cannot read the lake: {first_line(error)} — {lake.store.url}",
+            "check that it can be reached, and that nobody else than msgflow has written there",
+        ) from error
+
+
+def open_runs(lake: Lake, where: str | None = None, tables: Sequence[str] | None = None) -> Reading:
+    """Open the runs of a lake that a condition holds for, as `choose` and `Reading` say."""
+    return Reading(choose(lake, where), tables)

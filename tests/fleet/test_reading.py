@@ -1,0 +1,127 @@
+"""Runs are chosen by their labels, and only their files are opened."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import duckdb
+import pytest
+
+from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.reading import choose, open_runs
+
+
+def chosen(lake: Lake, where: str | None) -> list[str]:
+    return sorted(choose(lake, where).runs["name"].to_pylist())
+
+
+@pytest.mark.parametrize(
+    ("where", "names"),
+    [
+        (None, ["copy", "first", "second"]),
+        ("robot = 'r1'", ["copy", "first"]),
+        ("software_version > '1.0' -- new", ["copy"]),
+        ("\"soft-ware\" = 'a''b'", ["second"]),
+        ("labels['soft-ware'] IS NULL AND name LIKE 'f%'", ["first"]),
+        ("ROBOT IN ('r2', 'r3') OR software_version = '1.1'", ["copy", "second"]),
+    ],
+)
+def test_a_condition_chooses_by_labels_and_columns(
+    night: Lake, where: str | None, names: list[str]
+) -> None:
+    assert chosen(night, where) == names
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ("robott = 'r1'", r"such a label — robott.*did you mean robot\?"),
+        ("site = 'x'", "has such a label — site.*labels are robot, soft-ware, software_version"),
+        ("robot = 'r9'", "none of the 3 runs of the lake fits"),
+        ("robot", "cannot be evaluated"),
+        ("true); DROP TABLE run; --", "no condition"),
+        ("robot = 'r1' LIMIT 1", "no condition"),
+        ("exists (FROM read_csv('/etc/passwd'))", "may only read"),
+        ("robot = $x", "takes no parameters"),
+    ],
+)
+def test_a_condition_that_is_none(night: Lake, where: str, words: str) -> None:
+    with pytest.raises(UsageError, match=f"(?s){words}"):
+        choose(night, where)
+
+
+def test_a_label_called_like_a_column_is_not_mistaken(tmp_path: Path) -> None:
+    lake = Lake.open_or_create(tmp_path / "lake")
+    with pytest.raises(UsageError, match="no run yet"):
+        choose(lake)
+    base = {"generation": 1, "is_removed": False, "schema_revision": "1"}
+    hostile = 'a" || (SELECT 1) || "'
+    lake.commit(
+        {**base, "run": str(n), "name": f"n{n}", "labels": labels}
+        for n, labels in enumerate(
+            [{"name": "other", hostile: "x"}, {"Site": "x", "site": "y"}, {}]
+        )
+    )
+    assert chosen(lake, "name = 'n0'") == ["n0"]
+    assert chosen(lake, "labels['name'] = 'other'") == ["n0"]
+    assert chosen(lake, "labels['site'] = 'y'") == ["n1"]
+    assert chosen(lake, '"a"" || (SELECT 1) || """ = \'x\'') == ["n0"]
+    with pytest.raises(UsageError, match="several names"):
+        choose(lake, "site = 'y'")
+
+
+def test_only_files_of_the_chosen_runs_are_opened(
+    night: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with open_runs(night, "robot = 'r2'", ["flow"]) as reading:
+        (files,) = reading.connection.execute("SELECT getvariable('files of flow')").fetchall()
+        assert len(files[0]) == 1
+        found = reading.connection.execute("SELECT DISTINCT run FROM flow").fetchall()
+        assert [key for (key,) in found] == reading.choice.runs["run"].to_pylist()
+        with pytest.raises(duckdb.CatalogException):
+            reading.connection.execute("FROM delivery")
+
+
+def test_the_connection_reaches_nothing_else(night: Lake, tmp_path: Path) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text("a\n1\n")
+    with open_runs(night, tables=["flow"]) as reading:
+        con = reading.connection
+        for sql in (
+            f"FROM read_csv('{other}')",
+            f"COPY run TO '{tmp_path / 'x.csv'}'",
+            f"ATTACH '{tmp_path / 'x.duckdb'}'",
+            "SET enable_external_access = true",
+            "LOAD httpfs",
+        ):
+            with pytest.raises(duckdb.Error):
+                con.execute(sql)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["other.csv"]
+
+
+def test_all_tables_are_there_and_rows_of_runs_that_count(night: Lake) -> None:
+    with open_runs(night) as reading:
+        tables = {
+            (schema, name)
+            for schema, name in reading.connection.execute(
+                "SELECT schema_name, view_name FROM duckdb_views() WHERE NOT internal"
+            ).fetchall()
+        }
+        assert {("main", "flow"), ("main", "distribution"), ("view", "publication")} <= tables
+        counts = reading.connection.execute(
+            "SELECT count(DISTINCT run) FROM flow UNION ALL SELECT count(DISTINCT run) "
+            "FROM view.publication"
+        ).fetchall()
+        assert counts == [(3,), (2,)]
+
+
+def test_a_damaged_file_is_said(tmp_path: Path) -> None:
+    lake = Lake.open_or_create(tmp_path / "lake")
+    lake.commit([{"run": "1", "generation": 1, "is_removed": False, "part": "1-x"}])
+    # A table that nobody wrote is not there.
+    with open_runs(lake, tables=["flow"]) as reading, pytest.raises(duckdb.CatalogException):
+        reading.connection.execute("FROM flow")
+    lake.store.put("flow/part=1-x/data.parquet", b"no parquet")
+    with pytest.raises(DatabaseError, match="cannot read the lake"):
+        open_runs(lake, tables=["flow"])
