@@ -30,6 +30,8 @@ _UNITS = {None: 1, "B": 1, "KB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 _TIME = re.compile(r"(\d+(?:\.\d+)?) ?(s|min|h|d)?")
 _SECONDS = {None: 1.0, "s": 1.0, "min": 60.0, "h": 3_600.0, "d": 86_400.0}
 _MOST_FAILURES = 20
+# On a terminal: paths are long.
+_MOST_PATHS = 10
 
 
 @app.callback()
@@ -255,6 +257,107 @@ def compact(
         f"answers of {count(done.packed, 'run')} put into {count(done.packs, 'part')};"
         f" {count(done.deleted, 'file')} deleted, {done.size / 1e6:,.1f} MB"
     )
+
+
+@app.command("compare")
+def compare(
+    lake: LakeOption,
+    by: Annotated[
+        str, typer.Option("--by", metavar="LABEL", help="Label that tells the two sides apart")
+    ],
+    base: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="BASE",
+            help="Its value on side A, which the other is compared with",
+            show_default="the lesser, where there are two",
+        ),
+    ] = None,
+    other: Annotated[
+        str | None, typer.Argument(metavar="OTHER", help="Its value on side B")
+    ] = None,
+    where: Annotated[
+        str | None,
+        typer.Option(
+            "--where",
+            metavar="SQL",
+            help="Only runs for which this holds: a condition on labels",
+            show_default="all",
+        ),
+    ] = None,
+    unit: Annotated[
+        str | None,
+        typer.Option(
+            "--unit",
+            metavar="LABEL",
+            help="All runs with one value of this label count as one, such as those of a robot",
+            show_default="each run for itself",
+        ),
+    ] = None,
+    case: Annotated[
+        str,
+        typer.Option(
+            "--case",
+            metavar="first|last|newest|every_pair",
+            help="First or last arrival of each root, newest root of each arrival, or all pairs",
+        ),
+    ] = "first",
+    confidence: Annotated[
+        float, typer.Option("--confidence", help="Confidence level of the intervals")
+    ] = 0.95,
+    fail_on: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fail-on",
+            metavar="CONDITION",
+            help="Exit with 1 if side B exceeds side A by more than that: 'p95>5%', 'median>2ms'"
+            " (median, mean, p95, p99 or max), or if less arrives: 'share<-1%'; may be repeated",
+        ),
+    ] = None,
+    only_different: Annotated[
+        bool | None,
+        typer.Option(
+            "--only-different/--all",
+            help="One row for each path: those that differ, or all",
+            show_default="on a terminal those that differ; else every statistic",
+        ),
+    ] = None,
+    form: FormatOption = None,
+    output: OutputOption = None,
+    wide: WideOption = False,
+) -> None:
+    """Compare paths in runs of one version (robot, site) with those of another.
+
+    The run is the unit: how much runs of one side differ from each other tells
+    whether the two sides differ.
+    """
+    from msgflow.cli.output import is_screen, print_error, print_result
+    from msgflow.export.formats import Format
+    from msgflow.fleet.compare import compare as compared
+    from msgflow.fleet.lake import Lake
+    from msgflow.query.compare import parse_conditions
+
+    parse_conditions(fail_on or [])
+    comparison = compared(
+        Lake.open(lake),
+        by,
+        base,
+        other,
+        where=where,
+        unit=unit,
+        case=case,
+        confidence=confidence,
+    )
+    result = comparison.result
+    is_table = form in (None, Format.TABLE) and output is None
+    if only_different is not None or (is_table and not wide and is_screen()):
+        result = comparison.changes(only_different=only_different is not False)
+    print_result(result, form, output, wide=wide, most_rows=_MOST_PATHS)
+    failures = comparison.failures(fail_on or [])
+    for failure in failures:
+        print_error(f"{failure.condition}: {failure.reason} — {failure.subject}")
+    if failures:
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _labels(texts: list[str]) -> dict[str, str]:

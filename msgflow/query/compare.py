@@ -110,29 +110,41 @@ class Comparison:
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
         """Return what exceeds run A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
-        'share<-1%' is for what arrived: its share may be less than in run A by that many points.
-        What has values in run A and none in run B fails, too. The limits are compared with what was
-        measured, whether or not it may be chance.
-
-        Raises:
-            UsageError: a condition that cannot be read, that is in percent of a negative latency,
-                or that cannot be answered for all paths because some were left out.
+        As `failures` of this module says.
         """
-        wanted = parse_conditions(conditions)
-        rows = self.result.to_arrow().to_pylist()
-        if wanted and any(row[CUT_COLUMN] for row in rows):
-            raise UsageError(
-                f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
-                "a higher --max-paths or --max-depth, or --from and --to",
-            )
-        return [
-            Failure(condition.text, row["subject"], reason)
-            for condition in wanted
-            for row in rows
-            if row["statistic"]
-            == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
-            and (reason := _excess(condition, row)) is not None
-        ]
+        return failures(self.result, conditions)
+
+
+def failures(result: QueryResult, conditions: Iterable[str]) -> list[Failure]:
+    """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
+
+    'share<-1%' is for what arrived: its share may be less than in A by that many points. What has
+    values in A and none in B fails, too. The limits are compared with what was measured, whether or
+    not it may be chance.
+
+    Args:
+        result: of a comparison.
+        conditions: several may stand in one text, separated by commas.
+
+    Raises:
+        UsageError: a condition that cannot be read, that is in percent of a negative latency, or
+            that cannot be answered for all paths because some were left out.
+    """
+    wanted = parse_conditions(conditions)
+    rows = result.to_arrow().to_pylist()
+    if wanted and any(row[CUT_COLUMN] for row in rows):
+        raise UsageError(
+            f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
+            "a higher --max-paths or --max-depth, or --from and --to",
+        )
+    return [
+        Failure(condition.text, row["subject"], reason)
+        for condition in wanted
+        for row in rows
+        if row["statistic"]
+        == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
+        and (reason := _excess(condition, row)) is not None
+    ]
 
 
 def parse_conditions(texts: Iterable[str]) -> list[Condition]:
@@ -167,18 +179,17 @@ def _excess(condition: Condition, row: dict[str, Any]) -> str | None:
     if a_ns is None:
         return None
     if b_ns is None:
-        return "has no value in run B"
+        return "has no value in B"
     difference = b_ns - a_ns
     if not condition.is_relative:
         return f"{_ms(difference)} more" if difference > condition.limit else None
     if a_ns < 0:
         raise UsageError(
-            f"no percentage can be told of {_ms(a_ns)} in run A: {condition.text}"
-            f" — {row['subject']}",
+            f"no percentage can be told of {_ms(a_ns)} in A: {condition.text} — {row['subject']}",
             "msgflow clocks apply messages, or a limit in ns, us, ms or s",
         )
     if a_ns == 0:
-        return f"{_ms(b_ns)}, and 0 ms in run A" if difference > 0 else None
+        return f"{_ms(b_ns)}, and 0 ms in A" if difference > 0 else None
     if difference * 100 > condition.limit * a_ns:
         return f"{100 * difference / a_ns:.4g} % more ({_ms(a_ns)} to {_ms(b_ns)})"
     return None
@@ -188,7 +199,7 @@ def _shortfall(condition: Condition, a_share: float | None, b_share: float | Non
     if a_share is None:
         return None
     if b_share is None:
-        return "has nothing in run B that could arrive"
+        return "has nothing in B that could arrive"
     # Shares have four digits.
     points = round(100 * (a_share - b_share), 2)
     if points > condition.limit:

@@ -369,7 +369,7 @@ def test_what_is_gone_fails(fresh_database: Path) -> None:
     with msgflow.open_db(fresh_database) as database:
         comparison = database.compare("before", "after", what="callbacks")
     (failure,) = comparison.failures(["median>1000%"])
-    assert (failure.subject, failure.reason) == ("/n · Timer(1 ms)", "has no value in run B")
+    assert (failure.subject, failure.reason) == ("/n · Timer(1 ms)", "has no value in B")
     assert comparison.result.notes[0] == "1 callback with values only in run A, before (1)"
 
 

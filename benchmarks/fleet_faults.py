@@ -1,0 +1,236 @@
+"""Many recordings go into a lake by a Ray cluster while much goes wrong: is anything lost or twice?
+
+    python benchmarks/fleet_faults.py [--recordings 200] [--factor 0.02] [--keep DIR]
+
+Simulates recordings of 20 robots with three versions of their software, every tenth of them broken,
+in a bucket of an S3-compatible server (moto), which refuses every tenth request. Three nodes of a
+Ray cluster on this machine ingest them. Meanwhile workers are killed while they write, a node is
+taken away, and the driver is killed and started again. A reader polls all the time.
+
+At the end every table of the lake has to have the rows that each recording gives alone, and every
+run has to have been whole at the moment when it was seen first. `--keep` keeps the recordings and a
+copy of the lake.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import duckdb
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
+from fleet_cluster import (
+    NODE,
+    Watcher,
+    parent_of,
+    ray_cluster,
+    row_counts,
+    start_ingest,
+    wait_for,
+)
+from fleet_robots import record, robot_of, write_broken
+from object_store import ObjectStore, object_store
+
+from msgflow import Database
+from msgflow.fleet.answers import answers
+from msgflow.fleet.failure import read_failures
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.part import Content, write_part
+from msgflow.ingest import ingest
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Iterator
+
+VERSIONS = ("1.0", "1.1", "2.0")
+SLOW = {"2.0": 0.05}
+BROKEN = 10
+LAKE = "s3://fleet/lake"
+REFUSED = 10
+
+
+def main() -> None:
+    """Do it, and print what happened."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--recordings", type=int, default=200)
+    parser.add_argument("--factor", type=float, default=0.02)
+    parser.add_argument("--keep", type=Path)
+    given = parser.parse_args()
+    with contextlib.ExitStack() as stack:
+        folder = given.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        for line in measured(folder, given.recordings, given.factor):
+            print(line, flush=True)
+
+
+def measured(folder: Path, count: int, factor: float) -> Iterator[str]:
+    """Yield what happened; raise where the lake is not what it has to be."""
+    good = simulated(folder / "recordings", count, factor)
+    yield f"{count} recordings, {count - len(good)} of them broken"
+    with pytest.MonkeyPatch.context() as patch, object_store(patch) as bucket:
+        upload(bucket, folder, count)
+        bucket.refuse_every = REFUSED
+        begin = time.monotonic()
+        with ray_cluster(3) as cluster, Watcher(LAKE) as watcher:
+            said = go_wrong(cluster, watcher, folder / "scratch", len(good))
+        seconds = time.monotonic() - begin
+        bucket.refuse_every = 0
+        yield said
+        yield (
+            f"{seconds:.0f} s; {bucket.refused:,} requests refused; a reader looked"
+            f" {watcher.polls} times"
+        )
+        assert not watcher.errors, watcher.errors
+        lake = Lake.open(LAKE)
+        runs = lake.runs().to_pylist()
+        assert sorted(run["name"] for run in runs) == sorted(good)
+        failed = read_failures(lake).to_pylist()
+        assert {row["reason"] for row in failed} == {"broken"}, failed
+        assert len(failed) == count - len(good)
+        whole = {
+            (run["run"], run["part"]): row_counts(lake, run["run"], run["part"]) for run in runs
+        }
+        assert watcher.seen == whole, "somebody saw half a run"
+        assert watcher.visible == sorted(watcher.visible), "a run was gone meanwhile"
+        tries = sum(run["tries"] for run in runs)
+        yield f"{len(runs)} runs in {tries} tries by the drivers that committed them; none half"
+        copy(lake, folder / "lake")
+    begin, cpu = time.monotonic(), children_cpu()
+    alone = Lake.open_or_create(folder / "alone")
+    jobs = [(folder / "recordings" / run["name"], run["source"], alone.store.url) for run in runs]
+    with ProcessPoolExecutor(2) as pool:
+        alone.commit(pool.map(ingest_alone, jobs))
+    yield f"each alone: {time.monotonic() - begin:.0f} s, {children_cpu() - cpu:.0f} s of CPU"
+    for table, rows in equal(folder / "lake", folder / "alone").items():
+        yield f"equal: {table}, {rows:,} rows"
+
+
+def simulated(folder: Path, count: int, factor: float) -> list[str]:
+    """Write recordings, and return the names of those that are not broken."""
+    good = []
+    for number in range(count):
+        name = f"n{number:03}"
+        if number % BROKEN == BROKEN - 1:
+            write_broken(folder / name, number)
+        else:
+            slower = SLOW.get(VERSIONS[number % len(VERSIONS)], 0.0)
+            record(folder / name, number, slower=slower, factor=factor)
+            good.append(name)
+    return good
+
+
+def upload(bucket: ObjectStore, folder: Path, count: int) -> None:
+    """Put recordings and their manifest into the bucket."""
+    for file in sorted((folder / "recordings").rglob("*")):
+        if file.is_file():
+            path = file.relative_to(folder / "recordings").as_posix()
+            bucket.put(f"fleet/night/{path}", file.read_bytes())
+    rows = [
+        f"n{number:03},{robot_of(number)},{VERSIONS[number % len(VERSIONS)]}"
+        for number in range(count)
+    ]
+    text = "\n".join(["path,robot,software_version", *rows, ""])
+    bucket.put("fleet/night/night.csv", text.encode())
+
+
+def go_wrong(cluster: Any, watcher: Watcher, scratch: Path, good: int) -> str:
+    """Ingest while workers, a node and the driver are killed; return what the last one said."""
+
+    def start() -> subprocess.Popen[str]:
+        return start_ingest(["s3://fleet/night/night.csv"], LAKE, cluster.address, scratch)
+
+    def kill_writing_worker() -> None:
+        os.kill(parent_of(wait_for("writing", scratch)), signal.SIGKILL)
+
+    driver = start()
+    kill_writing_worker()
+    watcher.wait_until(good // 5, driver, 3_600)
+    cluster.remove_node(sorted(cluster.worker_nodes, key=str)[0], allow_graceful=False)
+    watcher.wait_until(good // 3, driver, 3_600)
+    cluster.add_node(**NODE)
+    # The process that does it, not its worker.
+    os.kill(wait_for("writing", scratch), signal.SIGKILL)
+    watcher.wait_until(good // 2, driver, 3_600)
+    assert driver.poll() is None, "it was done too soon"
+    driver.kill()
+    driver.communicate()
+    again = start()
+    watcher.wait_until(2 * good // 3, again, 3_600)
+    kill_writing_worker()
+    _, said = again.communicate(timeout=7_200)
+    assert again.returncode == 1, said
+    return next(line for line in said.splitlines() if "recordings for" in line)
+
+
+def copy(lake: Lake, folder: Path) -> None:
+    """Copy a lake out of its bucket."""
+    for entry in lake.store.entries():
+        content = lake.store.read(entry.path)
+        assert content is not None
+        path = folder / entry.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+
+
+def ingest_alone(job: tuple[Path, str, str]) -> dict[str, Any]:
+    """Ingest one recording into a database, write its answers, and return its row of `run`."""
+    recording, source, url = job
+    with tempfile.TemporaryDirectory() as name:
+        database = Path(name) / "msgflow.duckdb"
+        ingest([recording], database)
+        with Database(database) as opened:
+            part = write_part(
+                opened.connection,
+                database,
+                Lake.open(url).store,
+                Path(name),
+                source=source,
+                options={"alone": True},
+                content=Content(views=False, database=False),
+            )
+    return {**part.values, "generation": 1}
+
+
+def equal(one: Path, other: Path) -> dict[str, int]:
+    """Return the rows of every answer; raise where two lakes differ in one."""
+    found = {}
+    with duckdb.connect() as con:
+        for side, folder in (("one", one), ("other", other)):
+            con.register(f"run_{side}", Lake.open(folder).runs())
+            for answer in answers():
+                con.execute(
+                    f"CREATE VIEW {answer.table}_{side} AS SELECT a.* EXCLUDE (part) FROM"
+                    f" read_parquet('{folder}/{answer.table}/*/*.parquet',"
+                    " hive_partitioning = true, union_by_name = true) AS a"
+                    f" JOIN run_{side} USING (run, part)"
+                )
+        for answer in answers():
+            name = answer.table
+            ((rows, others, missing),) = con.execute(
+                f"SELECT (SELECT count(*) FROM {name}_one), (SELECT count(*) FROM {name}_other),"
+                f" (SELECT count(*) FROM (FROM {name}_one EXCEPT ALL FROM {name}_other))"
+            ).fetchall()
+            assert (others, missing) == (rows, 0), name
+            found[name] = rows
+    return found
+
+
+def children_cpu() -> float:
+    """Return the processor time of processes that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+"""Compares runs of a lake by a label: do they differ by more than runs of one side do?"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, replace
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any
+
+from msgflow.errors import UsageError
+from msgflow.fleet.reading import Choice, Reading, choose
+from msgflow.nearest import nearest
+from msgflow.query.compare import STATISTICS, Failure, failures
+from msgflow.query.result import QueryResult
+from msgflow.query.selection import CUT_COLUMN
+from msgflow.sql.statement import program
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    import duckdb
+
+    from msgflow.fleet.lake import Lake
+
+CASES = ("first", "last", "newest", "every_pair")
+# With fewer, intervals are too narrow where the other side has many, see docs/fleet.md.
+LEAST_RUNS = 6
+_TABLES = ("flow", "e2e_latency")
+_SHOWN = ("B is longer", "B is shorter")
+_MOST_NAMED = 10
+
+
+@dataclass(frozen=True)
+class FleetComparison:
+    """Runs of one side compared with those of another.
+
+    Attributes:
+        result: one row per path and statistic, see `program.fleet_comparison`.
+    """
+
+    result: QueryResult
+
+    def changes(self, *, only_different: bool = True) -> QueryResult:
+        """Return a row for each path, the greatest change first.
+
+        Args:
+            only_different: leave out those of which no difference is shown.
+        """
+        from msgflow.query.changes import changes
+
+        return changes(self.result, only_different)
+
+    def failures(self, conditions: Iterable[str]) -> list[Failure]:
+        """Return what exceeds side A by more than conditions such as 'p95>5%' allow.
+
+        Raises:
+            UsageError: see `msgflow.query.compare.failures`.
+        """
+        return failures(self.result, conditions)
+
+
+def compare(
+    lake: Lake,
+    by: str,
+    base: str | None = None,
+    other: str | None = None,
+    *,
+    where: str | None = None,
+    unit: str | None = None,
+    case: str = "first",
+    confidence: float = 0.95,
+) -> FleetComparison:
+    """Compare runs whose label has one value with those of another.
+
+    Args:
+        lake: the lake.
+        by: key of the label.
+        base: its value in side A; with `other` None where the runs have two values of it: the
+            lesser is A, numbers in them by their size.
+        other: its value in side B.
+        where: condition on the runs, as `choose` has it; all when None.
+        unit: key of a label of which each value counts as one run, such as the robot: where runs
+            of one are more alike than those of several, as many runs tell less.
+        case: which arrivals of paths: one of CASES.
+        confidence: share of intervals that would contain the true difference.
+
+    Raises:
+        UsageError: no such label or value, no run, or no path in common.
+        DatabaseError: the lake cannot be read.
+    """
+    if not 0 < confidence < 1:
+        raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")
+    if case not in CASES:
+        raise UsageError(f"there is no such case — {case}", f"choose one of {', '.join(CASES)}")
+    choice = choose(lake, where)
+    for key in (by, unit):
+        _require_label(choice, key)
+    labels = [dict(pairs or ()) for pairs in choice.runs["labels"].to_pylist()]
+    known = Counter(each[by] for each in labels if by in each)
+    base, other = _sides(by, known, base, other)
+    sides = {base: "a", other: "b"}
+    keys = choice.runs["run"].to_pylist()
+    sided = [
+        (key, sides[each[by]], each.get(unit, key) if unit else key)
+        for key, each in zip(keys, labels, strict=True)
+        if each.get(by) in sides
+    ]
+    import pyarrow as pa
+
+    columns = ("run", "side", "unit")
+    table = pa.table(
+        {
+            name: pa.array([row[place] for row in sided], pa.string())
+            for place, name in enumerate(columns)
+        }
+    )
+    wanted = pa.array([each.get(by) in sides for each in labels])
+    with Reading(replace(choice, runs=choice.runs.filter(wanted)), _TABLES) as reading:
+        reading.connection.register("sided", table)
+        result = compared(reading.connection, case=case, confidence=confidence)
+    result.notes.extend(_who(by, base, other, sided, unit))
+    result.notes.extend(_left_out(by, known, sides, len(labels)))
+    result.notes.extend(_one_sided(result))
+    result.notes.extend(_doubts(result, confidence))
+    return FleetComparison(result)
+
+
+def compared(
+    connection: duckdb.DuckDBPyConnection, *, case: str = "first", confidence: float = 0.95
+) -> QueryResult:
+    """Return how two sides differ.
+
+    Args:
+        connection: with `flow` and `e2e_latency` of a lake, and `sided` with run, side and unit.
+        case: which arrivals of paths.
+        confidence: share of intervals that would contain the true difference.
+    """
+    measured = program().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
+    connection.register("measured", measured)
+    statement = "fleet_comparison"
+    values = {"z": NormalDist().inv_cdf((1 + confidence) / 2), "least_units": LEAST_RUNS}
+    rows = program().run(connection, statement, values).to_arrow_table()
+    return QueryResult(rows, replace(program().header(statement), name="fleet compare"))
+
+
+def _require_label(choice: Choice, key: str | None) -> None:
+    if key is None or key in choice.labels:
+        return
+    near = nearest(key, choice.labels)
+    meant = f"did you mean {' or '.join(near)}? " if near else ""
+    have = f"the labels are {', '.join(choice.labels)}" if choice.labels else "there are no labels"
+    raise UsageError(f"no run of the lake has such a label — {key}", f"{meant}{have}")
+
+
+def _sides(
+    by: str, known: Mapping[str, int], base: str | None, other: str | None
+) -> tuple[str, str]:
+    """Return the values of the label that are side A and side B."""
+    values = sorted(known, key=_natural)
+    have = ", ".join(f"{value} ({known[value]:,})" for value in values[:_MOST_NAMED])
+    have += ", …" if len(values) > _MOST_NAMED else ""
+    if base is None or other is None:
+        if base is not None or len(values) != 2:
+            raise UsageError(
+                f"two values of {by} are compared, the runs have {len(values)}: {have or 'none'}",
+                f"msgflow fleet compare BASE OTHER --by {by}",
+            )
+        return values[0], values[1]
+    for value in (base, other):
+        if value not in known:
+            raise UsageError(f"no run has {by}={value}", f"the runs have {have or 'none'}")
+    if base == other:
+        raise UsageError(f"both sides are the same — {base}", "give two values")
+    return base, other
+
+
+def _natural(text: str) -> list[tuple[int, int | str]]:
+    """Return by what to order: 2.9 before 2.10."""
+    return [
+        (0, int(part)) if part.isdecimal() and part.isascii() else (1, part)
+        for part in re.split(r"(\d{1,40})", text)
+        if part
+    ]
+
+
+def _who(
+    by: str, base: str, other: str, sided: list[tuple[str, str, str]], unit: str | None
+) -> Iterator[str]:
+    units: dict[str, set[str]] = {}
+    for name, side, value in (("A", "a", base), ("B", "b", other)):
+        runs = [row for row in sided if row[1] == side]
+        units[side] = {row[2] for row in runs}
+        of = f", {len(units[side]):,} by {unit}" if unit is not None else ""
+        yield f"{name} is {by}={value}: {len(runs):,} run{'s' * (len(runs) != 1)}{of}"
+    both = units["a"] & units["b"]
+    if unit is not None and both:
+        yield (
+            f"by {unit}, {len(both):,} on both sides: what tells one from another counts as chance,"
+            " so that intervals are rather too wide"
+        )
+
+
+def _left_out(
+    by: str, known: Mapping[str, int], sides: Mapping[str, str], total: int
+) -> Iterator[str]:
+    others = sum(number for value, number in known.items() if value not in sides)
+    without = total - sum(known.values())
+    if others or without:
+        yield f"left out: {others:,} runs with other values of {by}, {without:,} without it"
+
+
+def _one_sided(result: QueryResult) -> Iterator[str]:
+    """Say what only one side has; nothing in common is an error."""
+    rows = _of_paths(result)
+    if not any(row["a_count"] and row["b_count"] for row in rows):
+        raise UsageError(
+            "the two sides have no path with latencies in common",
+            "msgflow fleet query e2e-latency --group-by tells what each has",
+        )
+    for side in ("A", "B"):
+        number = sum(row["verdict"] == f"only in {side}" for row in rows)
+        if number:
+            yield f"{number} path{'s' * (number != 1)} with values only in {side}"
+
+
+def _doubts(result: QueryResult, confidence: float) -> Iterator[str]:
+    """Say what the numbers do not tell."""
+    rows = result.to_arrow().to_pylist()
+    if any(row[CUT_COLUMN] for row in rows):
+        yield "some runs have more paths than an ingest looks for, and those are left out"
+    for side in ("a", "b"):
+        affected = sum(row[f"{side}_loss_affected"] or 0 for row in _of_paths(result))
+        if affected:
+            yield f"{affected:,} flows of {side.upper()} have a gap of a trace in their time"
+    intervals = [row for row in rows if row["low_ns"] is not None]
+    shown = sum(row["verdict"] in _SHOWN for row in rows)
+    if shown:
+        yield (
+            f"{shown:,} of {len(intervals):,} intervals show a difference; if there were none,"
+            f" some {(1 - confidence) * len(intervals):.2g} would"
+        )
+
+
+def _of_paths(result: QueryResult) -> list[dict[str, Any]]:
+    return [row for row in result.to_arrow().to_pylist() if row["statistic"] == STATISTICS[0]]
