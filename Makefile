@@ -17,11 +17,12 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test bench truth fuzz mutants babeltrace chromium clean
+.PHONY: help demo test test-all bench truth fuzz mutants babeltrace chromium clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
-	@echo 'make test    style, types, import contracts, tests'
+	@echo 'make test    style, types, import contracts, tests: minutes'
+	@echo 'make test-all the same with thorough tests: what others show on one input, on all of them'
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth   precision and recall on systems of which everything is known, minutes'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
@@ -42,12 +43,13 @@ demo: $(VENV)/.installed
 	@echo '  msgflow flow --topic /camera/image               one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
 
-test: $(VENV)/.developed babeltrace chromium
+test: SELECTED := -m 'not thorough'
+test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist worksteal $(SELECTED)
 
 bench: $(VENV)/.installed babeltrace
 	$(BIN)/python benchmarks/run.py

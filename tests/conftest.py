@@ -5,8 +5,9 @@ from __future__ import annotations
 import shutil
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -17,6 +18,7 @@ from msgflow.trace import bt2_library
 pytest_plugins = ["golden"]
 
 ROOT = Path(__file__).resolve().parents[1]
+_LEFT_OUT = pytest.StashKey[int]()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -39,6 +41,29 @@ def pytest_configure(config: pytest.Config) -> None:
         sys.modules["bt2"] = None  # type: ignore[assignment]
         bt2_library.ROOTS = ()
         bt2_library.PREFIXES = ()
+
+
+def pytest_deselected(items: Sequence[pytest.Item]) -> None:
+    """Count the thorough tests that are left out, also for the process that has started this."""
+    left_out = [item for item in items if item.get_closest_marker("thorough")]
+    if left_out:
+        config = left_out[0].config
+        config.stash[_LEFT_OUT] = len(left_out)
+        getattr(config, "workeroutput", {})["left_out"] = len(left_out)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Take what a worker has counted; each counts all."""
+    node.config.stash[_LEFT_OUT] = getattr(node, "workeroutput", {}).get("left_out", 0)
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say how many tests `make test` leaves to `make test-all`."""
+    config = terminalreporter.config
+    count = config.stash.get(_LEFT_OUT, 0)
+    if count and config.option.markexpr == "not thorough":
+        terminalreporter.write_line(f"{count:,} thorough tests not run: make test-all")
 
 
 @pytest.fixture(scope="session")

@@ -45,7 +45,7 @@ def run(*arguments: object, directory: Path) -> str:
 
 
 def test_from_the_trace_to_every_kind_of_file(tmp_path: Path) -> None:
-    run("simulate", "demo", "trace", "--factor", "0.05", directory=tmp_path)
+    run("simulate", "demo", "trace", "--factor", "0.02", directory=tmp_path)
     links = tmp_path / "links.yaml"
     links.write_text(LINKS, "utf-8")
     run("ingest", "trace", "--links", links, directory=tmp_path)

@@ -35,8 +35,19 @@ def ask(database: Path, *calls: Call) -> list[tuple[bool, str]]:
     return asyncio.run(talk())
 
 
+def ask_here(database: Path, *calls: Call) -> list[tuple[bool, str]]:
+    """As `ask` does, of a server in this process."""
+
+    async def talk() -> list[tuple[bool, str]]:
+        async with Client(mcp_server.make_server(database)) as client:
+            answers = [await client.call_tool(name, words) for name, words in calls]
+        return [(bool(answer.is_error), answer.content[0].text) for answer in answers]
+
+    return asyncio.run(talk())
+
+
 def one(database: Path, tool: str, **words: Any) -> Any:
-    ((failed, text),) = ask(database, (tool, words))
+    ((failed, text),) = ask_here(database, (tool, words))
     assert not failed, text
     return json.loads(text)
 
@@ -71,7 +82,7 @@ def test_the_tools_and_what_they_answer(small_database: Path) -> None:
 def test_a_flow_is_a_tree(small_database: Path) -> None:
     with duckdb.connect(str(small_database), read_only=True) as connection:
         number = connection.execute("SELECT min(publication_id) FROM publication").fetchall()[0][0]
-    ((failed, text),) = ask(small_database, ("flow", {"publication_id": number}))
+    ((failed, text),) = ask_here(small_database, ("flow", {"publication_id": number}))
     assert not failed
     assert text.startswith(f"publication {number}, /chatter")
 
@@ -110,7 +121,7 @@ def test_answers_are_capped_and_say_so(small_database: Path) -> None:
     ],
 )
 def test_errors_have_hints(small_database: Path, call: Call, words: list[str]) -> None:
-    ((failed, text),) = ask(small_database, call)
+    ((failed, text),) = ask_here(small_database, call)
     assert failed
     for word in words:
         assert word in text
@@ -141,7 +152,7 @@ def test_errors_have_hints(small_database: Path, call: Call, words: list[str]) -
 def test_arguments_that_a_tool_does_not_have_are_refused(
     small_database: Path, tool: str, given: dict[str, Any], hint: str
 ) -> None:
-    ((failed, text),) = ask(small_database, (tool, given))
+    ((failed, text),) = ask_here(small_database, (tool, given))
     assert failed
     assert f"{tool} has no such argument — " in text
     assert f"hint: {hint}" in text or f"; {hint}" in text

@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import pty
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -19,18 +20,26 @@ from typer.testing import Result
 
 from msgflow.database import Database
 from msgflow.db.check import run_checks
+from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
 Msgflow = Callable[..., Result]
 
 
-@pytest.fixture
-def database(msgflow: Msgflow, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def ingested(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database of two runs, beside their traces: read it only."""
+    directory = tmp_path_factory.mktemp("runs")
     for seed, name in ((1, "before"), (2, "after")):
-        simulate("demo", tmp_path / name, factor=0.05, seed=seed)
-        result = msgflow("ingest", tmp_path / name, "--db", tmp_path / "two.duckdb")
-        assert result.exit_code == 0
-    return tmp_path / "two.duckdb"
+        simulate("demo", directory / name, factor=0.02, seed=seed)
+        ingest([directory / name], directory / "two.duckdb")
+    return directory / "two.duckdb"
+
+
+@pytest.fixture
+def database(ingested: Path, tmp_path: Path) -> Path:
+    """A copy, to change it."""
+    return Path(shutil.copy(ingested, tmp_path / "two.duckdb"))
 
 
 def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
@@ -56,7 +65,7 @@ def names(msgflow: Msgflow, database: Path) -> list[str]:
 
 
 def test_remove_leaves_the_others_as_they_were(
-    msgflow: Msgflow, database: Path, tmp_path: Path
+    msgflow: Msgflow, database: Path, ingested: Path
 ) -> None:
     kept = of_run(database, 2)
     result = msgflow("runs", "remove", "before", "--db", database)
@@ -71,7 +80,7 @@ def test_remove_leaves_the_others_as_they_were(
             {"run_id": 2}
         ]
         assert not any(check.row_count for check in run_checks(opened.connection, 2))
-    assert msgflow("ingest", tmp_path / "before", "--db", database).exit_code == 0
+    assert msgflow("ingest", ingested.parent / "before", "--db", database).exit_code == 0
     assert names(msgflow, database) == ["after", "before"]
 
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 # In a process of its own, as some commands are forked from it.
 SLICE = """
@@ -18,6 +20,7 @@ print(json.dumps([signals.NAMES, list(ends)]))
 """
 
 
+@pytest.mark.thorough
 def test_a_slice_of_the_campaign() -> None:
     done = subprocess.run(
         [sys.executable, "-c", SLICE], cwd=BENCHMARKS, capture_output=True, text=True, check=False

@@ -29,6 +29,7 @@ def produced() -> dict[str, str]:
     return script().pages()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("page", script().PAGES)
 def test_it_shows_what_its_commands_print(page: str) -> None:
     assert produced()[page] == (DOCS / page).read_text("utf-8")

@@ -39,6 +39,7 @@ def test_documents_show_all_pictures_and_none_is_blank() -> None:
         assert colors(IMAGES / f"{name}.png") > 100
 
 
+@pytest.mark.thorough
 def test_they_can_be_taken_anew(tmp_path: Path) -> None:
     pytest.importorskip("playwright")
     if shutil.which("chromium") is None and shutil.which("chromium-browser") is None:

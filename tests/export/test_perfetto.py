@@ -11,6 +11,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from thorough import few
 
 from msgflow import Database, UsageError
 from msgflow.clocks import apply_clocks, read_clock_sync
@@ -111,7 +112,9 @@ def decode(path: Path) -> Decoded:
     return decoded
 
 
-@pytest.fixture(scope="module", params=["demo", "services", "nested", "partial_sync"])
+@pytest.fixture(
+    scope="module", params=few(["demo", "services", "nested", "partial_sync"], "demo", "services")
+)
 def exported(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[duckdb.DuckDBPyConnection, Decoded]:

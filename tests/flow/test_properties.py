@@ -40,6 +40,8 @@ HANDLES = {
 def outputs(analysis: Analysis, hidden: frozenset[str] = frozenset()) -> dict[str, Any]:
     """All rows of the model and its flows, without the columns named."""
     result = {}
+    # All of it at once, not what one table needs after the other.
+    assert analysis.connection
     for table in metadata.tables.values():
         if "run_id" not in table.columns or table.name == "run":
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from analysis import Analysis
 from random_system import random_system
+from thorough import thorough
 
 MACROS = {"forward": "flow_forward", "backward": "flow_backward", "both": "flow_both"}
 STARTS = """
@@ -16,13 +17,13 @@ ORDER BY ALL
 COLUMNS = "from_kind, from_id, link_kind, kind, id"
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_picture_is_that_of_the_walkers(analysis: Analysis, seed: int) -> None:
+@pytest.mark.parametrize(("seed", "every"), [(1, 31), thorough(1, 7), thorough(2, 7)])
+def test_the_picture_is_that_of_the_walkers(analysis: Analysis, seed: int, every: int) -> None:
     analysis.build(random_system(seed, actions=60))
     con = analysis.connection
     starts = analysis.rows(STARTS)
     assert len(starts) > 50
-    for kind, number in starts[::7]:
+    for kind, number in starts[::every]:
         for direction, macro in MACROS.items():
             rows = con.execute(
                 f"SELECT {COLUMNS} FROM flow_step(?, ?, direction := ?, internal := true) "
@@ -44,10 +45,12 @@ def test_the_picture_is_that_of_the_walkers(analysis: Analysis, seed: int) -> No
             assert {row for row in rows if row[0] is not None} == links
 
 
-def test_what_was_not_taken_is_what_no_link_shows(analysis: Analysis) -> None:
+@pytest.mark.parametrize("every", [7, thorough(1)])
+def test_what_was_not_taken_is_what_no_link_shows(analysis: Analysis, every: int) -> None:
     analysis.build(random_system(1, actions=60))
     shown = 0
-    for (number,) in analysis.rows("SELECT publication_id FROM publication ORDER BY ALL"):
+    numbers = analysis.rows("SELECT publication_id FROM publication ORDER BY ALL")
+    for (number,) in numbers[::every]:
         subscriptions = set(
             analysis.rows(
                 f"SELECT s.subscription_id FROM publication AS b JOIN publisher AS p "

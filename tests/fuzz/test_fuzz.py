@@ -8,9 +8,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+from thorough import thorough
+
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 SEED = 1
-COUNT = 26
 CAMPAIGN = """
 import json, sys
 import fuzz
@@ -91,14 +93,16 @@ def run(program: str, *arguments: object) -> Any:
     return json.loads(ran.stdout.splitlines()[-1])
 
 
+@pytest.mark.thorough
 def test_the_campaign_finds_what_is_planted() -> None:
     found = run(PLANTED)
     assert found == {name: [] if name == "nothing" else [name] for name in found}
     assert len(found) == 7
 
 
-def test_a_slice_of_the_campaign() -> None:
-    found = run(CAMPAIGN, COUNT, SEED)
-    assert sorted(number for number, *_ in found) == list(range(COUNT))
+@pytest.mark.parametrize("count", [5, thorough(26)])
+def test_a_slice_of_the_campaign(count: int) -> None:
+    found = run(CAMPAIGN, count, SEED)
+    assert sorted(number for number, *_ in found) == list(range(count))
     assert {ending for _, ending, *_ in found} >= {"ended", "refused"}
     assert [outcome for outcome in found if outcome[2]] == []

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from ingested import contents
+from thorough import few
 
 from msgflow.errors import ExitCode
 from msgflow.ingest import ingest
@@ -79,7 +80,7 @@ def test_an_interrupt_leaves_nothing(trace: Path, new_database: Path, stage: str
     assert os.listdir(new_database.parent) == []
 
 
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("stage", few(STAGES, "reading the traces", "storing the run"))
 @pytest.mark.parametrize("ignored", [False, True])
 def test_a_termination_leaves_nothing(
     trace: Path, new_database: Path, stage: str, ignored: bool
@@ -114,7 +115,7 @@ def test_an_impatient_interrupt_leaves_the_database_as_it_was(
     assert os.listdir(database.parent) == [database.name]
 
 
-@pytest.mark.parametrize("signals", [1, 3])
+@pytest.mark.parametrize("signals", few([1, 3], 3))
 def test_an_interrupt_that_comes_too_late_is_none(
     database: Path, other_trace: Path, signals: int
 ) -> None:

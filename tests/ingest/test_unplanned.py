@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from ingested import contents
+from thorough import thorough
 
 from msgflow.db import conditions, objects
 from msgflow.ingest import ingest, model
@@ -27,7 +28,7 @@ def of_ingest(trace: Path, database: Path) -> dict[str, object]:
     return dict(found)
 
 
-@pytest.fixture(params=SYSTEMS, ids=lambda system: system[0])
+@pytest.fixture(params=[SYSTEMS[0], *map(thorough, SYSTEMS[1:])], ids=lambda system: system[0])
 def trace(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     system, layout, recording = request.param
     simulate(system, tmp_path / "trace", factor=0.02, layout=layout, recording=recording)

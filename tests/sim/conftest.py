@@ -11,6 +11,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from thorough import SHOWN, few
 
 from msgflow.errors import TraceError
 from msgflow.sim import (
@@ -120,17 +121,20 @@ def _plain(value: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def recordings(bt2: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Recording]:
-    """Every built-in scenario, simulated and read once."""
-    found = {}
-    for name in scenarios():
-        simulation = simulate(
-            name, tmp_path_factory.mktemp("sim") / name, factor=_LENGTHS.get(name, _LENGTH)
-        )
-        found[name] = Recording(simulation, read_events(bt2, simulation.directory))
-    return found
+    """Every built-in scenario, simulated and read once it is asked for."""
+    directory = tmp_path_factory.mktemp("sim")
+
+    class Recordings(dict[str, Recording]):
+        def __missing__(self, name: str) -> Recording:
+            factor = _LENGTHS.get(name, _LENGTH)
+            simulation = simulate(name, directory / name, factor=factor)
+            self[name] = Recording(simulation, read_events(bt2, simulation.directory))
+            return self[name]
+
+    return Recordings()
 
 
-@pytest.fixture(params=list(scenarios()))
+@pytest.fixture(params=few(scenarios(), *SHOWN))
 def recording(request: pytest.FixtureRequest, recordings: dict[str, Recording]) -> Recording:
     """Each built-in scenario in turn."""
     return recordings[request.param]

@@ -90,11 +90,16 @@ def _events(bt2, simulation):
     return events, discarded, packets
 
 
+@pytest.fixture(scope="module")
+def perfect(bt2, made):
+    return _events(bt2, made("perfect"))
+
+
 @pytest.mark.parametrize("name", list(FAULTS))
-def test_the_truth_names_exactly_what_is_missing(bt2, made, name):
+def test_the_truth_names_exactly_what_is_missing(bt2, made, perfect, name):
     simulation = made(name)
     events, discarded, packets = _events(bt2, simulation)
-    everything, none, _ = _events(bt2, made("perfect"))
+    everything, none, _ = perfect
     missing = duckdb.sql(f"FROM '{simulation.truth['unrecorded']}'").project(
         "pid, tid, event, ts_ns, cause"
     )

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pyarrow.parquet as pq
 import pytest
+from thorough import SHOWN, few
 
 from msgflow.errors import UsageError
 from msgflow.sim import Host, Node, Process, Scenario, Subscription, Timer, scenarios, simulate
@@ -21,7 +22,7 @@ def _digest(directory):
     }
 
 
-@pytest.mark.parametrize("name", list(scenarios()))
+@pytest.mark.parametrize("name", few(scenarios(), *SHOWN))
 def test_same_seed_gives_the_same_bytes(tmp_path, name):
     for folder, seed in (("one", 7), ("two", 7), ("three", 8)):
         simulate(name, tmp_path / folder, factor=0.05, seed=seed)

@@ -14,7 +14,7 @@ from staged_events import StagedEvents
 
 from msgflow.db import objects
 from msgflow.db.connection import attach
-from msgflow.db.derive import derive, derived_tables
+from msgflow.db.derive import derive, derive_table, derived_tables
 from msgflow.db.opening import open_memory
 from msgflow.db.store import delete, store
 from msgflow.ingest import model, staging
@@ -22,7 +22,7 @@ from msgflow.ingest.reported import restore
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 # What is stored of links and of what is missing comes of whole derivations.
-_DERIVED = {f"store.{name}" for name in derived_tables()}
+_DERIVED = frozenset(f"store.{name}" for name in derived_tables())
 
 
 class Analysis:
@@ -45,7 +45,7 @@ class Analysis:
         self._views = self._views_of_staging()
         self._built: set[str] | None = None
         self._growing: model.Growing | None = None
-        self._is_derived = False
+        self._derived: frozenset[str] = frozenset()
 
     @property
     def connection(self) -> duckdb.DuckDBPyConnection:
@@ -59,7 +59,7 @@ class Analysis:
         events.write(self._connection)
         restore(self._connection)
         self._built, self._growing = set(), None
-        self._is_derived = False
+        self._derived = frozenset()
         return self
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
@@ -85,14 +85,22 @@ class Analysis:
         if self._built is None:
             return
         self._model(needed)
-        if not self._is_derived and (
-            not needed.isdisjoint(_DERIVED) or self._has_topics_to_learn()
-        ):
-            self._model(_needed_by_links())
-            self._connection.begin()
+        tables = needed & _DERIVED
+        # A link may tell topics, of which others follow, and some diagnostics are noted of links.
+        if self._has_topics_to_learn() or (tables and "store.diagnostic" in needed):
+            tables = _DERIVED
+        if tables <= self._derived:
+            return
+        self._model(_closure(tables))
+        self._connection.begin()
+        if tables == _DERIVED:
             derive(self._connection, 1)
-            self._connection.commit()
-            self._is_derived = True
+        else:
+            for name in derived_tables():
+                if f"store.{name}" in tables:
+                    derive_table(self._connection, name, 1)
+        self._connection.commit()
+        self._derived |= tables
 
     def _model(self, needed: frozenset[str]) -> None:
         """Build the objects of the model among these, and store all that there are."""
@@ -118,7 +126,7 @@ class Analysis:
             "VALUES (1, 'case', TIMESTAMP '1970-01-01', '', '')"
         )
         self._connection.commit()
-        self._is_derived = False
+        self._derived = frozenset()
 
     def _has_topics_to_learn(self) -> bool:
         (row,) = self._read(
@@ -173,6 +181,7 @@ def _needs() -> dict[str, frozenset[str]]:
     """Return what every object of the model and of the database needs, tables of it included."""
     needs = {header.name: frozenset(header.needs) for header in objects.load("model")}
     needs |= {name.replace("staging.", "store."): frozenset({name}) for name in needs}
+    needs |= {name: frozenset({name.replace("store.", "derive.")}) for name in _DERIVED}
     return needs | {header.name: frozenset(header.needs) for header in objects.views()}
 
 
@@ -184,14 +193,7 @@ def _needed(sql: str) -> frozenset[str]:
 
 @cache
 def _everything() -> frozenset[str]:
-    return _closure(header.name for header in objects.load("model")) | _DERIVED
-
-
-@cache
-def _needed_by_links() -> frozenset[str]:
-    """Return what derivations read, whatever the events."""
-    derived = (name.replace("store.", "derive.") for name in _DERIVED)
-    return _closure([*derived, "derive.topic_learned"])
+    return _closure([*(header.name for header in objects.load("model")), *_DERIVED])
 
 
 def _closure(names: Iterable[str]) -> frozenset[str]:

@@ -16,6 +16,7 @@ class Ingested:
     """A database with one run, open for reading."""
 
     connection: duckdb.DuckDBPyConnection
+    path: Path
 
     def rows(self, sql: str) -> list[tuple[Any, ...]]:
         return self.connection.execute(sql).fetchall()
@@ -33,7 +34,7 @@ def ingest_one(traces: Path, path: Path) -> Ingested:
     """Ingest the traces below a path into a new database."""
     ingest([traces], path)
     # One that may read files: what is true lies in some.
-    return Ingested(duckdb.connect(str(path), read_only=True))
+    return Ingested(duckdb.connect(str(path), read_only=True), path)
 
 
 def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:

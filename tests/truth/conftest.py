@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from ingested import Ingested, ingest_one
+from thorough import SHOWN, few
 
 from msgflow.sim import scenarios, simulate
 from msgflow.sim.entity import SECOND
@@ -62,13 +63,16 @@ def simulations(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[
         yield get
 
 
-@pytest.fixture(params=list(scenarios()))
+@pytest.fixture(params=few(scenarios(), *SHOWN))
 def simulated(request: pytest.FixtureRequest, simulations: Callable[[str], Ingested]) -> Ingested:
     """Each built-in scenario in turn."""
     return simulations(request.param)
 
 
-@pytest.fixture(params=[name for name in scenarios() if name not in (*_WITH_GAPS, *_DOUBTFUL)])
+_COMPLETE = [name for name in scenarios() if name not in (*_WITH_GAPS, *_DOUBTFUL)]
+
+
+@pytest.fixture(params=few(_COMPLETE, *(name for name in SHOWN if name in _COMPLETE)))
 def complete(request: pytest.FixtureRequest, simulations: Callable[[str], Ingested]) -> Ingested:
     """Each built-in scenario whose messages all go from rmw_publish to rmw_take to a callback."""
     return simulations(request.param)

@@ -12,6 +12,7 @@ import msgflow
 from msgflow.sim import Simulation, simulate
 from msgflow.sim.entity import SECOND
 
+pytestmark = pytest.mark.thorough
 _MARGIN_NS = SECOND
 
 

@@ -9,9 +9,11 @@ from typing import Any
 import duckdb
 import pytest
 from ingested import Ingested
+from thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
+from msgflow.sim import scenarios
 
 WINDOW = "-9223372036854775807, 9223372036854775807"
 RECORDINGS = [
@@ -74,16 +76,17 @@ def check_flows(ingested: Ingested) -> int:
     return count
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("name", few(RECORDINGS, "services"))
 def test_parts_of_recorded_flows_add_up(recordings: Callable[[str], Ingested], name: str) -> None:
     assert check_flows(recordings(name)) > 0
 
 
-def test_parts_of_simulated_flows_add_up(simulated: Ingested) -> None:
-    check_flows(simulated)
+@pytest.mark.parametrize("name", few(scenarios(), "services", "demo"))
+def test_parts_of_simulated_flows_add_up(simulations: Callable[[str], Ingested], name: str) -> None:
+    check_flows(simulations(name))
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("name", few(RECORDINGS, "sync_1_1", "services"))
 def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], name: str) -> None:
     """Sums of the query over the parts of a path are those of the query e2e-latency."""
     con = recordings(name).connection
@@ -99,7 +102,7 @@ def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], na
     assert totals == dict(expected)
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("name", few(RECORDINGS, "periodic_async_jazzy24"))
 def test_pieces_of_the_critical_path_add_up(
     recordings: Callable[[str], Ingested], name: str
 ) -> None:
@@ -126,7 +129,9 @@ def test_pieces_of_the_critical_path_add_up(
             assert pieces[0][1] == longest
 
 
-@pytest.mark.parametrize("name", ["tracecompass-ros2", "services", "periodic_async_jazzy24"])
+@pytest.mark.parametrize(
+    "name", few(["tracecompass-ros2", "services", "periodic_async_jazzy24"], "services")
+)
 def test_the_critical_path_and_the_breakdown_agree(
     recordings: Callable[[str], Ingested], name: str
 ) -> None:
@@ -166,7 +171,9 @@ def test_the_wait_for_a_timer_is_shown_as_such(recordings: Callable[[str], Inges
     assert row[0] > 0.5
 
 
-@pytest.mark.parametrize("name", ["sync_1_1", "periodic_async_jazzy24", "partial_sync"])
+@pytest.mark.parametrize(
+    "name", few(["sync_1_1", "periodic_async_jazzy24", "partial_sync"], "periodic_async_jazzy24")
+)
 def test_maximum_reaction_time_is_maximum_data_age(
     recordings: Callable[[str], Ingested], name: str
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from ingested import ingest_one
 from scoring import compare_simulated
+from thorough import few, thorough
 
 from msgflow.sim import Recording, simulate
 
@@ -17,8 +18,8 @@ RECORDINGS = {
 }
 
 
-@pytest.mark.parametrize("recording", RECORDINGS)
-@pytest.mark.parametrize("system", ["bursts", "bursts_two_hosts"])
+@pytest.mark.parametrize("recording", few(RECORDINGS, "drift"))
+@pytest.mark.parametrize("system", few(["bursts", "bursts_two_hosts"], "bursts_two_hosts"))
 def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording: str) -> None:
     """Publications of one publisher follow each other within 2 to 4 µs, and all are found."""
     simulation = simulate(
@@ -36,7 +37,11 @@ def test_no_message_is_taken_for_the_next(tmp_path: Path, system: str, recording
 
 @pytest.mark.parametrize(
     ("offset_ns", "slew_ppm", "factor", "least"),
-    [(7_000_000, 150, 0.3, 4_100), (300_000, -150, 0.1, 1_200), (5_509_365, -170, 0.2, 700)],
+    [
+        thorough(7_000_000, 150, 0.3, 4_100),
+        (300_000, -150, 0.1, 1_200),
+        thorough(5_509_365, -170, 0.2, 700),
+    ],
 )
 def test_a_fast_clock_makes_none_wrong(
     tmp_path: Path, offset_ns: int, slew_ppm: int, factor: float, least: int

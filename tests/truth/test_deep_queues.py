@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from ingested import ingest_one
 from scoring import compare_simulated
+from thorough import thorough
 
 from msgflow.sim import Host, Node, Process, Publisher, Scenario, Subscription, Timer, simulate
 from msgflow.sim.entity import MILLISECOND, SECOND, Work
@@ -15,7 +16,7 @@ from msgflow.sim.entity import MILLISECOND, SECOND, Work
 @pytest.mark.parametrize(
     ("depth", "period", "work", "duration"),
     [
-        (100, 5 * MILLISECOND, Work(7 * MILLISECOND), 4 * SECOND),
+        thorough(100, 5 * MILLISECOND, Work(7 * MILLISECOND), 4 * SECOND),
         (50, MILLISECOND, Work(3 * MILLISECOND // 2, MILLISECOND // 4), 2 * SECOND),
     ],
 )

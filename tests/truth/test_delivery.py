@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 from ingested import Ingested, ingest_one
 from scoring import compare_simulated
+from thorough import few
 
 from msgflow.db.check import run_checks
 from msgflow.sim import Recording, simulate
 
-RECORDED = (
+TRACES = (
     "partial_sync",
     "periodic_async_jazzy24",
     "pingpong",
@@ -87,7 +88,7 @@ def test_no_take_is_an_orphan(decided: Ingested) -> None:
     assert decided.rows("SELECT reason FROM stat_orphan") == []
 
 
-@pytest.mark.parametrize("name", RECORDED)
+@pytest.mark.parametrize("name", few(TRACES, "services", "tracecompass-ros2"))
 def test_reasons_add_up(recordings: Callable[[str], Ingested], name: str) -> None:
     results = {result.name: result for result in run_checks(recordings(name).connection)}
     assert results["check.delivery_is_complete"].row_count == 0
@@ -126,7 +127,7 @@ FAULTY = {
 }
 
 
-@pytest.mark.parametrize("name", FAULTY)
+@pytest.mark.parametrize("name", few(FAULTY, "starved", "mixed_intra_process"))
 def test_no_reason_is_false(tmp_path: Path, name: str) -> None:
     """Also where readers get no CPU, processes leave one by one, and events are lost."""
     simulation = simulate(name, tmp_path / "trace", factor=0.1, recording=FAULTY[name])

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from ingested import ingest_one
+from thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
@@ -116,7 +117,7 @@ class Witness:
         monkeypatch.setattr(executor_thread, "_RUN", handlers)
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", few(SCENARIOS, "executors", "nested"))
 def test_inputs_arrive_within_their_bounds(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,7 +147,7 @@ def test_inputs_arrive_within_their_bounds(
     assert sum(origin is None for _, origin, _, _ in due) <= 10
 
 
-@pytest.mark.parametrize("name", ["demo", "executors", "overload"])
+@pytest.mark.parametrize("name", few(["demo", "executors", "overload"], "executors"))
 def test_the_breakdown_bounds_how_long_executors_were_busy(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

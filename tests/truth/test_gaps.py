@@ -8,6 +8,7 @@ import duckdb
 import pytest
 from ingested import ingest_one
 from scoring import compare_simulated
+from thorough import few
 
 from msgflow.sim import Recording, simulate
 
@@ -36,7 +37,7 @@ RECORDINGS: dict[str, tuple[Recording, set[str], bool]] = {
 }
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
+@pytest.mark.parametrize("name", few(RECORDINGS, "brim", "stopped"))
 def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
     recording, gaps, is_complete = RECORDINGS[name]
     simulation = simulate(
@@ -76,7 +77,7 @@ QUIET: dict[str, tuple[Recording, list[int]]] = {
 }
 
 
-@pytest.mark.parametrize("name", QUIET)
+@pytest.mark.parametrize("name", few(QUIET, "stopped_between_ticks", "last_snapshot"))
 def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -> None:
     """Though nothing is lost, and it is as silent everywhere else."""
     recording, pauses = QUIET[name]

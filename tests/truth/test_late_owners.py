@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from ingested import ingest_one
+from thorough import few
 
 from msgflow.sim import Recording, simulate
 from msgflow.sim.entity import MILLISECOND
@@ -26,7 +27,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(("system", "layout"), CASES)
+@pytest.mark.parametrize(
+    ("system", "layout"),
+    few(CASES, ("intra_process", "galactic"), ("services", "rolling"), ("layers", "rolling")),
+)
 def test_owners(system: str, layout: str, tmp_path: Path) -> None:
     simulation = simulate(
         system,

@@ -38,7 +38,7 @@ def per_process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ingested]:
     with duckdb.connect(str(path)) as connection:
         for table, file in done.truth.items():
             connection.execute(f"CREATE TEMP VIEW truth_{table} AS FROM '{file}'")
-        yield Ingested(connection)
+        yield Ingested(connection, path)
 
 
 @pytest.mark.parametrize("table", TIMES)

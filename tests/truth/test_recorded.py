@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from ingested import Ingested
 from scoring import compare_recorded
+from thorough import RECORDED, few
 
 Vertex = tuple[str, int]
 
@@ -106,18 +107,7 @@ def checker(shared_traces: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "sync_1_1",
-        "sync_1_1_humble",
-        "sync_1_1_jazzy",
-        "pingpong",
-        "services",
-        "periodic_async_jazzy24",
-        "partial_sync",
-    ],
-)
+@pytest.mark.parametrize("name", few(TRUE_TRACES, *RECORDED))
 def test_scores(
     recordings: Callable[[str], Ingested],
     shared_traces: Path,
@@ -131,6 +121,7 @@ def test_scores(
     assert float(agreement[0]) >= 0.99
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["lossy_intra_mt", "intra_lost", "snapshots_intra"])
 def test_nothing_is_wrong_where_events_were_lost(
     recordings: Callable[[str], Ingested],
@@ -148,6 +139,7 @@ def test_nothing_is_wrong_where_events_were_lost(
     assert all(float(recall) > 0.94 for _, recall in scores.values())
 
 
+@pytest.mark.thorough
 def test_wrong_inputs_of_a_reentrant_node_are_marked(
     recordings: Callable[[str], Ingested], shared_traces: Path
 ) -> None:
@@ -178,7 +170,7 @@ def test_scores_of_services(
     assert counts == [(386, 385)]
 
 
-@pytest.mark.parametrize(("name", "kind"), TRUE_TRACES.items())
+@pytest.mark.parametrize(("name", "kind"), few(TRUE_TRACES.items(), ("services", "service")))
 def test_directions_agree(recordings: Callable[[str], Ingested], name: str, kind: str) -> None:
     """Forward from a reaches b exactly when backward from b reaches a.
 

@@ -11,6 +11,7 @@ import duckdb
 import pytest
 from ingested import ingest_one
 from scoring import compare, compare_recorded, compare_simulated
+from thorough import few, thorough
 
 from msgflow.sim import Recording, simulate
 
@@ -24,11 +25,17 @@ def simulation(tmp_path_factory):
     return simulate("two_hosts", directory / "trace", factor=0.1, recording=recording)
 
 
-@pytest.fixture
-def database(simulation, tmp_path):
-    path = tmp_path / "run.duckdb"
+@pytest.fixture(scope="module")
+def ingested(simulation, tmp_path_factory):
+    path = tmp_path_factory.mktemp("scoring") / "run.duckdb"
     ingest_one(simulation.directory, path).connection.close()
     return path
+
+
+@pytest.fixture
+def database(ingested, tmp_path):
+    """A copy, to change it."""
+    return Path(shutil.copy(ingested, tmp_path / "run.duckdb"))
 
 
 def _scores(simulation, database):
@@ -41,9 +48,19 @@ def _change(database, sql):
         connection.execute(sql)
 
 
-def test_quick_comparison_is_faultless():
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        ("--system", "two_hosts", "--layout", "jazzy", "--recording", "loss", "--factor", "0.05"),
+        thorough(("--quick",)),
+    ],
+)
+def test_quick_comparison_is_faultless(chosen, tmp_path):
     done = subprocess.run(
-        [sys.executable, SCRIPT, "--quick"], capture_output=True, text=True, check=False
+        [sys.executable, SCRIPT, *chosen, "--traces", tmp_path],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "two_hosts" in done.stdout
@@ -61,8 +78,8 @@ def test_lost_events_are_not_asked_for(simulation, database):
     assert scores["transport"].labels.startswith("exact")
 
 
-@pytest.mark.parametrize("share", [0, 0.3])
-@pytest.mark.parametrize("layout", ["foxy", "galactic"])
+@pytest.mark.parametrize("share", few([0, 0.3], 0.3))
+@pytest.mark.parametrize("layout", few(["foxy", "galactic"], "galactic"))
 def test_takes_without_an_event_are_no_loss(tmp_path, layout, share):
     """Before Humble nothing but the callback shows a take, and nothing whose message it was."""
     recording = Recording(lost_event_share=share)
@@ -257,10 +274,11 @@ def test_an_indirect_link_stored_twice_is_repeated(caches, tmp_path):
     assert _scores(simulation, changed)["partial_sync"].repeated == 5
 
 
-@pytest.mark.parametrize("name", ["sync_1_1", "sync_1_1_jazzy", "pingpong", "services"])
-def test_recorded_systems(shared_traces, tmp_path, name):
-    path = tmp_path / "run.duckdb"
-    ingest_one(shared_traces / name, path).connection.close()
+@pytest.mark.parametrize(
+    "name", few(["sync_1_1", "sync_1_1_jazzy", "pingpong", "services"], "services")
+)
+def test_recorded_systems(shared_traces, recordings, name):
+    path = recordings(name).path
     scores = compare_recorded(path, shared_traces / name / "truth.jsonl.gz")
     assert {"transport", "direct"} <= {score.kind for score in scores}
     for score in scores:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from ingested import Ingested
+from thorough import SHOWN, few
 
 from msgflow.sim import scenarios
 
@@ -150,7 +151,7 @@ DOUBTFUL = {"reentrant"}
 
 
 @pytest.mark.parametrize("table", CASES)
-@pytest.mark.parametrize("name", scenarios())
+@pytest.mark.parametrize("name", few(scenarios(), *SHOWN))
 def test_row_by_row(simulations: Callable[[str], Ingested], name: str, table: str) -> None:
     simulated = simulations(name)
     simulated.connection.execute(PLACE)

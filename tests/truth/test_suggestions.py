@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from suggestions import compare, merges
+from thorough import few
 
 from msgflow.sim import simulate
 
@@ -18,7 +19,7 @@ NOT_FOUND = {
 }
 
 
-@pytest.mark.parametrize("system", NOT_FOUND)
+@pytest.mark.parametrize("system", few(NOT_FOUND, "merges"))
 def test_what_is_suggested_without_a_doubt_is_right(system: str, tmp_path: Path) -> None:
     scenario = merges() if system == "merges" else system
     done = simulate(scenario, tmp_path / "trace", factor=0.5)

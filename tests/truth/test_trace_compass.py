@@ -74,7 +74,7 @@ def session(shared_traces: Path, tmp_path_factory: pytest.TempPathFactory) -> Se
 @pytest.fixture(scope="module")
 def trace(session: Session) -> Iterator[Ingested]:
     connection = connect(session.database, read_only=True)
-    yield Ingested(connection)
+    yield Ingested(connection, session.database)
     connection.close()
 
 

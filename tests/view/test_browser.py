@@ -11,6 +11,7 @@ from pathlib import Path
 import duckdb
 import pytest
 from served import Page, Served, a_publication, colors, flow_of, shown
+from thorough import thorough
 
 from msgflow.database import open_db
 
@@ -58,7 +59,7 @@ def test_picking_lights_up_exactly_the_flow(
     if way == "served":
         page.open(serve(systems).address)
     else:
-        page.open(report(systems, run=3))
+        page.open(report(systems))
     page.go(f"#/timeline?run=3&flow=publication:{number}")
     wanted = flow_of(connection, "publication", number)
     assert len(wanted) > 10
@@ -118,13 +119,13 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
 @pytest.mark.parametrize(
     ("run", "kind", "which"),
     [
-        (3, "publication", "SELECT min(publication_id) FROM publication JOIN publisher USING"
-         " (publisher_id) WHERE publication.run_id = 3 AND topic_name = '/FrontLidarDriver'"),
+        thorough(3, "publication", "SELECT min(publication_id) FROM publication JOIN publisher"
+         " USING (publisher_id) WHERE publication.run_id = 3 AND topic_name = '/FrontLidarDriver'"),
         (3, "take", "SELECT quantile_disc(take_id, 0.5) FROM take JOIN subscription USING"
          " (subscription_id) WHERE take.run_id = 3 AND topic_name = '/VehicleInterface'"),
-        (3, "callback_instance", "SELECT min(callback_instance_id) FROM link_causal"
+        thorough(3, "callback_instance", "SELECT min(callback_instance_id) FROM link_causal"
          " WHERE run_id = 3 AND kind = 'periodic_async'"),
-        (2, "publication", "SELECT quantile_disc(publication_id, 0.5) FROM publication JOIN"
+        thorough(2, "publication", "SELECT quantile_disc(publication_id, 0.5) FROM publication JOIN"
          " publisher USING (publisher_id) WHERE publication.run_id = 2"
          " AND topic_name = '/RayGroundFilter'"),
         (1, "request", "SELECT quantile_disc(l.request_id, 0.5) FROM link_request AS l"

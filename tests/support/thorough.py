@@ -1,0 +1,36 @@
+"""Which parameters of a test are for `make test-all` only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+# Simulated systems that have every kind of link and cause between them, and most faults.
+SHOWN = (
+    "demo",
+    "services",
+    "partial_sync",
+    "losses",
+    "mixed_intra_process",
+    "python",
+    "restarts",
+)
+# Recorded ones likewise: two that are short, one with services.
+RECORDED = ("sync_1_1", "services", "periodic_async_jazzy24")
+
+
+def thorough(*values: Any, **options: Any) -> Any:
+    """A set of parameters that shows what others of the test show already."""
+    return pytest.param(*values, marks=pytest.mark.thorough, **options)
+
+
+def few(values: Iterable[Any], *chosen: Any) -> list[Any]:
+    """All values of one parameter, or sets of several: all but the chosen ones thorough."""
+    values = list(values)
+    assert all(value in values for value in chosen), chosen
+    return [
+        value if value in chosen else thorough(*(value if isinstance(value, tuple) else (value,)))
+        for value in values
+    ]
