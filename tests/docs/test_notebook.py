@@ -29,6 +29,7 @@ def contents(notebook: Any) -> list[tuple[str, list[tuple[str, str]]]]:
     return found
 
 
+@pytest.mark.thorough
 def test_the_notebook_is_what_its_cells_give(tmp_path: Path) -> None:
     for name in NEEDED:
         pytest.importorskip(name)

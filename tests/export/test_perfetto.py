@@ -112,9 +112,7 @@ def decode(path: Path) -> Decoded:
     return decoded
 
 
-@pytest.fixture(
-    scope="module", params=few(["demo", "services", "nested", "partial_sync"], "demo", "services")
-)
+@pytest.fixture(scope="module", params=few(["demo", "services", "nested", "partial_sync"], "demo"))
 def exported(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[duckdb.DuckDBPyConnection, Decoded]:

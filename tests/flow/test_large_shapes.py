@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import duckdb
+import pytest
 from analysis import Analysis
 from golden import SYSTEMS, fill
 from ros_system import RosSystem
@@ -26,6 +27,7 @@ def limit(con: duckdb.DuckDBPyConnection, most: str) -> None:
     con.execute("SET threads = 2")
 
 
+@pytest.mark.thorough
 def test_a_long_path(fresh_database: Path) -> None:
     con = open_memory()
     con.execute(f"ATTACH '{fresh_database}' AS target; USE target")

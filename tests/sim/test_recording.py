@@ -11,6 +11,7 @@ from dataclasses import replace
 import duckdb
 import pyarrow.parquet as pq
 import pytest
+from thorough import few
 
 from msgflow.errors import UsageError
 from msgflow.sim import Buffers, Recording, long_recording, simulate
@@ -95,7 +96,7 @@ def perfect(bt2, made):
     return _events(bt2, made("perfect"))
 
 
-@pytest.mark.parametrize("name", list(FAULTS))
+@pytest.mark.parametrize("name", few(FAULTS, "late", "brim", "packets", "stopped", "last_snapshot"))
 def test_the_truth_names_exactly_what_is_missing(bt2, made, perfect, name):
     simulation = made(name)
     events, discarded, packets = _events(bt2, simulation)

@@ -7,15 +7,13 @@ from typing import Any
 
 import pytest
 
-# Simulated systems that have every kind of link and cause between them, and most faults.
+# Simulated systems that have every kind of link and cause between them.
 SHOWN = (
     "demo",
     "services",
     "partial_sync",
-    "losses",
     "mixed_intra_process",
     "python",
-    "restarts",
 )
 # Recorded ones likewise: two that are short, one with services.
 RECORDED = ("sync_1_1", "services", "periodic_async_jazzy24")

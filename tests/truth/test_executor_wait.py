@@ -117,7 +117,7 @@ class Witness:
         monkeypatch.setattr(executor_thread, "_RUN", handlers)
 
 
-@pytest.mark.parametrize("name", few(SCENARIOS, "executors", "nested"))
+@pytest.mark.parametrize("name", few(SCENARIOS, "executors"))
 def test_inputs_arrive_within_their_bounds(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

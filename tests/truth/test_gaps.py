@@ -37,7 +37,7 @@ RECORDINGS: dict[str, tuple[Recording, set[str], bool]] = {
 }
 
 
-@pytest.mark.parametrize("name", few(RECORDINGS, "brim", "stopped"))
+@pytest.mark.parametrize("name", few(RECORDINGS, "brim"))
 def test_what_is_said_near_gaps_is_true(tmp_path: Path, name: str) -> None:
     recording, gaps, is_complete = RECORDINGS[name]
     simulation = simulate(
@@ -77,7 +77,7 @@ QUIET: dict[str, tuple[Recording, list[int]]] = {
 }
 
 
-@pytest.mark.parametrize("name", few(QUIET, "stopped_between_ticks", "last_snapshot"))
+@pytest.mark.parametrize("name", few(QUIET, "stopped_between_ticks"))
 def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -> None:
     """Though nothing is lost, and it is as silent everywhere else."""
     recording, pauses = QUIET[name]

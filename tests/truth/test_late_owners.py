@@ -29,7 +29,7 @@ CASES = {
 
 @pytest.mark.parametrize(
     ("system", "layout"),
-    few(CASES, ("intra_process", "galactic"), ("services", "rolling"), ("layers", "rolling")),
+    few(CASES, ("intra_process", "galactic"), ("layers", "rolling")),
 )
 def test_owners(system: str, layout: str, tmp_path: Path) -> None:
     simulation = simulate(

@@ -9,6 +9,7 @@ from typing import Any
 import duckdb
 import pytest
 from served import Page, Served, shown
+from thorough import few
 
 from msgflow.database import open_db
 
@@ -89,7 +90,7 @@ def test_a_point_of_the_latency_leads_to_its_flow(demo: Path, report: Report, pa
     assert page.flow()
 
 
-@pytest.mark.parametrize("way", ["served", "file"])
+@pytest.mark.parametrize("way", few(["served", "file"], "file"))
 def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(systems) as opened:
         rates = opened.query("publication-rate", run=3).to_arrow().to_pylist()
@@ -131,7 +132,7 @@ def test_services_in_the_graph(systems: Path, serve: Serve, page: Page) -> None:
     assert all(shown(row["round_trip_median_ns"]) in text for row in services if row["answered"])
 
 
-@pytest.mark.parametrize("way", ["served", "file"])
+@pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Page) -> None:
     with open_db(demo) as opened:
         usage = opened.query("executor-usage").to_arrow().to_pylist()
@@ -233,6 +234,7 @@ def test_compare_shows_what_was_measured_before_intervals(
     page.page.get_by_role("region", name="comparison", exact=True).wait_for(timeout=60_000)
 
 
+@pytest.mark.thorough
 def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> None:
     page.open(report(systems, run=3, compare=2, path_text="/BehaviorPlanner"))
     page.go("#/compare")
