@@ -82,14 +82,23 @@ def fresh_database(empty_database: Path, tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def small_database(fresh_database: Path) -> Path:
-    """A database with two runs, a node, two topics of which one is internal, and a finding."""
+@pytest.fixture(scope="session")
+def _small_database(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     from golden import fill_case
 
-    with duckdb.connect(str(fresh_database)) as connection:
+    path = tmp_path_factory.mktemp("small") / "msgflow.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
         fill_case(connection, ROOT / "tests" / "support" / "small_database.case")
-    return fresh_database
+    return path
+
+
+@pytest.fixture
+def small_database(_small_database: Path, tmp_path: Path) -> Path:
+    """A database with two runs, a node, two topics of which one is internal, and a finding."""
+    path = tmp_path / "msgflow.duckdb"
+    shutil.copyfile(_small_database, path)
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -140,12 +140,12 @@ class Analysis:
     def _read(self, sql: str) -> list[tuple[Any, ...]]:
         return self._connection.execute(sql).fetchall()
 
-    def _tables_of(self, database: str) -> set[str]:
+    def _tables_of(self, database: str, condition: str = "true") -> set[str]:
         return {
             name
             for (name,) in self._read(
                 "SELECT table_name FROM duckdb_tables() "
-                f"WHERE database_name = '{database}' AND schema_name = 'main'"
+                f"WHERE database_name = '{database}' AND schema_name = 'main' AND {condition}"
             )
         }
 
@@ -167,7 +167,7 @@ class Analysis:
             con.execute(f"DROP VIEW staging.{view}")
         for database, tables in (("raw", raw), ("staging", given)):
             con.begin()
-            for table in tables:
+            for table in tables & self._tables_of(database, "estimated_size > 0"):
                 con.execute(f"DELETE FROM {database}.{table}")
             con.commit()
         con.begin()

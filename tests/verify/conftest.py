@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,13 +15,23 @@ from msgflow.db.derive import derive
 from msgflow.verify import Verification
 
 
-@pytest.fixture
-def system(fresh_database: Path) -> Path:
-    with duckdb.connect(str(fresh_database)) as connection:
+@pytest.fixture(scope="session")
+def _system(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("system") / "msgflow.duckdb"
+    shutil.copyfile(empty_database, path)
+    with duckdb.connect(str(path)) as connection:
         fill(connection)
         connection.execute((SYSTEMS / "many_messages.sql").read_text())
         derive(connection, 1)
-    return fresh_database
+    return path
+
+
+@pytest.fixture
+def system(_system: Path, tmp_path: Path) -> Path:
+    """A copy, to change it."""
+    path = tmp_path / "msgflow.duckdb"
+    shutil.copyfile(_system, path)
+    return path
 
 
 @pytest.fixture
