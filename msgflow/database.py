@@ -727,9 +727,9 @@ class Database:
             if not statements:
                 raise UsageError("there is no SQL to run", 'msgflow sql "SELECT * FROM run"')
             joined = "\n;\n".join(statements)
-            return interruptible(connection, lambda: _capped(connection.sql(joined), limit))
+            return interruptible(connection, lambda: capped(connection.sql(joined), limit))
         except duckdb.Error as error:
-            raise in_words(error, self.path) or _sql_error(error) from error
+            raise in_words(error, self.path) or sql_error(error) from error
 
     def schema(self) -> QueryResult:
         """Return the public views: one row per column, with its type and meaning."""
@@ -925,7 +925,8 @@ class Database:
         return self._ask(export)
 
 
-def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:
+def capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:
+    """Return the rows of SQL that somebody gave, `limit` at most."""
     import pyarrow
 
     if relation is None:
@@ -939,7 +940,8 @@ def _capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> Quer
     return QueryResult(table.slice(0, limit), notes=[note])
 
 
-def _sql_error(error: duckdb.Error) -> QueryError:
+def sql_error(error: duckdb.Error) -> QueryError:
+    """Return what DuckDB says about SQL that somebody gave."""
     # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from msgflow.cli import fleet_asking
 from msgflow.cli.ingest import Reader
-from msgflow.cli.options import FormatOption, OutputOption, WideOption
+from msgflow.cli.options import FormatOption, LakeOption, OutputOption, WideOption
 from msgflow.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -16,15 +17,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Many recordings, on one machine or many, into one lake of Parquet files.")
 
-LakeOption = Annotated[
-    str,
-    typer.Option(
-        "--lake",
-        envvar="MSGFLOW_LAKE",
-        metavar="PATH|s3://BUCKET/PREFIX",
-        help="The lake: a folder or a bucket",
-    ),
-]
 _SIZE = re.compile(r"(\d+(?:\.\d+)?) ?(B|[kK]B|MB|GB|TB)?")
 _UNITS = {None: 1, "B": 1, "KB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 _TIME = re.compile(r"(\d+(?:\.\d+)?) ?(s|min|h|d)?")
@@ -218,6 +210,12 @@ def failures(
     from msgflow.fleet.listing import list_failures
 
     print_result(list_failures(Lake.open(lake)), form, output, wide=wide)
+
+
+app.command("query")(fleet_asking.query)
+app.command("sql")(fleet_asking.sql)
+app.command("worst")(fleet_asking.worst)
+app.command("open")(fleet_asking.open_)
 
 
 @app.command("remove")

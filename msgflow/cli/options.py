@@ -115,3 +115,23 @@ OutputOption = Annotated[
         rich_help_panel=OUTPUT,
     ),
 ]
+LakeOption = Annotated[
+    str,
+    typer.Option(
+        "--lake",
+        envvar="MSGFLOW_LAKE",
+        metavar="PATH|s3://BUCKET/PREFIX",
+        help="The lake: a folder or a bucket",
+    ),
+]
+LakeWhereOption = Annotated[
+    str | None,
+    typer.Option(
+        "--where",
+        metavar="CONDITION",
+        help="Runs for which this is true: SQL on labels and columns of run, such as"
+        " \"robot = 'r1'\"",
+        show_default="all runs",
+        rich_help_panel=SELECTION,
+    ),
+]

@@ -42,15 +42,20 @@ def command(
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
-    statements = _statements(text, file)
+    statements = statements_of(text, file, 'msgflow sql "SELECT * FROM run"')
     with Database(database) as opened:
         result = opened.sql(statements, limit=limit or None)
     print_result(result, form, output, wide=wide)
 
 
-def _statements(text: str | None, file: Path | None) -> str:
+def statements_of(text: str | None, file: Path | None, example: str) -> str:
+    """Return the SQL that was given, on the command line, in a file or on stdin.
+
+    Raises:
+        UsageError: not exactly one of them, or the file cannot be read.
+    """
     if (text is None) == (file is None):
-        raise UsageError("give SQL, or a file with -f", 'msgflow sql "SELECT * FROM run"')
+        raise UsageError("give SQL, or a file with -f", example)
     if file is not None:
         return read_text(file, "cannot read the file", "give a file with SQL with -f")
     return sys.stdin.read() if text == "-" else str(text)

@@ -20,7 +20,7 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.nearest import nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 _NODES = {"SELECT_NODE", "SET_OPERATION_NODE", "RECURSIVE_CTE_NODE", "CTE_NODE"}
 _SOURCES = {
@@ -70,12 +70,15 @@ _CONDITION_HINT = "such as --where \"p99_ns > 80e6 AND node LIKE '%planner'\""
 _HINT = "SELECT, FROM, WITH, VALUES, DESCRIBE, SUMMARIZE, SHOW and EXPLAIN of such read"
 
 
-def reading_statements(con: duckdb.DuckDBPyConnection, text: str) -> list[str]:
+def reading_statements(
+    con: duckdb.DuckDBPyConnection, text: str, schemas: Sequence[str] = SCHEMAS
+) -> list[str]:
     """Return the statements in `text`, all of which only read the tables of the database.
 
     Args:
-        con: connection to a current msgflow database.
+        con: connection to a current msgflow database, or to one that nobody else has filled.
         text: one or more statements.
+        schemas: those of msgflow in it.
 
     Raises:
         QueryError: one of them might do something else.
@@ -84,9 +87,9 @@ def reading_statements(con: duckdb.DuckDBPyConnection, text: str) -> list[str]:
     statements = _split(con, text)
     for kind, statement in statements:
         if kind == "EXPLAIN":
-            _require_reading(con, _explained(con, statement), kind)
+            _require_reading(con, _explained(con, statement), kind, schemas)
         else:
-            _require_reading(con, statement, kind)
+            _require_reading(con, statement, kind, schemas)
     return [statement for _, statement in statements]
 
 
@@ -146,7 +149,9 @@ def _split(con: duckdb.DuckDBPyConnection, text: str) -> list[tuple[str, str]]:
         raise _refused("a kind of statement that msgflow does not know") from error
 
 
-def _require_reading(con: duckdb.DuckDBPyConnection, statement: str, kind: str) -> None:
+def _require_reading(
+    con: duckdb.DuckDBPyConnection, statement: str, kind: str, schemas: Sequence[str] = SCHEMAS
+) -> None:
     """Raise unless a statement is a query, of the parts and functions above only."""
     tree = _parse(con, statement)
     if tree is None:
@@ -157,7 +162,7 @@ def _require_reading(con: duckdb.DuckDBPyConnection, statement: str, kind: str) 
             )
         raise _refused(kind.replace("_", " "))
     foreign = {
-        name.lower() for (name,) in con.execute(_FOREIGN_SCHEMAS, [list(SCHEMAS)]).fetchall()
+        name.lower() for (name,) in con.execute(_FOREIGN_SCHEMAS, [list(schemas)]).fetchall()
     }
     sources: list[dict[str, Any]] = []
     for part in _parts(tree):

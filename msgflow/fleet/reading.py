@@ -269,11 +269,17 @@ class Reading:
 
 
 @contextmanager
-def lake_errors(lake: Lake) -> Iterator[None]:
-    """Raise what the files of a lake are to blame for as a DatabaseError."""
+def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
+    """Raise what the files of a lake are to blame for as a DatabaseError.
+
+    Args:
+        lake: the lake.
+        is_query: a statement of a user may be to blame for its input.
+    """
+    kinds = (duckdb.IOException, OSError) if is_query else (duckdb.Error, OSError)
     try:
         yield
-    except (duckdb.IOException, duckdb.InvalidInputException, OSError) as error:
+    except kinds as error:
         raise DatabaseError(
             f"cannot read the lake: {first_line(error)} — {lake.store.url}",
             "check that it can be reached, and that nobody else than msgflow has written there",

@@ -128,7 +128,7 @@ def run_query(
                 f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
             ) from error
         raise QueryError(f"the query failed: {first_line(error)} — {header.name}") from error
-    table, total, hidden, cut = _without_counts(table)
+    table, total, hidden, cut = without_counts(table)
     if not internal and INTERNAL_COLUMN in table.column_names:
         table = table.drop_columns([INTERNAL_COLUMN])
     notes = [] if runs else ["the database holds no run yet"]
@@ -278,7 +278,7 @@ def _parameters(header: Header) -> str:
     return f"its parameters are {', '.join(param.name for param in header.params)}"
 
 
-def _without_counts(table: pa.Table) -> tuple[pa.Table, int, int, int]:
+def without_counts(table: pa.Table) -> tuple[pa.Table, int, int, int]:
     """Return the rows themselves, and how many there were, were hidden, and are cut off."""
     total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
     if table[PLACE][0].as_py() is None:

@@ -1,0 +1,234 @@
+"""`msgflow fleet query`, `sql`, `worst` and `open`: questions to the runs of a lake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from msgflow.cli.options import (
+    ColumnsOption,
+    FormatOption,
+    InternalOption,
+    LakeOption,
+    LakeWhereOption,
+    OutputOption,
+    WideOption,
+)
+from msgflow.cli.sql import DEFAULT_LIMIT, statements_of
+from msgflow.errors import UsageError
+
+_CHOICE = "Which rows"
+_MOST_WORST = 1_000
+
+
+def query(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME]", help="Named query; without it they are listed"),
+    ] = None,
+    lake: LakeOption = "",
+    where: LakeWhereOption = None,
+    group_by: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--group-by",
+            metavar="LABEL",
+            help="One row for each value of this label (or column of run); several between commas",
+        ),
+    ] = None,
+    case: Annotated[
+        str | None,
+        typer.Option(
+            "--case",
+            metavar="first|last|newest|every_pair",
+            help="Pairs of root and arrival that count, of e2e-latency",
+            show_default="first",
+        ),
+    ] = None,
+    node: Annotated[
+        list[str] | None,
+        typer.Option("--node", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
+    ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option("--topic", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
+    ] = None,
+    callback: Annotated[
+        list[str] | None,
+        typer.Option("--callback", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
+    ] = None,
+    host: Annotated[
+        list[str] | None,
+        typer.Option("--host", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
+    ] = None,
+    via: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--via",
+            metavar="NAME",
+            help="Paths through all of these topics and nodes",
+            rich_help_panel=_CHOICE,
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--without",
+            metavar="NAME",
+            help="Paths through none of these",
+            rich_help_panel=_CHOICE,
+        ),
+    ] = None,
+    sort: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sort",
+            metavar="COLUMN[:desc]",
+            help="Column to sort by, or several",
+            rich_help_panel=_CHOICE,
+        ),
+    ] = None,
+    limit: Annotated[
+        int | None,
+        typer.Option(
+            "--limit", metavar="N", min=1, help="Maximum number of rows", rich_help_panel=_CHOICE
+        ),
+    ] = None,
+    internal: InternalOption = False,
+    form: FormatOption = None,
+    columns: ColumnsOption = None,
+    output: OutputOption = None,
+    wide: WideOption = False,
+) -> None:
+    """Ask a named query of many runs, as msgflow query asks it of one.
+
+    Quantiles come from the latencies of all flows, or from counts in buckets that are off by less
+    than 1 %; they are never averages of those of runs.
+    """
+    from msgflow.cli.output import print_list, print_result
+    from msgflow.fleet.asking import fleet_query, header_of, names
+    from msgflow.fleet.lake import Lake
+    from msgflow.query.selection import values_of
+    from msgflow.query.show.present import MOST_ROWS
+
+    if name is None:
+        print_list([(each, header_of(each).title) for each in names()], ("query", "title"))
+        return
+    header_of(name)
+    require_lake(lake)
+    result = fleet_query(
+        Lake.open(lake),
+        name,
+        where=where,
+        group_by=values_of(group_by),
+        internal=internal,
+        selection={
+            "node": node,
+            "topic": topic,
+            "callback": callback,
+            "host": host,
+            "via": via,
+            "without": without,
+            "sort": sort,
+            "limit": limit,
+        },
+        **({} if case is None else {"case": case}),
+    )
+    print_result(result, form, output, wide=wide, columns=columns, most_rows=limit or MOST_ROWS)
+
+
+def sql(
+    text: Annotated[
+        str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
+    ] = None,
+    lake: LakeOption = "",
+    where: LakeWhereOption = None,
+    file: Annotated[
+        Path | None,
+        typer.Option("-f", "--file", metavar="FILE", help="Read the statements from FILE"),
+    ] = None,
+    limit: Annotated[
+        int,
+        typer.Option(
+            "--limit", min=0, metavar="ROWS", help="Maximum number of rows to print; 0 for all"
+        ),
+    ] = DEFAULT_LIMIT,
+    form: FormatOption = None,
+    wide: WideOption = False,
+    output: OutputOption = None,
+) -> None:
+    """Run SQL on the tables of a lake, read-only and without access to anything else.
+
+    Tables are run, flow, distribution and the others of docs/fleet.md, with the rows of the chosen
+    runs that count; public views are view.publication and so on.
+    """
+    from msgflow.cli.output import print_result
+    from msgflow.fleet.asking import fleet_sql
+    from msgflow.fleet.lake import Lake
+
+    statements = statements_of(text, file, "msgflow fleet sql 'FROM run'")
+    require_lake(lake)
+    result = fleet_sql(Lake.open(lake), statements, where=where, limit=limit or None)
+    print_result(result, form, output, wide=wide)
+
+
+def worst(
+    path: Annotated[
+        str, typer.Argument(metavar="PATH", help="Text of a path, a glob, or a part: a topic")
+    ],
+    lake: LakeOption,
+    where: LakeWhereOption = None,
+    limit: Annotated[
+        int,
+        typer.Option("--limit", metavar="N", min=1, max=_MOST_WORST, help="Number of flows"),
+    ] = 10,
+    form: FormatOption = None,
+    columns: ColumnsOption = None,
+    output: OutputOption = None,
+    wide: WideOption = False,
+) -> None:
+    """Show the flows of a path that took longest, with what opens each."""
+    from msgflow.cli.output import print_result
+    from msgflow.fleet.asking import fleet_worst
+    from msgflow.fleet.lake import Lake
+
+    result = fleet_worst(Lake.open(lake), path, where=where, limit=limit)
+    print_result(result, form, output, wide=wide, columns=columns, most_rows=limit)
+
+
+def open_(
+    run: Annotated[
+        str, typer.Argument(metavar="RUN", help="Key of a run, the begin of it, or a name")
+    ],
+    lake: LakeOption,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="New database file; one that exists is not replaced",
+            show_default="RUN.duckdb",
+        ),
+    ] = None,
+) -> None:
+    """Bring one run of a lake back as an ordinary database, for flow, ui and all other commands."""
+    from msgflow.cli.output import print_status
+    from msgflow.fleet.lake import Lake
+    from msgflow.fleet.opening import open_run
+
+    done = open_run(Lake.open(lake), run, output)
+    more = f", upgraded from schema revision {done.before}" if done.before else ""
+    print_status(f"run {done.name} ({done.run}) is in {done.path}: {done.size:,} bytes{more}")
+
+
+def require_lake(lake: str) -> None:
+    """Raise where an option of a command that does something without a lake, too, is missing.
+
+    Raises:
+        UsageError: no lake is named.
+    """
+    if not lake:
+        raise UsageError("no lake is named", "--lake PATH, or MSGFLOW_LAKE")

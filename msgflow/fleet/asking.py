@@ -1,0 +1,324 @@
+"""Questions to many runs of a lake: the named queries, the slowest flows of a path, and any SQL.
+
+What each named query says of many runs is a statement below `sql`: counts, sums and extremes are
+added up, quantiles come from rows of flows or from counts in buckets. Quantiles are never averaged.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import duckdb
+
+from msgflow.database import capped, sql_error
+from msgflow.db.reading import reading_statements
+from msgflow.errors import QueryError, UsageError
+from msgflow.fleet.answers import answers
+from msgflow.fleet.layout import VIEWS
+from msgflow.fleet.reading import (
+    Reading,
+    choose,
+    lake_errors,
+    quoted,
+    what_there_is,
+)
+from msgflow.nearest import nearest
+from msgflow.query.catalogue import query_names
+from msgflow.query.result import QueryResult
+from msgflow.query.run import bind, first_line, without_counts
+from msgflow.query.selection import CUT_COLUMN, INTERNAL_COLUMN, make_selection, selected
+from msgflow.sql.header import Column
+from msgflow.sql.interrupt import interruptible
+from msgflow.sql.statement import Statements
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from msgflow.fleet.lake import Lake
+    from msgflow.fleet.reading import Choice
+    from msgflow.sql.header import Header
+    from msgflow.sql.value import Value
+
+GROUP = "label_group"
+WORST = "worst"
+DEFAULT_LIMIT = 10
+_LAYER = "fleet"
+_OF_LAKE = "lake."
+_MADE = ("run", "run_group")
+# What looks at tables without naming them.
+_LISTS = re.compile(r"\b(show|describe|summarize|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE)
+_BUCKETS = "distributed"
+
+
+@cache
+def statements() -> Statements:
+    """Return what a lake is asked for."""
+    return Statements(_LAYER, Path(__file__).parent / "sql")
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Return the names of the queries that a lake answers, sorted."""
+    return tuple(
+        name.replace("_", "-")
+        for name in statements().names()
+        if any(column.name == GROUP for column in statements().header(name).columns)
+    )
+
+
+def header_of(name: str) -> Header:
+    """Return the header of a query that a lake answers.
+
+    Raises:
+        UsageError: there is no such query, or a lake cannot answer it.
+    """
+    if name in names():
+        return statements().header(name.replace("-", "_"))
+    if name in query_names():
+        raise UsageError(
+            f"a lake does not hold what this query needs — {name}",
+            f"it answers {', '.join(names())}; for others: msgflow fleet open RUN, then"
+            f" msgflow query {name}",
+        )
+    near = nearest(name, names())
+    raise UsageError(
+        f"there is no such query — {name}",
+        f"did you mean {' or '.join(near)}" if near else f"a lake answers {', '.join(names())}",
+    )
+
+
+def fleet_query(
+    lake: Lake,
+    name: str,
+    *,
+    where: str | None = None,
+    group_by: Sequence[str] = (),
+    internal: bool = False,
+    selection: Mapping[str, object] | None = None,
+    **parameters: Value,
+) -> QueryResult:
+    """Ask a named query of many runs.
+
+    Args:
+        lake: the lake.
+        name: as `names` has it.
+        where: a condition on runs and their labels, see `choose`; all runs when None.
+        group_by: labels, or columns of the table `run`: one row for each of their values, which
+            stand in columns before the others.
+        internal: show the rows of ROS's own topics and services too.
+        selection: node, topic, callback, host, via, without, sort and limit, as `Database.query`
+            has them.
+        parameters: the query's own.
+
+    Raises:
+        UsageError: a query, label, parameter or column that there is not, or no run fits.
+        DatabaseError: the lake cannot be read.
+        QueryError: the lake could not be asked.
+    """
+    header = header_of(name)
+    own = bind(header, parameters, f"msgflow fleet query {name}")
+    chosen = make_selection(dict(selection or {}))
+    choice = choose(lake, where)
+    with Reading(choice, _tables(header)) as reading:
+        con = reading.connection
+        _require_tables(con, header)
+        grouped = _group(con, choice, header, group_by)
+        sql, bindings = selected(grouped, chosen, internal)
+
+        def ask() -> Any:
+            return con.sql(sql, params=own | bindings).to_arrow_table()
+
+        table = _asked(lake, name, con, ask)
+    table, total, hidden, cut = without_counts(table)
+    if not internal and INTERNAL_COLUMN in table.column_names:
+        table = table.drop_columns([INTERNAL_COLUMN])
+    notes = []
+    if len(choice.runs) < choice.total:
+        notes.append(f"{len(choice.runs):,} of {choice.total:,} runs")
+    if table.num_rows < total:
+        notes.append(f"{table.num_rows:,} of {total:,} rows")
+    if hidden:
+        notes.append(f"internal rows are hidden ({hidden:,}); --internal shows them")
+    if cut:
+        notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
+    if f"{_LAYER}.{_BUCKETS}" in header.needs and len(choice.runs) > 1:
+        notes.append("medians and other quantiles of several runs are off by less than 1 %")
+    return QueryResult(table, grouped, notes=notes)
+
+
+def fleet_sql(
+    lake: Lake, text: str, *, where: str | None = None, limit: int | None = None
+) -> QueryResult:
+    """Run SQL that only reads on the tables of a lake, and return the last result.
+
+    Args:
+        lake: the lake.
+        text: one or more queries. Tables are `run` and the answers, with the rows of the chosen
+            runs that count; public views are in the schema `view`.
+        where: a condition on runs and their labels, see `choose`; all runs when None.
+        limit: most rows returned, all when None; a note says when there were more.
+
+    Raises:
+        UsageError: a label that there is not, or no run fits.
+        QueryError: a statement might do more than read, or failed.
+        DatabaseError: the lake cannot be read.
+    """
+    choice = choose(lake, where)
+    try:
+        with Reading(choice, _named_tables(text)) as reading:
+            con = reading.connection
+            found = reading_statements(con, text, schemas=("main", VIEWS))
+            if not found:
+                raise UsageError("there is no SQL to run", "msgflow fleet sql 'FROM run'")
+            with lake_errors(lake, is_query=True):
+                joined = "\n;\n".join(found)
+                return interruptible(con, lambda: capped(con.sql(joined), limit))
+    except duckdb.Error as error:
+        raise sql_error(error) from error
+
+
+def fleet_worst(
+    lake: Lake, path: str, *, where: str | None = None, limit: int = DEFAULT_LIMIT
+) -> QueryResult:
+    """Return the flows of a path that took longest, each with the command that opens it.
+
+    Args:
+        lake: the lake.
+        path: the text of a path, a glob, or a part of it.
+        where: a condition on runs and their labels, see `choose`; all runs when None.
+        limit: most rows.
+
+    Raises:
+        UsageError: no path has this text, a label that there is not, or no run fits.
+        DatabaseError: the lake cannot be read.
+    """
+    import pyarrow as pa
+
+    header = statements().header(WORST)
+    choice = choose(lake, where)
+    with Reading(choice, _tables(header)) as reading:
+        con = reading.connection
+        _require_tables(con, header)
+        values = {"path": path, "count": limit}
+        table = _asked(
+            lake, WORST, con, lambda: statements().run(con, WORST, values).to_arrow_table()
+        )
+    if not len(table):
+        raise UsageError(
+            f"no flow of these runs reached the end of a path with this text — {path}",
+            f"msgflow fleet query e2e-latency --lake {shlex.quote(lake.store.url)}",
+        )
+    # A handful of rows, as text: what to type is not for SQL to say.
+    commands = [_command(lake, row) for row in table.to_pylist()]
+    table = table.append_column("command", pa.array(commands, pa.string()))
+    table = table.drop_columns(["has_database"])
+    notes = []
+    if None in commands:
+        notes.append("runs without a command were written with --no-database")
+    meaning = Column("command", "VARCHAR", None, "What opens the flow")
+    columns = (*(column for column in header.columns if column.name != "has_database"), meaning)
+    return QueryResult(table, replace(header, columns=columns), notes=notes)
+
+
+def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
+    if not row["has_database"]:
+        return None
+    file = f"{row['run']}.duckdb"
+    option = f"--{row['root_kind'].replace('_', '-')} {row['root_id']}"
+    return (
+        f"msgflow fleet open {row['run']} --lake {shlex.quote(lake.store.url)}"
+        f" && msgflow flow --db {file} {option}"
+    )
+
+
+def _tables(header: Header) -> list[str]:
+    """Return the tables of the lake that a statement reads."""
+    sources = statements().sources([header.name.partition(".")[2]])
+    found = [name.removeprefix(_OF_LAKE) for name in sources]
+    return [name for name in found if name not in _MADE]
+
+
+def _require_tables(con: duckdb.DuckDBPyConnection, header: Header) -> None:
+    there = {name for (name,) in con.execute("SELECT view_name FROM duckdb_views()").fetchall()}
+    for table in _tables(header):
+        if table not in there:
+            raise UsageError(
+                f"these runs lack a table, an earlier msgflow wrote them — {table}",
+                "msgflow fleet ingest SOURCE --lake LAKE --replace writes them again",
+            )
+
+
+def _named_tables(text: str) -> list[str] | None:
+    """Return the tables of the lake that SQL names; None: any may be looked at."""
+    if _LISTS.search(text):
+        return None
+    known = {answer.table for answer in answers()}
+    words = set(re.findall(r"\w+", text.lower()))
+    return [name for name in sorted(known) if name in words] + (
+        [f"{VIEWS}/{word}" for word in sorted(words)] if VIEWS in words else []
+    )
+
+
+def _group(
+    con: duckdb.DuckDBPyConnection, choice: Choice, header: Header, group_by: Sequence[str]
+) -> Header:
+    """Make the table that says which run is of which group; return the query with their labels."""
+    taken = {column.name.lower() for column in header.columns}
+    fields = set(choice.runs.column_names) - {"labels"}
+    values, bound = [], {}
+    columns: list[Column] = []
+    for name in dict.fromkeys(group_by):
+        if name in fields:
+            values.append(quoted(name))
+        elif name in choice.labels:
+            bound[f"key_{len(values)}"] = name
+            values.append(f"labels[$key_{len(values)}]")
+        else:
+            raise UsageError(
+                f"no run of the lake has such a label — {name}",
+                what_there_is(name, choice.labels, sorted(fields)),
+            )
+        title = f"label_{name}" if name.lower() in taken else name
+        columns.append(Column(title, "VARCHAR", None, f"Value of {name}"))
+    listed = "".join(
+        f", {value} AS {quoted(column.name)}" for value, column in zip(values, columns, strict=True)
+    )
+    number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
+    rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=_used(bound, number))
+    con.register("run_group", rows.to_arrow_table())
+    if not columns:
+        kept = tuple(column for column in header.columns if column.name != GROUP)
+        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{_text(header)}\n)"
+        return replace(header, columns=kept, body=body)
+    labels = con.sql(f"SELECT DISTINCT {number} AS {GROUP}{listed} FROM run", params=bound)
+    con.register("group_label", labels.to_arrow_table())
+    body = (
+        "SELECT l.* EXCLUDE (label_group), q.* EXCLUDE (label_group, place) FROM ("
+        f"SELECT row_number() OVER () AS place, * FROM (\n{_text(header)}\n)) AS q "
+        f"JOIN group_label AS l ON q.{GROUP} = l.{GROUP} ORDER BY q.place"
+    )
+    kept = tuple(column for column in header.columns if column.name != GROUP)
+    first = tuple(column.name for column in columns)
+    brief = (*header.brief[:1], *first, *header.brief[1:])
+    return replace(header, columns=(*columns, *kept), body=body, brief=brief)
+
+
+def _used(bound: Mapping[str, str], text: str) -> dict[str, str]:
+    return {key: value for key, value in bound.items() if f"${key}]" in text}
+
+
+def _text(header: Header) -> str:
+    return statements().text(header.name.partition(".")[2]).rstrip().rstrip(";")
+
+
+def _asked(lake: Lake, name: str, con: duckdb.DuckDBPyConnection, ask: Any) -> Any:
+    try:
+        with lake_errors(lake, is_query=True):
+            return interruptible(con, ask)
+    except duckdb.Error as error:
+        raise QueryError(f"the query failed: {first_line(error)} — {name}") from error

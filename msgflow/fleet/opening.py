@@ -1,0 +1,151 @@
+"""Brings one run of a lake back as an ordinary database."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msgflow.db.connection import connect
+from msgflow.db.migrate import upgrade
+from msgflow.errors import DatabaseError, MsgflowError, UsageError
+from msgflow.fleet.layout import database_path
+from msgflow.fleet.part import run_key
+
+if TYPE_CHECKING:
+    from msgflow.fleet.lake import Lake
+
+_CHUNK = 8 * 1024 * 1024
+_SHORTEST = 4
+
+
+@dataclass(frozen=True)
+class OpenedRun:
+    """A run that was brought back.
+
+    Attributes:
+        run: its key.
+        name: its name.
+        path: the database.
+        size: bytes of it.
+        before: the schema revision that it was upgraded from; None: it had the current one.
+    """
+
+    run: str
+    name: str
+    path: Path
+    size: int
+    before: str | None
+
+
+def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
+    """Write the database of a run of a lake into a new file.
+
+    It is the database that the ingest made, verified by the packets that it knows, and upgraded
+    where an earlier msgflow made it.
+
+    Args:
+        lake: the lake.
+        run: key of the run, the begin of it, or the name of a run.
+        path: the file, which must not exist; the key and `.duckdb`, here, when None.
+
+    Raises:
+        UsageError: no such run or several, no database of it, or the file exists.
+        DatabaseError: the lake cannot be read, or holds something else than this run there.
+    """
+    row = _row(lake, run)
+    target = Path(f"{row['run']}.duckdb") if path is None else path
+    if os.path.lexists(target):
+        raise UsageError(f"the file exists already — {target}", "give another one with -o")
+    if not target.parent.is_dir():
+        raise UsageError(f"there is no such folder — {target.parent}", "make it, or give another")
+    if row["database_part"] is None:
+        raise UsageError(
+            f"the lake has no database of this run, it was written with --no-database"
+            f" — {row['run']}",
+            f"msgflow ingest {row['source']}",
+        )
+    aside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    try:
+        _fetch(lake, row, aside)
+        before = _verified(lake, row, aside)
+        try:
+            # Fails where somebody made the file meanwhile.
+            os.link(aside, target)
+        except FileExistsError:
+            raise UsageError(
+                f"the file exists already — {target}", "give another one with -o"
+            ) from None
+        except OSError:  # a file system without links
+            aside.replace(target)
+    except OSError as error:
+        raise UsageError(f"cannot write the file: {error.strerror} — {target}") from error
+    finally:
+        for left in (aside, aside.with_name(f"{aside.name}.zst"), Path(f"{aside}.wal")):
+            left.unlink(missing_ok=True)
+    return OpenedRun(row["run"], row["name"], target, target.stat().st_size, before)
+
+
+def _row(lake: Lake, run: str) -> dict[str, Any]:
+    rows: list[dict[str, Any]] = lake.runs().to_pylist()
+    found = [row for row in rows if row["run"] == run] or [
+        row
+        for row in rows
+        if row["name"] == run or (len(run) >= _SHORTEST and row["run"].startswith(run))
+    ]
+    if not found:
+        raise UsageError(
+            f"the lake has no such run — {run}", f"msgflow fleet runs --lake {lake.store.url}"
+        )
+    if len(found) > 1:
+        keys = ", ".join(row["run"] for row in found[:3])
+        raise UsageError(f"{len(found)} runs are called so — {run}", f"give a key: {keys}")
+    return found[0]
+
+
+def _fetch(lake: Lake, row: dict[str, Any], target: Path) -> None:
+    import pyarrow as pa
+
+    path = database_path(row["database_part"])
+    if lake.store.entry(path) is None:
+        raise DatabaseError(
+            f"the database of the run is gone — {lake.store.url_of(path)}",
+            "msgflow fleet ingest SOURCE --lake LAKE --replace writes it again",
+        )
+    packed = target.with_name(f"{target.name}.zst")
+    try:
+        lake.store.fetch(path, packed)
+        with pa.CompressedInputStream(str(packed), "zstd") as source, target.open("xb") as file:
+            while chunk := source.read(_CHUNK):
+                file.write(chunk)
+    except OSError as error:
+        if error.errno is not None:
+            raise
+        raise _damaged(lake, row, str(error)) from error
+    finally:
+        packed.unlink(missing_ok=True)
+
+
+def _verified(lake: Lake, row: dict[str, Any], file: Path) -> str | None:
+    """Return the revision that a database was upgraded from; raise unless it is that of the run."""
+    try:
+        done = upgrade(file)
+        with contextlib.closing(connect(file, read_only=True)) as con:
+            ids = con.execute("SELECT run_id FROM main.run").fetchall()
+            is_it = len(ids) == 1 and run_key(con, ids[0][0]) == row["run"]
+    except MsgflowError as error:
+        raise _damaged(lake, row, error.message.partition(" — ")[0]) from error
+    if not is_it:
+        raise _damaged(lake, row, "it is that of another run")
+    return done.before if done.before != done.after else None
+
+
+def _damaged(lake: Lake, row: dict[str, Any], words: str) -> DatabaseError:
+    return DatabaseError(
+        f"the database in the lake cannot be used: {words}"
+        f" — {lake.store.url_of(database_path(row['database_part']))}",
+        "msgflow fleet ingest SOURCE --lake LAKE --replace writes it again",
+    )

@@ -1,0 +1,31 @@
+-- name: fleet.data_quality
+-- title: Data quality: what is missing, and in how many runs
+-- description: As the query data-quality says it of one run, added up over traces and processes;
+--     topics have a row each.
+-- grain: one row per scope, topic, measure and group of runs
+-- column: label_group BIGINT     Group of runs
+-- column: scope VARCHAR          'trace', 'process', 'topic' or 'run'
+-- column: topic VARCHAR [topic]  Topic; empty: not of one
+-- column: measure VARCHAR        What is counted
+-- column: runs BIGINT            Runs in which something is affected
+-- column: affected BIGINT        How many are affected; for gap_time: nanoseconds in gaps
+-- column: total BIGINT           How many there are; for gap_time: nanoseconds traced
+-- column: affected_percent DOUBLE [%]  Share affected
+-- column: is_internal BOOLEAN    ROS uses the topic for itself
+-- brief: scope, topic, measure, runs, affected, total, affected_percent
+-- answer: affected
+-- needs: lake.data_quality, lake.run_group
+SELECT
+    g.label_group,
+    q.scope,
+    CASE WHEN q.scope = 'topic' THEN q.subject END AS topic,
+    q.measure,
+    count(DISTINCT q.run) FILTER (WHERE q.affected > 0) AS runs,
+    sum(q.affected)::BIGINT AS affected,
+    sum(q.total)::BIGINT AS total,
+    100.0::DOUBLE * sum(q.affected) / nullif(sum(q.total), 0) AS affected_percent,
+    bool_and(q.is_internal) AS is_internal
+FROM data_quality AS q
+JOIN run_group AS g ON q.run = g.run
+GROUP BY ALL
+ORDER BY q.scope, topic, q.measure, g.label_group

@@ -1,0 +1,129 @@
+-- name: fleet.e2e_latency
+-- title: End-to-end latency by path, of many runs
+-- description: As the query e2e-latency says it of one run, exactly: computed from the flows of all
+--     runs. Paths of one text are one path.
+-- grain: one row per path and group of runs
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
+--     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- column: label_group BIGINT       Group of runs
+-- column: runs BIGINT              Runs that have the path
+-- column: roots BIGINT             Flows that began
+-- column: reached BIGINT           Roots that reached the end of the path
+-- column: superseded BIGINT        Roots replaced by a newer input before they were used
+-- column: lost BIGINT              Roots lost on the way although later ones arrived
+-- column: cut_by_recording BIGINT  Roots too close to the start or end of a recording to know
+-- column: loss_affected BIGINT     Roots with a gap of a trace in their time
+-- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
+-- column: looped BIGINT            Later messages at the end of the path that descend from an
+--     arrival there through a loop
+-- column: min_ns BIGINT [ns]       Shortest latency
+-- column: median_ns BIGINT [ns]    Median latency
+-- column: mean_ns BIGINT [ns]      Mean latency
+-- column: p95_ns BIGINT [ns]       95 % of the latencies are at most this
+-- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
+-- column: max_ns BIGINT [ns]       Longest latency
+-- column: sink_event VARCHAR       Events that stopped the clock
+-- column: is_cut BOOLEAN           The path goes on or has siblings beyond the limits of the query
+-- column: lost_reasons VARCHAR     Why roots were lost or superseded, with counts
+-- column: path VARCHAR [path]  Nodes and topics
+-- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, lost, superseded, p99_ns,
+--     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
+-- needs: lake.flow, lake.e2e_latency, lake.run_group
+WITH arrival AS MATERIALIZED (
+    SELECT
+        g.label_group, f.run, f.path, f.path_id, f.root_kind, f.root_id, f.latency_ns,
+        f.sink_event, f.status, f.reason, f.is_first, f.is_loss_affected,
+        CASE $case
+            WHEN 'first' THEN f.is_first
+            WHEN 'last' THEN f.is_last
+            WHEN 'newest' THEN f.is_newest
+            ELSE true
+        END AS is_counted
+    FROM flow AS f
+    JOIN run_group AS g ON f.run = g.run
+),
+completeness AS (
+    SELECT
+        label_group,
+        path,
+        count(*) AS roots,
+        count(*) FILTER (WHERE status = 'reached') AS reached,
+        count(*) FILTER (WHERE status = 'superseded') AS superseded,
+        count(*) FILTER (WHERE status = 'lost') AS lost,
+        count(*) FILTER (WHERE status = 'cut_by_recording') AS cut_by_recording
+    FROM arrival
+    WHERE is_first
+    GROUP BY label_group, path
+),
+affected AS (
+    SELECT label_group, path, count(*) AS number
+    FROM (
+        SELECT DISTINCT label_group, path, run, path_id, root_kind, root_id
+        FROM arrival
+        WHERE is_loss_affected
+    )
+    GROUP BY label_group, path
+),
+reason AS (
+    SELECT
+        label_group, path, string_agg(reason || ' ' || number, ', ' ORDER BY reason) AS lost_reasons
+    FROM (
+        SELECT label_group, path, reason, count(*) AS number
+        FROM arrival
+        WHERE is_first AND status IN ('lost', 'superseded')
+        GROUP BY label_group, path, reason
+    )
+    GROUP BY label_group, path
+),
+latency AS (
+    SELECT
+        label_group,
+        path,
+        count(*) AS pairs,
+        string_agg(DISTINCT sink_event, ', ' ORDER BY sink_event) AS sink_event,
+        min(latency_ns) AS min_ns,
+        quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
+        round(avg(latency_ns))::BIGINT AS mean_ns,
+        max(latency_ns) AS max_ns
+    FROM arrival
+    WHERE status = 'reached' AND is_counted
+    GROUP BY label_group, path
+),
+known AS (
+    SELECT
+        g.label_group,
+        e.path,
+        count(DISTINCT e.run) AS runs,
+        sum(e.looped)::BIGINT AS looped,
+        bool_or(e.is_cut) AS is_cut
+    FROM e2e_latency AS e
+    JOIN run_group AS g ON e.run = g.run
+    GROUP BY g.label_group, e.path
+)
+SELECT
+    k.label_group,
+    k.runs,
+    coalesce(c.roots, 0) AS roots,
+    coalesce(c.reached, 0) AS reached,
+    coalesce(c.superseded, 0) AS superseded,
+    coalesce(c.lost, 0) AS lost,
+    coalesce(c.cut_by_recording, 0) AS cut_by_recording,
+    coalesce(a.number, 0) AS loss_affected,
+    coalesce(l.pairs, 0) AS pairs,
+    k.looped,
+    l.min_ns,
+    l.quantiles[1] AS median_ns,
+    l.mean_ns,
+    l.quantiles[2] AS p95_ns,
+    l.quantiles[3] AS p99_ns,
+    l.max_ns,
+    l.sink_event,
+    k.is_cut,
+    r.lost_reasons,
+    k.path
+FROM known AS k
+LEFT JOIN completeness AS c ON k.label_group = c.label_group AND k.path = c.path
+LEFT JOIN affected AS a ON k.label_group = a.label_group AND k.path = a.path
+LEFT JOIN latency AS l ON k.label_group = l.label_group AND k.path = l.path
+LEFT JOIN reason AS r ON k.label_group = r.label_group AND k.path = r.path
+ORDER BY k.path, k.label_group

@@ -1,0 +1,41 @@
+-- name: fleet.executor_usage
+-- title: What executor threads spent their time on, of many runs
+-- description: As the query executor-usage says it of one run; threads of one process and kind of
+--     executor are put together. The callback share is the share of all their time.
+-- grain: one row per host, process, kind of executor and group of runs
+-- column: label_group BIGINT        Group of runs
+-- column: host VARCHAR [host]  Host
+-- column: process VARCHAR           Process name
+-- column: executor_kind VARCHAR     Kind of executor
+-- column: runs BIGINT               Runs that have it
+-- column: threads BIGINT            Threads of all these runs
+-- column: seen_ns BIGINT [ns]       Time for which threads were seen
+-- column: wait_ns BIGINT [ns]       Waiting for work
+-- column: process_ns BIGINT [ns]    Looking for what is ready
+-- column: execute_ns BIGINT [ns]    Executing, including taking messages
+-- column: callback_ns BIGINT [ns]   In callbacks with an end; nested time counts once
+-- column: callbacks BIGINT          Callbacks that began
+-- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
+-- column: callback_share_max DOUBLE [share] The same of the busiest thread of any run
+-- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, callbacks, host,
+--     execute_ns, wait_ns, seen_ns, executor_kind, process_ns
+-- needs: lake.executor_usage, lake.run_group
+SELECT
+    g.label_group,
+    u.host,
+    u.process,
+    u.executor_kind,
+    count(DISTINCT u.run) AS runs,
+    count(*) AS threads,
+    sum(u.seen_ns)::BIGINT AS seen_ns,
+    sum(u.wait_ns)::BIGINT AS wait_ns,
+    sum(u.process_ns)::BIGINT AS process_ns,
+    sum(u.execute_ns)::BIGINT AS execute_ns,
+    sum(u.callback_ns)::BIGINT AS callback_ns,
+    sum(u.callbacks)::BIGINT AS callbacks,
+    sum(u.callback_ns) / nullif(sum(u.seen_ns), 0)::DOUBLE AS callback_share,
+    max(u.callback_share) AS callback_share_max
+FROM executor_usage AS u
+JOIN run_group AS g ON u.run = g.run
+GROUP BY g.label_group, u.host, u.process, u.executor_kind
+ORDER BY u.host, u.process, u.executor_kind, g.label_group

@@ -1,0 +1,76 @@
+-- name: fleet.executor_wait
+-- title: How long callbacks waited, of many runs
+-- description: As the query executor-wait says it of one run. The median of several callbacks is off
+--     by less than 1 %, all else is exact.
+-- grain: one row per node, callback and group of runs
+-- column: label_group BIGINT        Group of runs
+-- column: node VARCHAR [node]  Node of the callback
+-- column: callback VARCHAR [callback]  What triggers it
+-- column: runs BIGINT               Runs that have it
+-- column: count BIGINT              Callback instances
+-- column: delayed_min BIGINT        Of these, certainly kept waiting: ready while others ran
+-- column: delayed_max BIGINT        Of these, possibly kept waiting
+-- column: wait_median_ns BIGINT [ns]  Median wait, where its start is known
+-- column: wait_max_ns BIGINT [ns]   Longest wait
+-- column: busy_worst_ns BIGINT [ns]   Longest time for which the executor can have been busy during
+--     one wait
+-- column: busy_total_min_ns BIGINT [ns]  Executor busy with others during all waits, at least
+-- column: busy_total_max_ns BIGINT [ns]  Executor busy with others during all waits, at most
+-- column: rest_total_min_ns BIGINT [ns]  Network, idle or overhead, where known, at least
+-- column: rest_total_max_ns BIGINT [ns]  Network, idle or overhead, where known, at most
+-- column: unknown BIGINT            Of these, with an unknown start of the wait
+-- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
+-- column: is_internal BOOLEAN       Infrastructure of ROS
+-- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, runs, count,
+--     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
+-- needs: lake.executor_wait, lake.run_group, fleet.distributed
+WITH merged AS (
+    SELECT
+        g.label_group,
+        w.node,
+        w.callback,
+        count(DISTINCT w.run) AS runs,
+        count(*) AS callbacks,
+        sum(w.count)::BIGINT AS count,
+        sum(w.delayed_min)::BIGINT AS delayed_min,
+        sum(w.delayed_max)::BIGINT AS delayed_max,
+        any_value(w.wait_median_ns) AS wait_median_ns,
+        max(w.wait_max_ns) AS wait_max_ns,
+        max(w.busy_worst_ns) AS busy_worst_ns,
+        sum(w.busy_total_min_ns)::BIGINT AS busy_total_min_ns,
+        sum(w.busy_total_max_ns)::BIGINT AS busy_total_max_ns,
+        sum(w.rest_total_min_ns)::BIGINT AS rest_total_min_ns,
+        sum(w.rest_total_max_ns)::BIGINT AS rest_total_max_ns,
+        sum(w.unknown)::BIGINT AS unknown,
+        sum(w.loss_affected)::BIGINT AS loss_affected,
+        bool_and(w.is_internal) AS is_internal
+    FROM executor_wait AS w
+    JOIN run_group AS g ON w.run = g.run
+    GROUP BY g.label_group, w.node, w.callback
+)
+SELECT
+    m.label_group,
+    m.node,
+    m.callback,
+    m.runs,
+    m.count,
+    m.delayed_min,
+    m.delayed_max,
+    CASE
+        WHEN m.callbacks = 1 THEN m.wait_median_ns
+        ELSE least(m.wait_max_ns, d.median_ns)
+    END AS wait_median_ns,
+    m.wait_max_ns,
+    m.busy_worst_ns,
+    m.busy_total_min_ns,
+    m.busy_total_max_ns,
+    m.rest_total_min_ns,
+    m.rest_total_max_ns,
+    m.unknown,
+    m.loss_affected,
+    m.is_internal
+FROM merged AS m
+LEFT JOIN distributed AS d
+    ON d.measure = 'callback_wait' AND m.label_group = d.label_group
+    AND m.node IS NOT DISTINCT FROM d.node AND m.callback IS NOT DISTINCT FROM d.subject
+ORDER BY m.busy_total_max_ns DESC, m.node, m.callback, m.label_group

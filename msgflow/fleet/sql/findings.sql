@@ -1,0 +1,35 @@
+-- name: fleet.findings
+-- title: What is wrong with recordings, and with how many
+-- description: What msgflow check says of one run, with cause and cure, and the run that has most of
+--     it.
+-- grain: one row per kind of finding and group of runs
+-- column: label_group BIGINT  Group of runs
+-- column: severity VARCHAR    'error' where results are wrong or missing, 'warning' where they may
+--     be
+-- column: name VARCHAR        Name of the finding
+-- column: title VARCHAR       What was found
+-- column: runs BIGINT         Runs in which it was
+-- column: places BIGINT       Traces, processes, topics where it was
+-- column: count BIGINT        How often, in all
+-- column: worst_run VARCHAR   Run with most of it
+-- column: subject VARCHAR     There: where
+-- column: cause VARCHAR       Where it comes from, as a rule
+-- column: cure VARCHAR        What to do about it
+-- brief: severity, title, runs, count, worst_run, subject, places, cure
+-- needs: lake.finding, lake.run_group
+SELECT
+    g.label_group,
+    f.severity,
+    f.name,
+    any_value(f.title) AS title,
+    count(DISTINCT f.run) AS runs,
+    count(*) AS places,
+    sum(f.count)::BIGINT AS count,
+    arg_max(f.run, (coalesce(f.count, 0), f.run, f.subject)) AS worst_run,
+    arg_max(f.subject, (coalesce(f.count, 0), f.run, f.subject)) AS subject,
+    any_value(f.cause) AS cause,
+    any_value(f.cure) AS cure
+FROM finding AS f
+JOIN run_group AS g ON f.run = g.run
+GROUP BY g.label_group, f.severity, f.name
+ORDER BY f.severity, runs DESC, f.name, g.label_group

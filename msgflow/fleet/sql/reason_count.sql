@@ -1,0 +1,38 @@
+-- name: fleet.reason_count
+-- title: Reasons of messages that were not taken, counted over runs
+-- description: Adds up what stands in the column reasons of delivery as 'reason 3, other 2'.
+-- grain: one row per group of runs, topic, receiving node and column
+-- kind: inline
+-- needs: lake.delivery, lake.run_group
+WITH told AS (
+    SELECT g.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
+    FROM delivery AS d
+    JOIN run_group AS g ON d.run = g.run
+    UNION ALL
+    SELECT g.label_group, d.topic_name, d.subscriber, 'orphan_reasons', d.orphan_reasons
+    FROM delivery AS d
+    JOIN run_group AS g ON d.run = g.run
+),
+part AS (
+    SELECT label_group, topic_name, subscriber, name, unnest(string_split(text, ', ')) AS text
+    FROM told
+),
+counted AS (
+    SELECT
+        label_group,
+        topic_name,
+        subscriber,
+        name,
+        regexp_extract(text, '^(.*) \d+$', 1) AS reason,
+        sum(regexp_extract(text, ' (\d+)$', 1)::BIGINT) AS number
+    FROM part
+    GROUP BY label_group, topic_name, subscriber, name, reason
+)
+SELECT
+    label_group,
+    topic_name,
+    subscriber,
+    name,
+    string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS text
+FROM counted
+GROUP BY label_group, topic_name, subscriber, name

@@ -1,0 +1,45 @@
+-- name: fleet.service_latency
+-- title: Latency of services by service and client, of many runs
+-- description: As the query service-latency says it of one run. Quantiles of runs cannot be added
+--     up: the largest of any run stands for them.
+-- grain: one row per service, client and group of runs
+-- column: label_group BIGINT          Group of runs
+-- column: service_name VARCHAR        Service
+-- column: server VARCHAR [node]  Node of the service; empty: not known
+-- column: client VARCHAR [node]  Node of the client; empty: not known
+-- column: runs BIGINT                 Runs that have it
+-- column: requests BIGINT             Requests sent or taken
+-- column: answered BIGINT             Requests whose response the client took
+-- column: not_taken BIGINT            Requests that no service was seen to take
+-- column: not_answered BIGINT         Requests that were taken, with no sign of a response
+-- column: not_received BIGINT         Requests whose response was sent, but not seen to be taken
+-- column: negative BIGINT             Requests or responses that were taken before they were sent
+-- column: round_trip_min_ns BIGINT [ns]     Shortest round trip
+-- column: round_trip_median_most_ns BIGINT [ns]  Largest median round trip
+-- column: round_trip_p99_most_ns BIGINT [ns]     Largest 99 % quantile of the round trips
+-- column: round_trip_max_ns BIGINT [ns]     Longest round trip
+-- column: is_internal BOOLEAN         ROS uses the service for itself
+-- brief: service_name, client, round_trip_median_most_ns, round_trip_p99_most_ns,
+--     round_trip_max_ns, runs, requests, answered, server, not_taken, not_answered, not_received
+-- needs: lake.service_latency, lake.run_group
+SELECT
+    g.label_group,
+    s.service_name,
+    s.server,
+    s.client,
+    count(DISTINCT s.run) AS runs,
+    sum(s.requests)::BIGINT AS requests,
+    sum(s.answered)::BIGINT AS answered,
+    sum(s.not_taken)::BIGINT AS not_taken,
+    sum(s.not_answered)::BIGINT AS not_answered,
+    sum(s.not_received)::BIGINT AS not_received,
+    sum(s.negative)::BIGINT AS negative,
+    min(s.round_trip_min_ns) AS round_trip_min_ns,
+    max(s.round_trip_median_ns) AS round_trip_median_most_ns,
+    max(s.round_trip_p99_ns) AS round_trip_p99_most_ns,
+    max(s.round_trip_max_ns) AS round_trip_max_ns,
+    bool_and(s.is_internal) AS is_internal
+FROM service_latency AS s
+JOIN run_group AS g ON s.run = g.run
+GROUP BY g.label_group, s.service_name, s.server, s.client
+ORDER BY s.service_name, s.server, s.client, g.label_group

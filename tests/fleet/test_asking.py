@@ -1,0 +1,273 @@
+"""Questions to many runs have the answers that all their rows together give."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import duckdb
+import pyarrow as pa
+import pytest
+from typer.testing import CliRunner, Result
+
+from msgflow import Database
+from msgflow.cli.app import app
+from msgflow.errors import QueryError, UsageError
+from msgflow.fleet.asking import fleet_query, fleet_sql, fleet_worst, names, statements
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.reading import Reading, choose
+from msgflow.query.catalogue import query_names
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["fleet", *map(str, arguments)])
+
+
+def rows(table: pa.Table, columns: list[str]) -> list[tuple[object, ...]]:
+    return sorted(zip(*(table[name].to_pylist() for name in columns), strict=True), key=repr)
+
+
+def test_headers_are_those_of_the_statements(night: Lake) -> None:
+    """And what they need is what they read."""
+    with Reading(choose(night)) as reading:
+        con = reading.connection
+        con.execute("CREATE TABLE run_group AS SELECT run, 1::BIGINT AS label_group FROM run")
+        for name in statements().names():
+            header = statements().header(name)
+            read = set(re.findall(r"(?:FROM|JOIN) ([a-z_0-9]+)", header.body))
+            needs = {need.partition(".")[2] for need in header.needs}
+            assert needs == read & (needs | {"run", "run_group"}), name
+            assert needs <= read
+            if header.kind == "inline":
+                continue
+            relation = statements().run(con, name, {"path": "x", "count": 1})
+            described = list(zip(relation.columns, map(str, relation.types), strict=True))
+            assert described == [(column.name, column.type) for column in header.columns], name
+
+
+def test_names_are_those_of_the_queries_of_one_run() -> None:
+    assert set(names()) - set(query_names()) == {"findings"}
+    for name in names():
+        assert f"`{name}`" in PAGE
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in names() if name not in ("findings", "data-quality")]
+)
+def test_one_run_is_what_its_database_says(
+    night: Lake, databases: tuple[Path, Path], name: str
+) -> None:
+    found = fleet_query(night, name, where="name = 'second'", internal=True)
+    assert found.notes == ["1 of 3 runs"]
+    with Database(databases[1]) as database:
+        expected = database.query(name, internal=True).to_arrow()
+    if name == "executor-usage":
+        assert sum(found.table["callback_ns"].to_pylist()) == sum(
+            expected["callback_ns"].to_pylist()
+        )
+        return
+    shared = [column for column in found.columns if column in expected.column_names]
+    assert len(shared) >= 3
+    assert rows(found.table, shared) == rows(expected, shared)
+
+
+def test_latencies_of_several_runs_are_those_of_all_their_flows(night: Lake) -> None:
+    for case, is_counted in (("first", "is_first"), ("every_pair", "true")):
+        found = fleet_query(night, "e2e-latency", case=case).table
+        expected = duckdb.sql(
+            "SELECT path, count(*), min(latency_ns), quantile_disc(latency_ns, 0.5), "
+            "round(avg(latency_ns))::BIGINT, quantile_disc(latency_ns, 0.95), "
+            "quantile_disc(latency_ns, 0.99), max(latency_ns) "
+            f"FROM read_parquet('{night.store.url}/flow/*/*.parquet') "
+            f"WHERE status = 'reached' AND {is_counted} GROUP BY path"
+        ).fetchall()
+        columns = ["path", "pairs", "min_ns", "median_ns", "mean_ns", "p95_ns", "p99_ns", "max_ns"]
+        assert rows(found, columns) == sorted(expected, key=repr)
+    # Half of the first run takes twice as long: no average of two medians is the median.
+    grouped = fleet_query(night, "e2e-latency", group_by=["software_version"]).table.to_pylist()
+    (path,) = {row["path"] for row in grouped if row["software_version"] == "1.1"}
+    of_path = {row["software_version"]: row for row in grouped if row["path"] == path}
+    assert of_path["1.1"]["median_ns"] == 2 * of_path["1.0"]["median_ns"]
+    assert {row["runs"] for row in of_path.values()} == {1}
+
+
+def test_times_of_several_runs_are_off_by_less_than_a_hundredth(night: Lake) -> None:
+    where = "name IN ('first', 'second')"
+    found = fleet_query(night, "callback-duration", where=where, internal=True)
+    assert "medians and other quantiles of several runs are off by less than 1 %" in found.notes
+    exact = fleet_sql(
+        night,
+        "SELECT l.node, l.label, count(*), quantile_disc(i.end_ns - i.start_ns, 0.5), "
+        "quantile_disc(i.end_ns - i.start_ns, 0.99), max(i.end_ns - i.start_ns), "
+        "sum(i.end_ns - i.start_ns)::BIGINT FROM view.callback_instance AS i "
+        "JOIN view.callback_label AS l USING (run, callback_id) GROUP BY ALL",
+        where=where,
+    ).table
+    expected = {(row[0], row[1]): row[2:] for row in zip(*exact.to_pydict().values(), strict=True)}
+    assert len(found) == len(expected) > 3
+    for row in found.table.to_pylist():
+        count, median, p99, longest, total = expected[row["node"], row["callback"]]
+        assert (row["count"], row["max_ns"], row["total_ns"]) == (count, longest, total)
+        assert row["median_ns"] == pytest.approx(median, rel=0.0101)
+        assert row["p99_ns"] == pytest.approx(p99, rel=0.0101)
+
+
+def test_quantiles_of_the_same_run_twice_are_its_own(night: Lake) -> None:
+    """All times of a run and its copy have the quantiles of the run, counts are doubled."""
+    for name, count, times in (
+        ("callback-duration", "count", ["period_median_ns", "median_ns", "p95_ns", "p99_ns"]),
+        ("executor-wait", "count", ["wait_median_ns"]),
+        ("transport-latency", "takes", ["median_ns", "p95_ns", "p99_ns"]),
+    ):
+        one, both = (
+            fleet_query(night, name, where=where, internal=True).table.to_pylist()
+            for where in ("name = 'first'", "robot = 'r1'")
+        )
+        assert len(one) == len(both) > 2
+        for alone, twice in zip(one, both, strict=True):
+            assert twice["runs"] == 2
+            assert twice[count] == 2 * alone[count]
+            assert [twice[time] for time in times] == pytest.approx(
+                [alone[time] for time in times], rel=0.0101
+            )
+
+
+def test_reasons_and_shares_are_of_sums(night: Lake) -> None:
+    one, both = (
+        fleet_query(night, "delivery", where=where, internal=True).table.to_pylist()
+        for where in ("name = 'first'", "robot = 'r1'")
+    )
+    assert any(row["reasons"] for row in one)
+    for alone, twice in zip(one, both, strict=True):
+        assert twice["delivered_percent"] == alone["delivered_percent"]
+        numbers = re.findall(r"\d+", alone["reasons"] or "")
+        assert re.findall(r"\d+", twice["reasons"] or "") == [str(2 * int(n)) for n in numbers]
+
+
+def test_groups_are_of_labels_and_of_columns(night: Lake) -> None:
+    found = fleet_query(night, "e2e-latency", group_by=["robot", "soft-ware", "name"])
+    assert found.columns[:4] == ("robot", "soft-ware", "name", "runs")
+    assert {row["soft-ware"] for row in found.table.to_pylist()} == {None, "a'b"}
+    assert {row["name"] for row in found.table.to_pylist()} == {"first", "second", "copy"}
+    # A column of the query has its name first.
+    assert "label_run" not in fleet_query(night, "delivery", group_by=["run"]).columns
+    assert fleet_query(night, "findings", group_by=["name"]).columns[0] == "label_name"
+    with pytest.raises(UsageError, match=r"(?s)such a label — robo.*did you mean robot"):
+        fleet_query(night, "e2e-latency", group_by=["robo"])
+
+
+def test_rows_are_chosen(night: Lake) -> None:
+    whole = fleet_query(night, "callback-duration")
+    node = whole.table["node"][0].as_py()
+    some = fleet_query(
+        night, "callback-duration", selection={"node": node, "sort": "max_ns:desc", "limit": 1}
+    )
+    assert some.table["node"].to_pylist() == [node]
+    assert "is_internal" not in some.columns
+    with pytest.raises(UsageError, match="no such parameter — case"):
+        fleet_query(night, "delivery", case="last")
+    with pytest.raises(UsageError, match="no such value — best"):
+        fleet_query(night, "e2e-latency", case="best")
+
+
+def test_what_a_lake_cannot_answer(night: Lake) -> None:
+    for name, words in (
+        ("flows", r"does not hold what this query needs — flows\n\nhint: it answers callback-"),
+        ("e2e", "no such query — e2e\n\nhint: did you mean e2e-latency"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            fleet_query(night, name)
+    result = run("query", "flows", "--lake", night.store.url)
+    assert result.exit_code == 2
+    assert "a lake does not hold what this query needs" in result.stderr
+    listed = run("query").stdout
+    assert all(name in listed for name in names())
+    result = CliRunner().invoke(app, ["fleet", "query", "delivery"], env={"MSGFLOW_LAKE": ""})
+    assert result.exit_code == 2
+    assert "no lake is named" in result.stderr
+
+
+def test_sql_reads_the_chosen_runs_and_nothing_else(night: Lake, tmp_path: Path) -> None:
+    found = fleet_sql(
+        night,
+        "SELECT labels['robot'] AS robot, count(DISTINCT run) AS runs "
+        "FROM flow JOIN run USING (run) GROUP BY ALL ORDER BY ALL",
+    )
+    assert found.table.to_pylist() == [{"robot": "r1", "runs": 2}, {"robot": "r2", "runs": 1}]
+    chosen = fleet_sql(night, "SELECT count(*) AS n FROM run", where="robot = 'r1'")
+    assert chosen.table["n"].to_pylist() == [2]
+    tables = fleet_sql(night, "SHOW ALL TABLES").table
+    assert {"flow", "publication", "run"} <= set(tables["name"].to_pylist())
+    capped = fleet_sql(night, "FROM view.topic", limit=1)
+    assert (len(capped), len(capped.notes)) == (1, 1)
+    target = tmp_path / "x.csv"
+    for text in (
+        f"COPY run TO '{target}'",
+        "FROM read_parquet('/etc/passwd')",
+        "CREATE TABLE x AS FROM run",
+        "SET threads = 1",
+        "DROP VIEW flow",
+        "ATTACH ':memory:' AS x",
+        "FROM 'x.parquet'",
+        "SELECT getenv('HOME')",
+        "SELECT nothing FROM run",
+        "FROM no_table",
+    ):
+        with pytest.raises(QueryError):
+            fleet_sql(night, text)
+    assert not target.exists()
+    with pytest.raises(UsageError, match="no SQL to run"):
+        fleet_sql(night, " -- nothing")
+    result = run("sql", "SELECT count(*) AS n FROM run", "--lake", night.store.url, "--format=csv")
+    assert result.stdout.split() == ['"n"', "3"]
+
+
+def test_the_worst_flows_come_with_what_opens_them(night: Lake) -> None:
+    flows = fleet_sql(
+        night,
+        "SELECT run, latency_ns FROM flow WHERE is_first AND status = 'reached' AND path = "
+        "(SELECT min(path) FROM flow WHERE run = repeat('c', 20)) ORDER BY latency_ns DESC LIMIT 5",
+        where="robot = 'r1'",
+    ).table
+    (path,) = (
+        fleet_sql(night, "SELECT min(path) AS path FROM flow WHERE run = repeat('c', 20)")
+        .table["path"]
+        .to_pylist()
+    )
+    found = fleet_worst(night, path, where="robot = 'r1'", limit=5)
+    assert found.table["latency_ns"].to_pylist() == flows["latency_ns"].to_pylist()
+    assert found.table["name"][0].as_py() == "copy"
+    assert found.table["labels"][0].as_py() == ["robot=r1", "software_version=1.1"]
+    # Its database is not in the lake.
+    assert found.table["command"][0].as_py() is None
+    assert found.notes == ["runs without a command were written with --no-database"]
+    first = fleet_worst(night, path.split(" ")[2], where="name = 'first'", limit=1)
+    (row,) = first.table.to_pylist()
+    kind = row["root_kind"].replace("_", "-")
+    assert row["command"] == (
+        f"msgflow fleet open {row['run']} --lake {night.store.url} && "
+        f"msgflow flow --db {row['run']}.duckdb --{kind} {row['root_id']}"
+    )
+    with pytest.raises(UsageError, match=r"no flow of these runs .* — /nowhere"):
+        fleet_worst(night, "/nowhere")
+    result = run(
+        "worst", path, "--lake", night.store.url, "--where", "name = 'copy'", "--format", "json"
+    )
+    assert '"name": "copy"' in result.stdout or '"name":"copy"' in result.stdout
+
+
+def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) -> None:
+    lake = Lake.open_or_create(tmp_path / "lake")
+    row = night.runs().to_pylist()[0]
+    lake.commit([row | {"labels": dict(row["labels"] or ())}])
+    with pytest.raises(UsageError, match="an earlier msgflow wrote them — delivery"):
+        fleet_query(lake, "delivery")
+
+
+def test_columns_of_headers_have_meanings() -> None:
+    for name in statements().names():
+        header = statements().header(name)
+        assert all(dataclasses.astuple(column)[3] for column in header.columns), name
