@@ -8,15 +8,35 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 
 from msgflow.db.objects import definition_hash, head_revision
 from msgflow.version import __version__
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 _MOST_OF_A_KIND = 8
+
+
+def made_once(kind: str, made_by: str, make: Callable[[], Any]) -> Any:
+    """Return what was kept, as JSON, or make it and keep it.
+
+    Args:
+        kind: what it is.
+        made_by: what else it depends on.
+        make: what makes it where it is not kept.
+    """
+    content = read(kind, made_by)
+    if content is None:
+        content = json.dumps(make()).encode()
+        keep(kind, made_by, content)
+    return json.loads(content)
 
 
 def read(kind: str, made_by: str) -> bytes | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db import cache as kept
+from msgflow.db import cache as cache_of_user
 from msgflow.db import objects
 from msgflow.db.diagnostic import diagnostics, text
 from msgflow.sql import emptiness
@@ -96,13 +95,9 @@ def _kept(headers: tuple[Header, ...]) -> dict[str, Condition]:
     made_by = objects.hash_of(
         [Path(emptiness.__file__).read_text(encoding="utf-8"), *(header.body for header in headers)]
     )
-    content = kept.read(_KIND, made_by)
-    if content is None:
-        if not kept.is_usable():
-            return {}
-        content = json.dumps(_conditions(headers)).encode()
-        kept.keep(_KIND, made_by, content)
-    found: dict[str, Condition] = json.loads(content)
+    found: dict[str, Condition] = cache_of_user.made_once(
+        _KIND, made_by, lambda: _conditions(headers) if cache_of_user.is_usable() else {}
+    )
     return found
 
 

@@ -7,7 +7,6 @@ they are compared with those of a new file, which are kept in the user's cache.
 
 from __future__ import annotations
 
-import json
 import shlex
 import tempfile
 from functools import cache
@@ -104,17 +103,13 @@ def require_ours(con: duckdb.DuckDBPyConnection, path: Path, *, only_tables: boo
 
 def remember(con: duckdb.DuckDBPyConnection) -> None:
     """Keep the definitions of a database that this process has just made, and opened again."""
-    if _cached() is None:
-        _keep(rendered(con))
+    cache_of_user.made_once(_KIND, _RENDERED, lambda: rendered(con))
 
 
 @cache
 def expected() -> Mapping[str, str]:
     """Return the definitions that a database of this msgflow has."""
-    found = _cached()
-    if found is None:
-        found = _made()
-        _keep(found)
+    found: Definitions = cache_of_user.made_once(_KIND, _RENDERED, _made)
     return found
 
 
@@ -124,12 +119,3 @@ def _made() -> Definitions:
         write_new(path)
         with duckdb.connect(str(path), read_only=True) as con:
             return rendered(con)
-
-
-def _cached() -> Definitions | None:
-    content = cache_of_user.read(_KIND, _RENDERED)
-    return None if content is None else dict(json.loads(content))
-
-
-def _keep(definitions: Definitions) -> None:
-    cache_of_user.keep(_KIND, _RENDERED, json.dumps(definitions).encode())

@@ -108,9 +108,7 @@ def run_schema() -> pa.Schema:
         ("worker", pa.string(), "Machine that did it"),
         ("committed_ns", pa.int64(), "When this row was written [epoch ns]"),
     ]
-    return pa.schema(
-        [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
-    )
+    return _schema(columns)
 
 
 @cache
@@ -131,6 +129,12 @@ def failure_schema() -> pa.Schema:
         ("msgflow_version", pa.string(), "Version of msgflow that tried"),
         ("failed_ns", pa.int64(), "When the last try failed [epoch ns]"),
     ]
+    return _schema(columns)
+
+
+def _schema(columns: list[tuple[str, pa.DataType, str]]) -> pa.Schema:
+    import pyarrow as pa
+
     return pa.schema(
         [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
     )

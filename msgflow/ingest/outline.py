@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db import cache as kept
+from msgflow.db import cache as cache_of_user
 from msgflow.db import objects
 from msgflow.ingest import staging
 
@@ -36,11 +35,7 @@ def empty_tables() -> Mapping[str, str]:
     """
     headers = objects.load("model")
     made_by = objects.hash_of([*staging.statements(), *map(creating, headers)])
-    content = kept.read(_KIND, made_by)
-    if content is None:
-        content = json.dumps(_empty_tables(headers)).encode()
-        kept.keep(_KIND, made_by, content)
-    found: dict[str, str] = json.loads(content)
+    found: dict[str, str] = cache_of_user.made_once(_KIND, made_by, lambda: _empty_tables(headers))
     return found
 
 

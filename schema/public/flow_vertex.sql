@@ -94,8 +94,7 @@ WHERE v.kind = 'callback_instance'
 UNION ALL
 SELECT
     v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
-    coalesce(q.sender_thread_id, q.receiver_thread_id),
-    h.process_id,
+    q.thread_id, h.process_id,
     CASE WHEN c.client_id IS NULL THEN '?'
         ELSE derive.node_label(n.full_name, o.name, o.pid) END,
     coalesce(c.service_name, s.service_name, '?'),
@@ -104,40 +103,31 @@ SELECT
     CASE
         WHEN q.sent_ns IS NULL THEN 'sending'
         WHEN q.taken_ns IS NULL THEN 'take'
-        WHEN q.callback_instance_id IS NULL THEN 'callback'
-        WHEN r.request_id IS NULL THEN 'response'
+        ELSE q.missing
     END,
     NULL
 FROM query_table(vertices) AS v
-JOIN main.request AS q ON v.id = q.request_id
-JOIN store.thread AS h ON coalesce(q.sender_thread_id, q.receiver_thread_id) = h.thread_id
+JOIN (
+    -- A message of a service is told on the thread of the client, where it is known.
+    SELECT
+        'request' AS kind, q.request_id AS id, q.run_id, q.sent_ns, q.taken_ns,
+        coalesce(q.sender_thread_id, q.receiver_thread_id) AS thread_id,
+        q.client_id, q.service_id,
+        CASE
+            WHEN q.callback_instance_id IS NULL THEN 'callback'
+            WHEN r.request_id IS NULL THEN 'response'
+        END AS missing
+    FROM main.request AS q
+    LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
+        ON q.request_id = r.request_id
+    UNION ALL
+    SELECT
+        'response', response_id, run_id, sent_ns, taken_ns,
+        coalesce(receiver_thread_id, sender_thread_id), client_id, service_id, NULL
+    FROM main.response
+) AS q ON v.kind = q.kind AND v.id = q.id
+JOIN store.thread AS h ON q.thread_id = h.thread_id
 LEFT JOIN store.client AS c ON q.client_id = c.client_id
 LEFT JOIN store.service AS s ON q.service_id = s.service_id
 LEFT JOIN store.process AS o ON c.process_id = o.process_id
 LEFT JOIN store.node AS n ON c.node_id = n.node_id
-LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
-    ON q.request_id = r.request_id
-WHERE v.kind = 'request'
-UNION ALL
-SELECT
-    v.key, v.kind, v.id, v.depth, r.run_id, coalesce(r.sent_ns, r.taken_ns), r.taken_ns,
-    coalesce(r.receiver_thread_id, r.sender_thread_id),
-    h.process_id,
-    CASE WHEN c.client_id IS NULL THEN '?'
-        ELSE derive.node_label(n.full_name, o.name, o.pid) END,
-    coalesce(c.service_name, s.service_name, '?'),
-    NULL,
-    NULL,
-    CASE
-        WHEN r.sent_ns IS NULL THEN 'sending'
-        WHEN r.taken_ns IS NULL THEN 'take'
-    END,
-    NULL
-FROM query_table(vertices) AS v
-JOIN main.response AS r ON v.id = r.response_id
-JOIN store.thread AS h ON coalesce(r.receiver_thread_id, r.sender_thread_id) = h.thread_id
-LEFT JOIN store.client AS c ON r.client_id = c.client_id
-LEFT JOIN store.service AS s ON r.service_id = s.service_id
-LEFT JOIN store.process AS o ON c.process_id = o.process_id
-LEFT JOIN store.node AS n ON c.node_id = n.node_id
-WHERE v.kind = 'response'
