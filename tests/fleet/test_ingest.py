@@ -26,7 +26,7 @@ from msgflow.fleet.compact import compact
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.ingest import Options, fleet_ingest
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.task import Outcome, Task, needs, without_secrets
+from msgflow.fleet.task import PASSING, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
@@ -270,6 +270,20 @@ def test_a_source_that_changes_while_it_is_read(
     assert (changed.reason, changed.stage) == ("changed", "looking at the source again")
 
 
+def test_a_disk_that_fills_is_said(
+    task: Task, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(*_: object, **__: object) -> None:
+        raise duckdb.IOException("Could not write file: No space left on device")
+
+    before = Lake.open(task.lake).rows()
+    monkeypatch.setattr(Database, "ingest", fill)
+    full = child.do(task, tmp_path)
+    assert (full.reason, full.stage, full.values) == ("no_space", "ingesting", None)
+    assert full.reason in PASSING
+    assert Lake.open(task.lake).rows().equals(before)
+
+
 class Fake(OneProcess):
     """Does no work, but says what came of it."""
 
@@ -353,6 +367,22 @@ def test_a_lake_that_cannot_be_written(filled: Filled, tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(DatabaseError, match="cannot write to the store: Permission denied"):
         fleet_ingest([str(filled.recordings / "r0")], tmp_path / "lake")
+
+
+def test_a_lake_where_nobody_may_write(filled: Filled) -> None:
+    """Not even root: the kernel makes no folders there."""
+    source = filled.recordings / "r0"
+    result = run("ingest", source, "--lake", "/proc/lake")
+    assert result.exit_code == 4
+    assert "cannot write to the store" in result.stderr
+
+
+def test_a_lake_that_cannot_be_reached(filled: Filled, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    monkeypatch.setattr("msgflow.fleet.store._MOST_ATTEMPTS", 1)
+    result = run("ingest", filled.recordings / "r0", "--lake", "s3://fleet/lake")
+    assert result.exit_code == 4
+    assert "cannot read the store" in result.stderr
 
 
 def test_secrets_are_in_no_text(monkeypatch: pytest.MonkeyPatch) -> None:
