@@ -135,3 +135,12 @@ LakeWhereOption = Annotated[
         rich_help_panel=SELECTION,
     ),
 ]
+# MSGFLOW_LAKE does not count here: these commands are of a database first.
+LakePageOption = Annotated[
+    str | None,
+    typer.Option(
+        "--lake",
+        metavar="PATH|s3://BUCKET/PREFIX",
+        help="A lake, in place of a database: paths of its runs by label over time",
+    ),
+]

@@ -8,7 +8,17 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import OUTPUT, SELECTION, DatabaseOption, EndOption, RunOption, StartOption
+from msgflow.cli.options import (
+    OUTPUT,
+    SELECTION,
+    DatabaseOption,
+    EndOption,
+    LakePageOption,
+    LakeWhereOption,
+    RunOption,
+    StartOption,
+)
+from msgflow.cli.ui import require_no_where
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 
@@ -59,15 +69,34 @@ def command(
             rich_help_panel=OUTPUT,
         ),
     ] = "20MB",
+    lake: LakePageOption = None,
+    where: LakeWhereOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Write the pages of a run to one file that any browser opens, without a server."""
-    from msgflow.cli.output import print_note, print_runs, print_status
+    """Write the pages of a run to one file that any browser opens, without a server.
+
+    With --lake: a page of the paths of all its runs by label over time, outliers, failures.
+    """
+    from msgflow.cli.output import count, print_note, print_runs, print_status
     from msgflow.database import Database
 
     if output.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"a report is a page: its name ends with .html — {output}", "-o FILE.html")
     size = read_size(max_size)
+    if lake is not None:
+        if not run is compare is start is end is path is None:
+            raise UsageError(
+                "the page of a lake is of all its runs", "--where chooses some of them"
+            )
+        from msgflow.fleet.lake import Lake
+        from msgflow.fleet.page import write_lake_page
+
+        page = write_lake_page(Lake.open(lake), output, where=where, max_size=size)
+        for note in page.notes:
+            print_note(note)
+        print_status(f"{count(page.runs, 'run')} of {lake} in {output}: open it in a browser")
+        return
+    require_no_where(where)
     with Database(database) as opened:
         report = opened.report(
             output, run=run, compare=compare, start=start, end=end, path_text=path, max_size=size

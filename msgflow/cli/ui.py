@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption
+from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption
 from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.errors import UsageError
 
 
 def command(
@@ -34,9 +35,13 @@ def command(
             show_default="250MB, more while a query needs it",
         ),
     ] = None,
+    lake: LakePageOption = None,
+    where: LakeWhereOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Show the database in the browser: timeline, paths, graph, executors, comparison.
+
+    With --lake: paths of all runs of a lake by label over time, outliers, failures.
 
     The printed address contains a token; without it, nothing is shown. The
     server answers this machine only: from another one, open the same address
@@ -44,14 +49,38 @@ def command(
     database, but not write to it.
     """
     from msgflow.cli.output import print_note, print_status
-    from msgflow.view.server import serve
+    from msgflow.view.server import serve, serve_single
 
     def started(address: str) -> None:
         print_status(f"{address}\nCtrl-C ends it")
         if browser and not _open(address):
             print_note("no browser could be opened here: open the address yourself")
 
-    serve(database, port=port, memory_limit=memory_limit, started=started)
+    if lake is None:
+        require_no_where(where)
+        serve(database, port=port, memory_limit=memory_limit, started=started)
+        return
+    from msgflow.fleet.lake import Lake
+    from msgflow.fleet.page import lake_page
+
+    opened = Lake.open(lake)
+    # Once before anybody looks: what cannot be shown is said here.
+    first = [lake_page(opened, where=where).content]
+    serve_single(
+        lambda: first.pop() if first else lake_page(opened, where=where).content,
+        port=port,
+        started=started,
+    )
+
+
+def require_no_where(where: str | None) -> None:
+    """Raise where runs of a lake are chosen, and there is no lake.
+
+    Raises:
+        UsageError: they are.
+    """
+    if where is not None:
+        raise UsageError("--where chooses runs of a lake", "--lake PATH")
 
 
 def _open(address: str) -> bool:

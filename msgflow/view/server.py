@@ -57,6 +57,7 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
     " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+_POLICY_OF_FILES = "frame-ancestors 'none'"
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 _HEADERS = {
     "Content-Security-Policy": _POLICY,
@@ -303,6 +304,48 @@ def application(shared: Shared, token: str) -> ASGIApp:
     return Guard(app, token)
 
 
+def single_application(make: Callable[[], str], token: str) -> ASGIApp:
+    """Return the application of one page with its data inside, made anew whenever it is loaded.
+
+    Args:
+        make: returns the page, which names its scripts in a policy of its own.
+        token: of the printed address.
+    """
+
+    async def page(request: Request) -> Response:
+        try:
+            content = await anyio.to_thread.run_sync(make)
+        except MsgflowError as error:
+            hint = f"\n\nhint: {error.hint}" if error.hint else ""
+            return PlainTextResponse(f"error: {error.message}{hint}\n", status_code=500)
+        return Response(content, media_type="text/html")
+
+    return Guard(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES)
+
+
+def serve_single(
+    make: Callable[[], str],
+    *,
+    port: int | None = None,
+    started: Callable[[str], None] = lambda address: None,
+) -> None:
+    """Serve one page with its data inside until Ctrl-C.
+
+    Args:
+        make: returns the page; called whenever it is loaded.
+        port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
+        started: called with the address, which has the token, once it can be opened.
+
+    Raises:
+        UsageError: the port is in use.
+    """
+    with listening(port, lambda token: single_application(make, token)) as (
+        server, listener, address,
+    ):  # fmt: skip
+        server.started_with = lambda: started(address)
+        server.run(sockets=[listener])
+
+
 async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLimiter) -> Response:
     """Return the answer; interrupt the query when nobody waits for it any more."""
     name = request.path_params["name"]
@@ -354,9 +397,10 @@ def _head() -> str:
 class Guard:
     """Lets only those through who know the token, come from our own page, and mean this machine."""
 
-    def __init__(self, app: ASGIApp, token: str) -> None:
+    def __init__(self, app: ASGIApp, token: str, policy: str = _POLICY) -> None:
         self._app = app
         self._token = token
+        self._headers = _HEADERS | {"Content-Security-Policy": policy}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, refuse, or pass on."""
@@ -373,7 +417,7 @@ class Guard:
 
         async def send_with_headers(message: Any) -> None:
             if message["type"] == "http.response.start":
-                known = [(k.lower().encode(), v.encode()) for k, v in _HEADERS.items()]
+                known = [(k.lower().encode(), v.encode()) for k, v in self._headers.items()]
                 message["headers"] = [*message["headers"], *known]
             await send(message)
 
@@ -495,17 +539,26 @@ def running(
     """Prepare a server; see `serve`."""
     shared = Shared(path, memory_limit)
     try:
-        listener = listen(port)
-        token = secrets.token_urlsafe(24)
-        address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
-        config = uvicorn.Config(
-            application(shared, token), log_level="error", access_log=False, lifespan="off",
-            timeout_graceful_shutdown=1, ws="none", server_header=False,
-        )  # fmt: skip
-        with listener:
-            yield _Server(config), listener, address
+        with listening(port, lambda token: application(shared, token)) as server:
+            yield server
     finally:
         shared.close()
+
+
+@contextmanager
+def listening(
+    port: int | None, make: Callable[[str], ASGIApp]
+) -> Iterator[tuple[_Server, socket.socket, str]]:
+    """Prepare a server of the application that `make` returns for a token."""
+    listener = listen(port)
+    token = secrets.token_urlsafe(24)
+    address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
+    config = uvicorn.Config(
+        make(token), log_level="error", access_log=False, lifespan="off",
+        timeout_graceful_shutdown=1, ws="none", server_header=False,
+    )  # fmt: skip
+    with listener:
+        yield _Server(config), listener, address
 
 
 class _Server(uvicorn.Server):

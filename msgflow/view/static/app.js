@@ -11,6 +11,7 @@ import { TimelinePage } from "./timeline.js";
 import { GraphPage } from "./graph.js";
 import { ExecutorsPage } from "./executors.js";
 import { ComparePage } from "./compare.js";
+import { LakePage } from "./lake.js";
 import { failed, waiting } from "./notice.js";
 
 const PAGES = {
@@ -20,7 +21,10 @@ const PAGES = {
   graph: ["Graph", GraphPage],
   executors: ["Executors", ExecutorsPage],
   compare: ["Compare", ComparePage],
+  lake: ["Lake", LakePage],
 };
+// Of a lake, which is no database.
+const OTHER_PAGES = ["lake"];
 
 class App {
   constructor(source) {
@@ -31,7 +35,7 @@ class App {
   async start() {
     const runs = await this.source.fetch("run");
     this.runs = records(runs);
-    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => !this.source.pages || this.source.pages.includes(page)));
+    this.pages = Object.fromEntries(Object.entries(PAGES).filter(([page]) => (this.source.pages ? this.source.pages.includes(page) : !OTHER_PAGES.includes(page))));
     if (!location.hash && this.source.address) history.replaceState(null, "", this.source.address);
     this.main = document.querySelector("main");
     this.nav = document.querySelector("nav");

@@ -6,7 +6,8 @@ import { duration } from "./words.js";
 const drawn = new Set();
 
 // Series: {label, color, values, width, points, fill, paths, stepped}; x: numbers.
-// Options: height, xFormat, yFormat, title, onClick(index), xLabel, yLabel.
+// Options: height, xFormat, yFormat, title, onClick(index), xLabel, yLabel, legend (false: none),
+// xAxis (more of what uPlot takes for the axis).
 export function chart(x, series, options = {}) {
   const frame = h("div", { className: "chart", role: "img", "aria-label": options.title ?? "chart" });
   const place = { frame, plot: null };
@@ -14,16 +15,16 @@ export function chart(x, series, options = {}) {
     place.plot?.destroy();
     frame.replaceChildren();
     const width = Math.max(frame.clientWidth || frame.parentElement?.clientWidth || 600, 240);
-    const axis = (format, label, size) => ({
+    const axis = (format, label, size, more) => ({
       stroke: color("soft"), grid: { stroke: color("line"), width: 1 }, ticks: { stroke: color("line") },
       values: (_, splits) => splits.map((value) => format(value)), label, labelSize: label ? 22 : 0, labelFont: "12px system-ui, sans-serif",
-      font: "11px system-ui, sans-serif", size,
+      font: "11px system-ui, sans-serif", size, ...more,
     });
     place.plot = new globalThis.uPlot({
-      width, height: options.height ?? 240, legend: { show: series.length > 1, live: false },
+      width, height: options.height ?? 240, legend: { show: options.legend ?? series.length > 1, live: false },
       cursor: { points: { show: Boolean(options.onClick) }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(0, low ?? 0), (high ?? 1) * 1.05 || 1] } },
-      axes: [axis(options.xFormat ?? String, options.xLabel, 44), axis(options.yFormat ?? duration, options.yLabel, 74)],
+      axes: [axis(options.xFormat ?? String, options.xLabel, 44, options.xAxis), axis(options.yFormat ?? duration, options.yLabel, 74)],
       series: [{}, ...series.map((one) => ({
         label: one.label, stroke: color(one.color), width: one.width ?? 1.5, spanGaps: false,
         fill: one.fill ? alpha(color(one.color), 0.35) : undefined,

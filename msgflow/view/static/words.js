@@ -30,6 +30,7 @@ const TITLES = {
   busy_worst_ns: "busy, longest", busy_total_min_ns: "busy in all, at least", busy_total_max_ns: "busy in all, at most",
   meanwhile_node: "kept waiting by", meanwhile_callback: "its callback", overlap_min_ns: "ran meanwhile, at least",
   overlap_max_ns: "ran meanwhile, at most", worst_ns: "longest", a_share: "share in A", b_share: "share in B",
+  usual_ns: "usual median", at_ns: "begin in the run", value: "value", to_open_it: "opens with", worst_run: "run with most", cure: "what to do",
 };
 
 // Parts of a latency, as path-breakdown names them.

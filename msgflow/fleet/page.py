@@ -1,0 +1,161 @@
+"""The page of a lake: paths by label over time, runs that stand out, slowest flows, failures."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from msgflow.atomic import replacing
+from msgflow.errors import UsageError
+from msgflow.fleet.asking import fleet_query, statements
+from msgflow.fleet.listing import list_failures
+from msgflow.fleet.reading import Reading, choose, lake_errors
+from msgflow.view.columns import encode
+from msgflow.view.single_page import Parts, single_page
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pyarrow as pa
+
+    from msgflow.fleet.lake import Lake
+    from msgflow.query.result import QueryResult
+
+# Labels that the page has a table for; each takes a query over all flows.
+MOST_LABELS = 8
+_STATEMENTS = ("page_run", "page_point", "page_outlier", "page_worst")
+_LATENCY, _FINDINGS = "e2e-latency", "findings"
+
+
+@dataclass(frozen=True)
+class LakePage:
+    """The page of a lake.
+
+    Attributes:
+        content: what a browser opens.
+        runs: how many runs it shows.
+        notes: what it leaves out, a sentence each.
+    """
+
+    content: str
+    runs: int
+    notes: tuple[str, ...]
+
+
+def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
+    """Return the page of the runs of a lake, with its data inside.
+
+    Args:
+        lake: the lake.
+        where: a condition on runs and their labels, see `choose`; all runs when None.
+
+    Raises:
+        UsageError: a label that there is not, or no run fits.
+        DatabaseError: the lake cannot be read.
+        QueryError: the lake could not be asked.
+    """
+    choice = choose(lake, where)
+    notes = []
+    if len(choice.runs) < choice.total:
+        notes.append(f"{len(choice.runs):,} of {choice.total:,} runs: {where}")
+    parts = Parts()
+    option = f"--lake {shlex.quote(lake.store.url)}"
+    option += f" --where {shlex.quote(where)}" if where else ""
+    with Reading(choice, ["flow"]) as reading, lake_errors(lake, is_query=True):
+        tables = {
+            name: statements().run(reading.connection, name, {"count": 10}).to_arrow_table()
+            for name in _STATEMENTS
+        }
+    for name, table in tables.items():
+        header = statements().header(name)
+        units = {column.name: column.unit for column in header.columns if column.unit}
+        meta = {"columns": {column.name: column.description for column in header.columns}}
+        parts.add(f"{name}?", encode(table, units=units, meta=meta))
+    result = fleet_query(lake, _LATENCY, where=where)
+    command = f"msgflow fleet query {_LATENCY} {option}"
+    parts.add("page_path?", _encoded(result, command))
+    used = {key for pairs in choice.runs["labels"].to_pylist() for key, _ in pairs or ()}
+    labels = sorted(used)[:MOST_LABELS]
+    if len(used) > len(labels):
+        notes.append(f"tables of {MOST_LABELS} of {len(used)} labels: {', '.join(labels)}")
+    for label in labels:
+        result = fleet_query(lake, _LATENCY, where=where, group_by=[label])
+        column = result.columns[0]
+        table = result.table.rename_columns(["value", *result.columns[1:]])
+        parts.add(
+            f"page_group?label={label}",
+            encode(
+                table,
+                units=result.units,
+                meta={"command": f"{command} --group-by {shlex.quote(column)}"},
+            ),
+        )
+    result = fleet_query(lake, _FINDINGS, where=where)
+    parts.add("page_finding?", _encoded(result, f"msgflow fleet query {_FINDINGS} {option}"))
+    failures = list_failures(lake).table
+    failed = f"msgflow fleet failures --lake {shlex.quote(lake.store.url)}"
+    parts.add("page_failure?", encode(_with_time(failures), meta={"command": failed}))
+    parts.add("run", encode(_frame(lake, tables["page_run"])))
+    head: dict[str, Any] = {
+        "notes": notes,
+        "pages": ["lake"],
+        "address": "#/lake",
+        "lake": lake.store.url,
+        "open": f"--lake {shlex.quote(lake.store.url)}",
+        "labels": labels,
+    }
+    return LakePage(single_page(parts, head), len(choice.runs), tuple(notes))
+
+
+def write_lake_page(lake: Lake, path: Path, *, where: str | None = None, max_size: int) -> LakePage:
+    """Write the page of a lake into one file that any browser opens.
+
+    Args:
+        lake: the lake.
+        path: the file; one that exists is replaced.
+        where: a condition on runs and their labels, see `choose`; all runs when None.
+        max_size: most bytes of the file.
+
+    Raises:
+        UsageError: a label that there is not, no run fits, or the page is too large.
+        DatabaseError: the lake cannot be read.
+    """
+    page = lake_page(lake, where=where)
+    content = page.content.encode()
+    if len(content) > max_size:
+        raise UsageError(
+            f"the page takes {len(content):,} bytes, more than {max_size:,}",
+            "give a larger --max-size, or choose runs with --where",
+        )
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+    return page
+
+
+def _encoded(result: QueryResult, command: str) -> bytes:
+    described = (
+        {column.name: column.description for column in result.header.columns}
+        if (result.header)
+        else {}
+    )
+    return encode(result.table, units=result.units, meta={"command": command, "columns": described})
+
+
+def _with_time(failures: pa.Table) -> pa.Table:
+    """Return failures with the time of the last try as people read it."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    moments = pc.cast(failures["failed_ns"], pa.timestamp("ns"))
+    texts = pc.strftime(pc.cast(moments, pa.timestamp("s"), safe=False), "%Y-%m-%d %H:%M:%S")
+    names = ["source", "reason", "error", "hint", "labels", "stage", "tries", "worker"]
+    return failures.select(names).add_column(1, "failed", texts)
+
+
+def _frame(lake: Lake, runs: pa.Table) -> pa.Table:
+    """Return the one row that all pages are about: here, the lake."""
+    import pyarrow as pa
+
+    name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url
+    return pa.table({"run_id": [0], "name": [name], "start_text": ["0"], "runs": [len(runs)]})

@@ -1,0 +1,27 @@
+-- name: fleet.page_point
+-- title: Latencies of every path, run by run
+-- description: Quantiles of the first arrivals of each run, and how many flows began and were lost.
+-- grain: one row per path and run
+-- column: path VARCHAR [path]     Nodes and topics
+-- column: run VARCHAR             Key of the run
+-- column: median_ns BIGINT [ns]   Median latency
+-- column: p99_ns BIGINT [ns]      99 % of the latencies are at most this
+-- column: max_ns BIGINT [ns]      Longest latency
+-- column: roots BIGINT            Flows that began
+-- column: reached BIGINT          Flows that reached the end of the path
+-- column: lost BIGINT             Flows that were lost
+-- needs: lake.flow, lake.run
+SELECT
+    f.path,
+    f.run,
+    quantile_disc(f.latency_ns, 0.5) FILTER (WHERE f.status = 'reached') AS median_ns,
+    quantile_disc(f.latency_ns, 0.99) FILTER (WHERE f.status = 'reached') AS p99_ns,
+    max(f.latency_ns) FILTER (WHERE f.status = 'reached') AS max_ns,
+    count(*) AS roots,
+    count(*) FILTER (WHERE f.status = 'reached') AS reached,
+    count(*) FILTER (WHERE f.status = 'lost') AS lost
+FROM flow AS f
+JOIN run AS r ON f.run = r.run
+WHERE f.is_first
+GROUP BY f.path, f.run, r.start_ns
+ORDER BY f.path, r.start_ns, f.run

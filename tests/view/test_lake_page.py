@@ -1,0 +1,205 @@
+"""The page of a lake: what it shows is what the lake says, and labels are only ever text."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+import pytest
+from hostile import HOSTILE
+from served import Page, shown
+from typer.testing import CliRunner
+
+from msgflow import Database
+from msgflow.cli.app import app
+from msgflow.errors import UsageError
+from msgflow.fleet.answers import answers
+from msgflow.fleet.asking import fleet_query
+from msgflow.fleet.failure import write_failure
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.layout import part_path
+from msgflow.fleet.page import lake_page, write_lake_page
+from msgflow.fleet.part import Content, write_part
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
+from msgflow.view.server import listening, single_application
+
+_DAY = 86_400 * 10**9
+_SLOW = 9
+
+
+@pytest.fixture(scope="module")
+def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
+    """Runs of ten days, one of them three times as slow, with labels and names that are hostile."""
+    folder = tmp_path_factory.mktemp("lake")
+    trace = simulate("pipeline", folder / "trace", factor=0.02)
+    database = folder / "one.duckdb"
+    ingest([trace.directory], database)
+    lake = Lake.open_or_create(folder / "lake")
+    with Database(database) as opened:
+        part = write_part(
+            opened.connection, database, lake.store, folder, source="here", options={},
+            content=Content(views=False),
+        )  # fmt: skip
+    tables = {
+        answer.table: pq.ParquetFile(
+            lake.store.full(part_path(answer.table, part.values["part"]))
+        ).read()
+        for answer in answers()
+    }
+    rows = []
+    for number in range(10):
+        key = f"{number:020x}"
+        for name, table in tables.items():
+            copy = table.set_column(0, "run", pa.array([key] * len(table), pa.string()))
+            if name == "flow" and number == _SLOW:
+                place = copy.column_names.index("latency_ns")
+                copy = copy.set_column(place, "latency_ns", pc.multiply(copy["latency_ns"], 3))
+            lake.put_table(part_path(name, key), name, copy, part.values["schema_revision"])
+        rows.append(
+            {
+                **part.values,
+                "run": key,
+                "part": key,
+                "generation": 1,
+                "name": HOSTILE[number % len(HOSTILE)],
+                "source": HOSTILE[number % len(HOSTILE)],
+                "start_ns": part.values["start_ns"] + number * _DAY,
+                "labels": {
+                    "software_version": "1.0" if number < 5 else "1.1",
+                    "robot": HOSTILE[number % len(HOSTILE)],
+                    HOSTILE[0]: HOSTILE[1],
+                },
+            }
+        )
+    lake.commit(rows)
+    for text in HOSTILE:
+        write_failure(
+            lake,
+            {"source": text, "labels": {"robot": text}, "reason": "broken", "error": text,
+             "stage": text, "hint": text, "tries": 1},
+        )  # fmt: skip
+    return lake
+
+
+@pytest.fixture(scope="module")
+def address(lake: Lake, tmp_path_factory: pytest.TempPathFactory) -> str:
+    target = tmp_path_factory.mktemp("page") / "lake.html"
+    done = CliRunner().invoke(app, ["report", "--lake", lake.store.url, "-o", str(target)])
+    assert done.exit_code == 0, done.stderr
+    assert "10 runs of" in done.stderr
+    return target.as_uri()
+
+
+def test_the_page_says_what_the_lake_says(lake: Lake, address: str, page: Page) -> None:
+    page.open(address)
+    assert page.page.locator("nav .tabs a").all_text_contents() == ["Lake"]
+    facts = page.page.locator("main .facts").inner_text().split()
+    assert facts[facts.index("runs") + 1] == "10"
+    assert facts[-1] == str(len(HOSTILE))
+    for group in ("software_version", "robot"):
+        page.page.get_by_label("label", exact=True).select_option(group)
+        found = fleet_query(lake, "e2e-latency", group_by=[group]).table.to_pylist()
+        assert len({row["path"] for row in found}) == 1
+        table = page.page.get_by_role("region", name="by label")
+        table.locator(f"text={shown(found[0]['median_ns'])}").first.wait_for()
+        rows = table.locator("tbody tr")
+        assert rows.count() == len(found)
+        for row in found:
+            cells = rows.filter(has_text=shown(row["max_ns"])).first
+            assert cells.count() == 1
+    # A run for every point, and the slow one stands out.
+    assert page.page.locator(".charts canvas").count() == 2
+    page.page.locator("summary", has_text="as a table").first.click()
+    over_time = page.page.get_by_role("region", name="runs over time")
+    assert over_time.locator("tbody tr").count() == 10
+    outliers = page.page.get_by_role("region", name="runs that stand out").locator("tbody tr")
+    assert outliers.count() == 1
+    assert "200 %" in outliers.first.inner_text()
+    flows = page.page.get_by_role("region", name="slowest flows").locator("tbody tr")
+    assert flows.count() == 10
+    assert f"msgflow fleet open {_SLOW:020x} --lake" in flows.first.inner_text()
+    assert page.page.get_by_role("region", name="failures").locator("tbody tr").count() == len(
+        HOSTILE
+    )
+
+
+def test_a_click_on_a_point_names_its_run(address: str, page: Page) -> None:
+    page.open(address)
+    over = page.page.locator(".charts .u-over").first
+    over.wait_for()
+    box = over.bounding_box()
+    assert box is not None
+    over.click(position={"x": box["width"] - 2, "y": 5})
+    said = page.page.locator("main .status", has_text="msgflow fleet open")
+    said.wait_for()
+    assert f"{_SLOW:020x}" in said.inner_text()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)])
+def test_labels_are_only_ever_text(address: str, page: Page, width: int, height: int) -> None:
+    page.page.set_viewport_size({"width": width, "height": height})
+    page.open(address)
+    page.page.get_by_label("label", exact=True).select_option("robot")
+    page.page.locator(".legend", has_text=HOSTILE[0]).wait_for()
+    page.page.locator("summary", has_text="10 runs").click()
+    assert page.page.evaluate("typeof hacked") == "undefined"
+    assert page.page.locator("main img, main script, main style").count() == 0
+    assert page.page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_the_server_shows_the_page_anew(lake: Lake, page: Page) -> None:
+    made: list[str] = []
+
+    def make() -> str:
+        made.append(lake_page(lake, where="software_version = '1.1'").content)
+        return made[-1]
+
+    for address, _ in served(make):
+        page.open(address)
+        assert "5 of 10 runs" in page.page.locator(".said").inner_text()
+        page.open(address)
+        assert len(made) == 2
+
+
+def served(make: object) -> Iterator[tuple[str, None]]:
+    with listening(0, lambda token: single_application(make, token)) as (  # type: ignore[arg-type]
+        server,
+        listener,
+        address,
+    ):
+        ready = threading.Event()
+        server.started_with = ready.set
+        thread = threading.Thread(target=lambda: server.run(sockets=[listener]), daemon=True)
+        thread.start()
+        assert ready.wait(20)
+        try:
+            yield address, None
+        finally:
+            server.should_exit = True
+            thread.join(20)
+
+
+def test_what_does_not_go_with_a_lake(lake: Lake, tmp_path: Path) -> None:
+    target = tmp_path / "x.html"
+    for arguments, words in (
+        (["report", "--lake", lake.store.url, "--run", "1"], "is of all its runs"),
+        (["report", "--where", "true"], "--where chooses runs of a lake"),
+        (["ui", "--where", "true"], "--where chooses runs of a lake"),
+        (["report", "--lake", lake.store.url, "--where", "x = 1"], "such a label — x"),
+        (["ui", "--lake", lake.store.url, "--where", "x = 1"], "such a label — x"),
+    ):
+        done = CliRunner().invoke(
+            app, [*arguments, *(["-o", str(target)] * ("ui" not in arguments))]
+        )
+        assert done.exit_code == 2
+        assert words in done.stderr
+    done = CliRunner().invoke(app, ["ui", "--lake", str(tmp_path)])
+    assert done.exit_code == 4
+    with pytest.raises(UsageError, match="more than 1,000"):
+        write_lake_page(lake, target, max_size=1_000)
+    assert not target.exists()
