@@ -54,7 +54,7 @@ def imported(*arguments: object) -> set[str]:
         ("query", "--list"),
         thorough(("query", "--help")),
         ("query", "info-topics", "--help"),
-        ("query", "info-topics", "--show"),
+        thorough(("query", "info-topics", "--show")),
         thorough(("sql", "--help")),
         thorough(("flow", "--help")),
         thorough(("info", "--help")),

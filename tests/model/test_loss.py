@@ -31,9 +31,9 @@ def test_events_are_lost_behind_the_last_event_of_their_packet(
     model = analyse(system)
     assert model.rows(GAPS) == [("loss", 0, 120, 200, 7)]
     assert model.rows("SELECT discarded_event_count, event_count FROM trace") == [(7, 4)]
-    assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'discarded_events'") == [
-        ("data_loss", 7)
-    ]
+    assert model.rows(
+        "SELECT severity, count FROM store.diagnostic WHERE name = 'discarded_events'"
+    ) == [("data_loss", 7)]
 
 
 def test_events_are_lost_before_a_packet_that_waited_for_room(
@@ -53,9 +53,9 @@ def test_events_are_lost_before_a_packet_that_waited_for_room(
         ("loss", 0, 480, 500, 2),
     ]
     assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, None)]
-    assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'discarded_events'") == [
-        ("data_loss", 9)
-    ]
+    assert model.rows(
+        "SELECT severity, count FROM store.diagnostic WHERE name = 'discarded_events'"
+    ) == [("data_loss", 9)]
 
 
 def test_packets_are_lost_before_one_that_counts_a_loss(
@@ -103,7 +103,7 @@ def test_lost_packets_lie_between_those_around_them(system: RosSystem, analyse: 
     system.add_packet(0, 500, cpu=1)
     model = analyse(system)
     assert model.rows(GAPS) == [("packets", 0, 100, 400, None)]
-    assert model.rows("SELECT severity FROM diagnostic WHERE name = 'lost_packets'") == [
+    assert model.rows("SELECT severity FROM store.diagnostic WHERE name = 'lost_packets'") == [
         ("data_loss",)
     ]
 
@@ -114,7 +114,7 @@ def test_a_pause_is_a_silence_of_all_streams(system: RosSystem, analyse: Analyse
         system.add_packet(50 * MS - cpu, 60 * MS, cpu=cpu)
     model = analyse(system)
     assert model.rows(GAPS) == [("pause", None, 10 * MS + 1, 50 * MS - 1, None)]
-    assert model.rows("SELECT severity, count FROM diagnostic WHERE name = 'pause'") == [
+    assert model.rows("SELECT severity, count FROM store.diagnostic WHERE name = 'pause'") == [
         ("warning", 1)
     ]
 
@@ -672,7 +672,7 @@ def test_sums_of_what_packets_say_that_they_lost_fit(system: RosSystem, analyse:
         system.add_packet(begin, begin + 100, discarded=(1 << 63) - 1)
     model = analyse(system)
     assert model.rows("SELECT discarded_event_count FROM trace") == [(1 << 53,)]
-    assert model.rows("SELECT count FROM diagnostic WHERE name = 'discarded_events'") == [
+    assert model.rows("SELECT count FROM store.diagnostic WHERE name = 'discarded_events'") == [
         (1 << 53,)
     ]
     found = find(model.connection, [1])

@@ -12,7 +12,8 @@ from msgflow.db.check import run_checks
 MILLISECOND = 1_000_000
 PERIOD = 2 * MILLISECOND
 FOUND = (
-    "SELECT trace_id, severity, count, detail FROM diagnostic WHERE name = 'overlapping_traces' "
+    "SELECT trace_id, severity, count, detail FROM store.diagnostic "
+    "WHERE name = 'overlapping_traces' "
     "ORDER BY trace_id"
 )
 

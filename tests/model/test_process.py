@@ -8,7 +8,7 @@ from staged_events import Thread
 
 MAIN = Thread(100)
 LIVES = "SELECT pid, life, name, first_seen_ns, last_seen_ns FROM store.process ORDER BY process_id"
-RESTARTS = "SELECT severity, count FROM diagnostic WHERE name = 'process_restart'"
+RESTARTS = "SELECT severity, count FROM store.diagnostic WHERE name = 'process_restart'"
 
 
 def test_a_process_is_named_after_its_main_thread(system: RosSystem, analyse: Analyse) -> None:

@@ -99,7 +99,7 @@ def test_handles_never_initialised_are_placeholders(system: RosSystem, analyse: 
         (200, 0x10, True, 1),
     ]
     assert model.rows(
-        "SELECT severity, count FROM diagnostic WHERE name = 'inferred_publisher'"
+        "SELECT severity, count FROM store.diagnostic WHERE name = 'inferred_publisher'"
     ) == [("warning", 3)]
 
 
@@ -209,7 +209,7 @@ def test_one_of_several_rosout_of_a_process_is_not_guessed(
         "SELECT topic_name, is_internal, is_inferred FROM publication "
         "JOIN publisher USING (publisher_id)"
     ) == [("/rosout", True, True)]
-    assert model.rows("SELECT * FROM diagnostic WHERE name = 'inferred_publisher'") == []
+    assert model.rows("SELECT * FROM store.diagnostic WHERE name = 'inferred_publisher'") == []
 
 
 def test_a_publisher_with_another_rmw_handle_is_not_rosout(

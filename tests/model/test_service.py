@@ -180,7 +180,9 @@ def test_what_cannot_be_told_is_not_guessed(system: RosSystem, analyse: Analyse)
     assert sorted(analysis.rows(REQUESTS), key=str) == sorted(
         [(1, sent[0], None, None), (1, sent[1], None, None), (1, None, taken, None)], key=str
     )
-    assert analysis.rows("SELECT count FROM diagnostic WHERE name = 'ambiguous_request'") == [(1,)]
+    assert analysis.rows("SELECT count FROM store.diagnostic WHERE name = 'ambiguous_request'") == [
+        (1,)
+    ]
 
 
 def test_two_services_of_one_name(system: RosSystem, analyse: Analyse) -> None:

@@ -127,7 +127,7 @@ FAULTY = {
 }
 
 
-@pytest.mark.parametrize("name", few(FAULTY, "starved", "mixed_intra_process"))
+@pytest.mark.parametrize("name", few(FAULTY, "mixed_intra_process"))
 def test_no_reason_is_false(tmp_path: Path, name: str) -> None:
     """Also where readers get no CPU, processes leave one by one, and events are lost."""
     simulation = simulate(name, tmp_path / "trace", factor=0.1, recording=FAULTY[name])

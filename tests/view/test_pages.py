@@ -27,7 +27,7 @@ def cells(page: Page, table: str) -> list[list[str]]:
     return found
 
 
-@pytest.mark.parametrize("way", ["served", "file"])
+@pytest.mark.parametrize("way", few(["served", "file"], "served"))
 def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, read: Read) -> None:
     with open_db(demo) as opened:
         latency = opened.query("e2e-latency").to_arrow().to_pylist()

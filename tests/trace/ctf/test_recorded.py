@@ -27,7 +27,7 @@ RECORDED = (
 )
 
 
-@pytest.mark.parametrize("name", few(RECORDED, "sync_1_1", "services"))
+@pytest.mark.parametrize("name", few(RECORDED, "services"))
 def test_as_bt2(shared_traces: Path, bt2_bindings: Any, name: str) -> None:
     path = shared_traces / name
     ours = read(path)
