@@ -30,6 +30,7 @@ def test_clocks_come_together(shared_traces: Path, tmp_path: Path, name: str) ->
     assert negative.columns[0][0].as_py() == 0
 
 
+@pytest.mark.thorough
 def test_a_late_start_and_pauses_do_not_keep_clocks_apart(
     shared_traces: Path, tmp_path: Path
 ) -> None:

@@ -15,8 +15,6 @@ SHOWN = (
     "mixed_intra_process",
     "python",
 )
-# Recorded ones likewise: two that are short, one with services.
-RECORDED = ("sync_1_1", "services", "periodic_async_jazzy24")
 
 
 def thorough(*values: Any, **options: Any) -> Any:

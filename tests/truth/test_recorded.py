@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from ingested import Ingested
 from scoring import compare_recorded
-from thorough import RECORDED, few
+from thorough import few
 
 Vertex = tuple[str, int]
 
@@ -107,7 +107,7 @@ def checker(shared_traces: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", few(TRUE_TRACES, *RECORDED))
+@pytest.mark.parametrize("name", few(TRUE_TRACES, "sync_1_1", "services"))
 def test_scores(
     recordings: Callable[[str], Ingested],
     shared_traces: Path,

@@ -184,6 +184,7 @@ def test_lateness_and_missed_calls_are_those_of_rcl(
     assert sum(row["bunched"] for row in rows.values()) > 5
 
 
+@pytest.mark.thorough
 def test_the_executor_is_busy_with_what_really_ran(
     tmp_path: Path, timers: dict[int, TrueTimer]
 ) -> None:
@@ -222,6 +223,7 @@ def test_calls_that_the_trace_lost_were_not_missed(
     assert sum(row["loss_affected"] for row in rows.values()) > 5
 
 
+@pytest.mark.thorough
 def test_without_its_creation_a_timer_has_no_lateness(
     tmp_path: Path, timers: dict[int, TrueTimer]
 ) -> None:
