@@ -57,7 +57,10 @@ class FleetComparison:
         Raises:
             UsageError: see `msgflow.query.compare.failures`.
         """
-        return failures(self.result, conditions)
+        hint = (
+            "--where chooses runs of which all paths were found: is_cut of fleet query e2e-latency"
+        )
+        return failures(self.result, conditions, hint)
 
 
 def compare(
@@ -121,7 +124,7 @@ def compare(
         result = compared(reading.connection, case=case, confidence=confidence)
     result.notes.extend(_who(by, base, other, sided, unit))
     result.notes.extend(_left_out(by, known, sides, len(labels)))
-    result.notes.extend(_one_sided(result))
+    result.notes.extend(_one_sided(result, by))
     result.notes.extend(_doubts(result, confidence))
     return FleetComparison(result)
 
@@ -210,13 +213,13 @@ def _left_out(
         yield f"left out: {others:,} runs with other values of {by}, {without:,} without it"
 
 
-def _one_sided(result: QueryResult) -> Iterator[str]:
+def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
     """Say what only one side has; nothing in common is an error."""
     rows = _of_paths(result)
     if not any(row["a_count"] and row["b_count"] for row in rows):
         raise UsageError(
             "the two sides have no path with latencies in common",
-            "msgflow fleet query e2e-latency --group-by tells what each has",
+            f"msgflow fleet query e2e-latency --group-by {by} tells what each has",
         )
     for side in ("A", "B"):
         number = sum(row["verdict"] == f"only in {side}" for row in rows)

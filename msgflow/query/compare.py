@@ -115,7 +115,11 @@ class Comparison:
         return failures(self.result, conditions)
 
 
-def failures(result: QueryResult, conditions: Iterable[str]) -> list[Failure]:
+def failures(
+    result: QueryResult,
+    conditions: Iterable[str],
+    hint: str = "a higher --max-paths or --max-depth, or --from and --to",
+) -> list[Failure]:
     """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
     'share<-1%' is for what arrived: its share may be less than in A by that many points. What has
@@ -125,6 +129,7 @@ def failures(result: QueryResult, conditions: Iterable[str]) -> list[Failure]:
     Args:
         result: of a comparison.
         conditions: several may stand in one text, separated by commas.
+        hint: what to do where paths were left out.
 
     Raises:
         UsageError: a condition that cannot be read, that is in percent of a negative latency, or
@@ -135,7 +140,7 @@ def failures(result: QueryResult, conditions: Iterable[str]) -> list[Failure]:
     if wanted and any(row[CUT_COLUMN] for row in rows):
         raise UsageError(
             f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
-            "a higher --max-paths or --max-depth, or --from and --to",
+            hint,
         )
     return [
         Failure(condition.text, row["subject"], reason)
