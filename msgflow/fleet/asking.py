@@ -126,7 +126,7 @@ def fleet_query(
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
         con = reading.connection
-        _require_tables(con, header)
+        _require_tables(reading, header)
         grouped = _group(con, choice, header, group_by)
         sql, bindings = selected(grouped, chosen, internal)
 
@@ -203,7 +203,7 @@ def fleet_worst(
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
         con = reading.connection
-        _require_tables(con, header)
+        _require_tables(reading, header)
         values = {"path": path, "count": limit}
         table = _asked(
             lake, WORST, con, lambda: statements().run(con, WORST, values).to_arrow_table()
@@ -243,10 +243,9 @@ def _tables(header: Header) -> list[str]:
     return [name for name in found if name not in _MADE]
 
 
-def _require_tables(con: duckdb.DuckDBPyConnection, header: Header) -> None:
-    there = {name for (name,) in con.execute("SELECT view_name FROM duckdb_views()").fetchall()}
+def _require_tables(reading: Reading, header: Header) -> None:
     for table in _tables(header):
-        if table not in there:
+        if table not in reading.tables:
             raise UsageError(
                 f"these runs lack a table, an earlier msgflow wrote them — {table}",
                 "msgflow fleet ingest SOURCE --lake LAKE --replace writes them again",

@@ -104,7 +104,9 @@ class Lake:
         """
         import pyarrow as pa
 
-        return pa.concat_tables([run_schema().empty_table(), *self.rows_by_file().values()])
+        tables = list(self.rows_by_file().values())
+        # Not for nothing: making an empty table imports pandas where it is installed.
+        return pa.concat_tables(tables) if tables else run_schema().empty_table()
 
     def rows_by_file(self) -> dict[str, pa.Table]:
         """Return the rows of the table `run` by their files, but of those that another stands for.
@@ -315,8 +317,9 @@ def visible(rows: pa.Table) -> pa.Table:
     if not len(ordered):
         return ordered
     keys = ordered["run"].combine_chunks()
-    is_first = pc.not_equal(keys[1:], keys[:-1])
-    is_first = pa.concat_arrays([pa.array([True]), is_first])
+    before = pa.concat_arrays([pa.nulls(1, keys.type), keys[:-1]])
+    # Without a value of Python: for one, pyarrow imports pandas where it is installed.
+    is_first = pc.or_kleene(pc.is_null(before), pc.not_equal(keys, before))
     return ordered.filter(pc.and_(is_first, pc.invert(ordered["is_removed"])))
 
 

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake
 
 _COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')
+# What DuckDB says where pyarrow, which reads a bucket for it, failed.
+_STREAM = "reading the stream registered as"
 _EXAMPLE = "such as --where \"robot = 'r1' AND software_version >= '2.4'\""
 _NONE_YET = "msgflow fleet ingest SOURCE --lake adds some"
 
@@ -146,6 +148,7 @@ class Reading:
         choice: the runs.
         connection: with the table `run`, and views of the tables that were asked for, each with the
             columns of its files but `part`.
+        tables: those of them that these runs have.
     """
 
     def __init__(self, choice: Choice, tables: Sequence[str] | None = None) -> None:
@@ -160,6 +163,7 @@ class Reading:
             DatabaseError: the lake cannot be read.
         """
         self.choice = choice
+        self.tables: set[str] = set()
         store = choice.lake.store
         if tables is None:
             tables = [answer.table for answer in answers()]
@@ -201,6 +205,7 @@ class Reading:
             found = self._files(table, key)
             if not found:
                 continue
+            self.tables.add(table)
             rows = self._scan(table, found)
             name = ".".join(map(quoted, table.split("/")))
             con.execute(
@@ -276,10 +281,12 @@ def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
         lake: the lake.
         is_query: a statement of a user may be to blame for its input.
     """
-    kinds = (duckdb.IOException, OSError) if is_query else (duckdb.Error, OSError)
     try:
         yield
-    except kinds as error:
+    except (duckdb.Error, OSError) as error:
+        is_of_files = isinstance(error, duckdb.IOException | OSError) or _STREAM in str(error)
+        if is_query and not is_of_files:
+            raise
         raise DatabaseError(
             f"cannot read the lake: {first_line(error)} — {lake.store.url}",
             "check that it can be reached, and that nobody else than msgflow has written there",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import duckdb
@@ -265,6 +267,17 @@ def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) 
     lake.commit([row | {"labels": dict(row["labels"] or ())}])
     with pytest.raises(UsageError, match="an earlier msgflow wrote them — delivery"):
         fleet_query(lake, "delivery")
+
+
+def test_nobody_waits_for_pandas(night: Lake) -> None:
+    """It is imported by pyarrow for values of Python, and takes longer than a small question."""
+    program = (
+        "import sys; from msgflow.fleet.asking import fleet_query; "
+        "from msgflow.fleet.lake import Lake; "
+        "fleet_query(Lake.open(sys.argv[1]), 'e2e-latency', where=\"robot = 'r1'\"); "
+        "assert 'pandas' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program, night.store.url], check=True)
 
 
 def test_columns_of_headers_have_meanings() -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
 import pytest
+from object_store import KEYS, ObjectStore, object_store
 
 from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet.asking import fleet_query, fleet_sql, fleet_worst
 from msgflow.fleet.lake import Lake
+from msgflow.fleet.opening import open_run
 from msgflow.fleet.reading import choose, open_runs
+from msgflow.fleet.store import Store
 
 
 def chosen(lake: Lake, where: str | None) -> list[str]:
@@ -125,3 +130,56 @@ def test_a_damaged_file_is_said(tmp_path: Path) -> None:
     lake.store.put("flow/part=1-x/data.parquet", b"no parquet")
     with pytest.raises(DatabaseError, match="cannot read the lake"):
         open_runs(lake, tables=["flow"])
+
+
+@pytest.fixture(scope="module")
+def in_bucket(night: Lake) -> Iterator[tuple[Lake, ObjectStore]]:
+    """The same lake in a bucket, without its views."""
+    with pytest.MonkeyPatch.context() as patch, object_store(patch) as store:
+        lake = Lake(Store("s3://fleet/lake"))
+        for entry in night.store.entries():
+            content = night.store.read(entry.path)
+            if content is not None and not entry.path.startswith("view/"):
+                lake.store.put(entry.path, content)
+        yield lake, store
+
+
+def test_a_bucket_answers_as_a_folder_does(
+    night: Lake, in_bucket: tuple[Lake, ObjectStore], tmp_path: Path
+) -> None:
+    lake, store = in_bucket
+    for name, more in (
+        ("e2e-latency", {"group_by": ["robot"]}),
+        ("callback-duration", {"where": "robot = 'r1'"}),
+        ("delivery", {"where": "name = 'second'"}),
+    ):
+        expected = fleet_query(night, name, **more).table  # type: ignore[arg-type]
+        assert fleet_query(lake, name, **more).table.equals(expected)  # type: ignore[arg-type]
+    text = "SELECT run, count(*) AS n, max(latency_ns) AS m FROM flow GROUP BY ALL ORDER BY ALL"
+    where = "robot = 'r1'"
+    assert fleet_sql(lake, text, where=where).table.equals(
+        fleet_sql(night, text, where=where).table
+    )
+    assert len(fleet_worst(lake, "/", limit=3)) == 3
+    # What DuckDB is told has no credentials, and reaches nothing itself.
+    with open_runs(lake, tables=["flow"]) as reading:
+        said = str(reading.connection.execute("FROM duckdb_settings()").fetchall())
+        assert not any(secret in said for secret in KEYS.values() if "-east-" not in secret)
+        with pytest.raises(duckdb.Error):
+            reading.connection.execute("FROM read_parquet('s3://fleet/lake/flow/*/*.parquet')")
+    target = tmp_path / "back.duckdb"
+    assert open_run(lake, "first", target).path == target
+    store.refuse_every = 10
+    try:
+        again = fleet_query(lake, "e2e-latency").table
+    finally:
+        store.refuse_every = 0
+    assert store.refused
+    assert again.equals(fleet_query(night, "e2e-latency").table)
+
+
+def test_a_file_that_is_gone_is_said(in_bucket: tuple[Lake, ObjectStore]) -> None:
+    lake, _ = in_bucket
+    lake.store.delete(f"flow/part={lake.runs()['part'][2].as_py()}/data.parquet")
+    with pytest.raises(DatabaseError, match="cannot read the lake"):
+        fleet_query(lake, "e2e-latency")
