@@ -105,7 +105,7 @@ class EventBody:
         return tuple("big" if field.dtype[0] == ">" else "little" for field in self.fields or ())
 
     @cached_property
-    def _steps(self) -> tuple[tuple[int, int, Kind, int], ...]:
+    def steps(self) -> tuple[tuple[int, int, Kind, int], ...]:
         """What leads from the begin of a body to its end, as few steps as possible.
 
         Alignment, and what follows: NOTHING goes on by so many bytes, NUMBER is a length or
@@ -133,7 +133,7 @@ class EventBody:
             FieldError: it does not fit in front of the byte `limit`.
         """
         lengths: dict[int, int] = {}
-        for align, size, kind, number in self._steps:
+        for align, size, kind, number in self.steps:
             if align > 1:
                 position = (position + align - 1) & -align
             if kind is Kind.NOTHING:

@@ -66,7 +66,12 @@ def find_events(
         layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
         for entry in entries
     ]
-    for entry, found in zip(entries, scan_lockstep(layout, memory, spans), strict=True):
+    fast = layout.compiled
+    if fast is not None:
+        scanned = [fast.scan(memory, span) for span in spans]
+    else:
+        scanned = scan_lockstep(layout, memory, spans)
+    for entry, found in zip(entries, scanned, strict=True):
         entry.events = found.positions - entry.base
         if found.problem is not None:
             position, message = found.problem
@@ -82,7 +87,11 @@ def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) 
     positions = np.concatenate([_begins(entry) for entry in entries])
     positions += np.repeat(bases, counts)
     befores = np.array([entry.clock_before for entry in entries], np.uint64)
-    headers = read_headers(layout, memory, positions, counts, befores)
+    fast = layout.compiled
+    if fast is not None:
+        headers = fast.headers(memory, positions, counts, befores)
+    else:
+        headers = read_headers(layout, memory, positions, counts, befores)
     return Events(counts, headers.classes, headers.clock, headers.bodies, positions)
 
 

@@ -10,6 +10,7 @@ import pyarrow as pa
 from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema
 from msgflow.trace.ctf.arrow_types import declared_schema, hexadecimal_names
 from msgflow.trace.ctf.build import EventRows, build_batch
+from msgflow.trace.ctf.compiled_columns import split
 from msgflow.trace.ctf.events import walk_of
 from msgflow.trace.ctf.order import ordered_batches
 from msgflow.trace.ctf.packet_rows import PacketRows
@@ -109,13 +110,9 @@ class Iteration:
         order = batch.order
         first_id = self.event_count
         self.event_count += order.size
-        classes = batch.classes[order].astype(
-            np.uint16 if len(self._classes) < 1 << 16 else np.uint32
-        )
-        counts = np.bincount(classes, minlength=len(self._classes))
+        by_class, ends = _split(batch, len(self._classes))
+        counts = np.diff(ends, prepend=0)
         self._counts += counts
-        by_class = np.argsort(classes, kind="stable")
-        ends = np.cumsum(counts)
         walks: dict[int, PacketWalk] = {}
 
         def walk_at(packet: int, position: int) -> tuple[PacketWalk, int]:
@@ -142,6 +139,16 @@ class Iteration:
     def _report_progress(self, fraction: float, time_ns: int) -> None:
         if self._progress is not None:
             self._progress(Progress(self.event_count, fraction, time_ns))
+
+
+def _split(batch: Batch, class_count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the events of a batch class after class, and where each class ends among them."""
+    fast = split(batch.order, batch.classes, class_count)
+    if fast is not None:
+        return fast
+    classes = batch.classes[batch.order].astype(np.uint16 if class_count < 1 << 16 else np.uint32)
+    ends = np.cumsum(np.bincount(classes, minlength=class_count))
+    return np.argsort(classes, kind="stable"), ends
 
 
 def _rows(batch: Batch, rows: NDArray[np.int64], event_ids: NDArray[np.int64]) -> EventRows:

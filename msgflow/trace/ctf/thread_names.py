@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from msgflow.trace.ctf.compiled_columns import Texts
 from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ class ThreadNames:
         self._index_of_name: dict[str, int] = {}
         self._dictionary: pa.Array | None = None
         self._tables: dict[int, _Table] = {}
+        self._texts: dict[int, Texts] = {}
+        self._indexes_of_texts: dict[int, NDArray[np.int32]] = {}
 
     def array(self, indexes: NDArray[np.int32]) -> pa.Array:
         """Return names given by their indexes."""
@@ -36,6 +39,10 @@ class ThreadNames:
         """Return the index of a name."""
         return self._index_of_name.setdefault(name, len(self._index_of_name))
 
+    def index_of_bytes(self, content: bytes) -> int:
+        """Return the index of the name that ends at the first NUL."""
+        return self.index_of(content.partition(b"\0")[0].decode("utf-8", "replace"))
+
     def array_of(self, names: Iterable[str | None]) -> pa.Array:
         """Return an array of names given one by one."""
         indexes = [None if name is None else self.index_of(name) for name in names]
@@ -43,6 +50,22 @@ class ThreadNames:
         return pa.DictionaryArray.from_arrays(
             integers_to_arrow(indexes, pa.int32()), self._dictionary
         )
+
+    def texts(self, length: int) -> Texts:
+        """Return what the kernel has seen of names of so many bytes."""
+        if length not in self._texts:
+            self._texts[length] = Texts(length)
+            self._indexes_of_texts[length] = np.empty(0, np.int32)
+        return self._texts[length]
+
+    def indexes_of_texts(self, length: int, numbers: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the indexes of names given by the numbers of their texts."""
+        indexes = self._indexes_of_texts[length]
+        new = [self.index_of_bytes(text) for text in self._texts[length].after(indexes.size)]
+        if new:
+            indexes = np.append(indexes, np.array(new, np.int32))
+            self._indexes_of_texts[length] = indexes
+        return indexes[numbers]
 
     def indexes(self, words: list[NDArray[np.uint64]], length: int) -> NDArray[np.int32]:
         """Return the indexes of names given by their bytes.
@@ -101,11 +124,14 @@ class _Table:
 
     def _learn(self, hashes: NDArray[np.uint64], words: list[NDArray[np.uint64]]) -> None:
         new, rows = np.unique(hashes, return_index=True)
-        indexes = [self._index([word[row] for word in words]) for row in rows.tolist()]
+        indexes = np.empty(rows.size, np.int32)
+        # Numbered as they are first seen.
+        for place in np.argsort(rows).tolist():
+            indexes[place] = self._index([word[rows[place]] for word in words])
         all_hashes = np.concatenate([self._hashes, new])
         order = np.argsort(all_hashes)
         self._hashes = all_hashes[order]
-        self._indexes = np.concatenate([self._indexes, np.array(indexes, np.int32)])[order]
+        self._indexes = np.concatenate([self._indexes, indexes])[order]
         self._words = [
             np.concatenate([mine, word[rows]])[order]
             for mine, word in zip(self._words, words, strict=True)
@@ -115,5 +141,4 @@ class _Table:
         content = bytearray(max(self._length, _WORD))
         for offset, word in zip(word_offsets(self._length), words, strict=True):
             content[offset : offset + _WORD] = int(word).to_bytes(_WORD, "little")
-        name = bytes(content[: self._length]).partition(b"\0")[0]
-        return self._names.index_of(name.decode("utf-8", "replace"))
+        return self._names.index_of_bytes(bytes(content[: self._length]))

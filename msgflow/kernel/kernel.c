@@ -1,0 +1,349 @@
+/* What reading a trace spends most of its time on. msgflow.kernel loads it where it was compiled;
+ * all of it exists in Python and numpy as well, which take over where this gives up.
+ *
+ * Nothing in a trace is trusted: every read of packets is checked against the end of their memory,
+ * and every size against what is left. Arrays and tables come from Python, which made them large
+ * enough. Nothing here allocates, keeps state or calls Python. For little-endian machines. */
+
+#include <stdint.h>
+#include <string.h>
+
+/* What it was compiled from, so that it is never used with another version of msgflow. */
+const uint32_t msgflow_source = MSGFLOW_SOURCE;
+
+#define RESIDUES 8
+#define LENGTHS 16
+#define NO_FORM 255
+
+/* An integer of an event header, see Place in event_header.py. */
+typedef struct {
+    int64_t width, is_big_endian, shift;
+    uint64_t mask;
+    int64_t offsets[RESIDUES];
+} Place;
+
+/* A form of the event header; `time_mask` is 0 where it has no time stamp. */
+typedef struct {
+    int64_t has_id;
+    uint64_t time_mask;
+    Place id, time;
+    int64_t sizes[RESIDUES];
+} Form;
+
+enum { SKIP, NUMBER, STRING, SEQUENCE };
+
+/* A step through a body whose size varies: `size` bytes for SKIP and NUMBER, for SEQUENCE of each
+ * element. NUMBER keeps a length in `slot`, SEQUENCE takes it from there. */
+typedef struct {
+    int64_t align, size, kind, slot, is_big_endian;
+} Step;
+
+/* The contexts and payload of an event class: `step_count` is 0 where sizes are known. */
+typedef struct {
+    int64_t number, first_step, step_count;
+    int64_t sizes[RESIDUES];
+} Body;
+
+/* A stream class. `body_of`: event id to its body, -1 for none. `form_of`: selector to form. */
+typedef struct {
+    int64_t residues, align, selector_count, id_count;
+    uint64_t only_id;
+    Place selector;
+    const Form *forms;
+    const uint8_t *form_of;
+    const Body *bodies;
+    const int32_t *body_of;
+    const Step *steps;
+} Layout;
+
+/* Bytes, and how many of them. */
+typedef struct {
+    const uint8_t *data;
+    int64_t size;
+} Memory;
+
+static uint64_t load(const uint8_t *from, int64_t width, int64_t is_big_endian)
+{
+    uint8_t byte;
+    uint16_t two;
+    uint32_t four;
+    uint64_t eight;
+    switch (width) {
+    case 1:
+        memcpy(&byte, from, 1);
+        return byte;
+    case 2:
+        memcpy(&two, from, 2);
+        return is_big_endian ? __builtin_bswap16(two) : two;
+    case 4:
+        memcpy(&four, from, 4);
+        return is_big_endian ? __builtin_bswap32(four) : four;
+    default:
+        memcpy(&eight, from, 8);
+        return is_big_endian ? __builtin_bswap64(eight) : eight;
+    }
+}
+
+static int64_t aligned(int64_t position, int64_t align)
+{
+    return (position + align - 1) & -align;
+}
+
+/* Read an integer of the header at `position`; return 0 where memory ends before. */
+static int read_place(const Memory *memory, const Place *place, int64_t position, int64_t residue,
+                      uint64_t *value)
+{
+    int64_t at = position + place->offsets[residue];
+    if (at < 0 || at > memory->size - place->width)
+        return 0;
+    *value = load(memory->data + at, place->width, place->is_big_endian) >> place->shift
+             & place->mask;
+    return 1;
+}
+
+/* Find form and body of the event at `position`; return 0 if there is none. */
+static int read_header(const Layout *layout, const Memory *memory, int64_t position,
+                       const Form **form, const Body **body)
+{
+    int64_t residue = position & (layout->residues - 1);
+    uint64_t selector, id;
+    if (!read_place(memory, &layout->selector, position, residue, &selector)
+        || selector >= (uint64_t)layout->selector_count || layout->form_of[selector] == NO_FORM)
+        return 0;
+    *form = layout->forms + layout->form_of[selector];
+    id = layout->only_id;
+    if ((*form)->has_id && !read_place(memory, &(*form)->id, position, residue, &id))
+        return 0;
+    if (id >= (uint64_t)layout->id_count || layout->body_of[id] < 0)
+        return 0;
+    *body = layout->bodies + layout->body_of[id];
+    return 1;
+}
+
+/* Return where a body of varying size ends, -1 if that is not before `limit`. */
+static int64_t walk(const Layout *layout, const Memory *memory, const Body *body, int64_t at,
+                    int64_t limit)
+{
+    uint64_t lengths[LENGTHS] = {0};
+    const Step *step = layout->steps + body->first_step;
+    const Step *end = step + body->step_count;
+    for (; step < end; step++) {
+        const uint8_t *nul;
+        at = aligned(at, step->align);
+        if (at > limit)
+            return -1;
+        switch (step->kind) {
+        case STRING:
+            nul = memchr(memory->data + at, 0, (size_t)(limit - at));
+            if (nul == NULL)
+                return -1;
+            at = nul - memory->data + 1;
+            break;
+        case SEQUENCE:
+            if (step->size > 0 && lengths[step->slot] > (uint64_t)((limit - at) / step->size))
+                return -1;
+            at += (int64_t)lengths[step->slot] * step->size;
+            break;
+        default:
+            if (step->size > limit - at)
+                return -1;
+            if (step->kind == NUMBER)
+                lengths[step->slot] = load(memory->data + at, step->size, step->is_big_endian);
+            at += step->size;
+        }
+    }
+    return at;
+}
+
+/* Find the events of a packet from `*position` on, whose content ends before `limit` and after
+ * which a header would begin at `until`.
+ *
+ * Return how many were found, at most `room`; `*position` is where the next one begins. Where that
+ * is before `until` although there is room, no event of this layout begins there. */
+int64_t msgflow_scan(const Layout *layout, const uint8_t *data, int64_t size, int64_t limit,
+                     int64_t until, int64_t *position, int64_t *found, int64_t room)
+{
+    Memory memory = {data, size};
+    int64_t at = *position, count = 0;
+    if (at < 0 || limit > size)
+        return 0;
+    while (at < until && count < room) {
+        const Form *form;
+        const Body *body;
+        int64_t begin, end;
+        if (!read_header(layout, &memory, at, &form, &body))
+            break;
+        begin = at + form->sizes[at & (layout->residues - 1)];
+        if (begin > limit)
+            break;
+        if (body->step_count)
+            end = walk(layout, &memory, body, begin, limit);
+        else
+            end = begin + body->sizes[begin & (layout->residues - 1)];
+        if (end > limit || end <= at)
+            break;
+        found[count++] = at;
+        at = aligned(end, layout->align);
+    }
+    *position = at;
+    return count;
+}
+
+/* Read the headers of events found before: class, clock and where the body begins.
+ *
+ * `clock` is the value before the first. Return how many could be read. */
+int64_t msgflow_headers(const Layout *layout, const uint8_t *data, int64_t size,
+                        const int64_t *positions, int64_t count, uint64_t clock,
+                        uint32_t *classes, uint64_t *clocks, int64_t *bodies)
+{
+    Memory memory = {data, size};
+    int64_t row;
+    for (row = 0; row < count; row++) {
+        int64_t at = positions[row], residue = at & (layout->residues - 1);
+        const Form *form;
+        const Body *body;
+        uint64_t time;
+        if (at < 0 || !read_header(layout, &memory, at, &form, &body))
+            break;
+        if (form->time_mask) {
+            if (!read_place(&memory, &form->time, at, residue, &time))
+                break;
+            clock += (time - clock) & form->time_mask;
+        }
+        classes[row] = (uint32_t)body->number;
+        clocks[row] = clock;
+        bodies[row] = at + form->sizes[residue];
+    }
+    return row;
+}
+
+/* Order rows by class, those of a class as they come in `order`: `places` are places in `order`.
+ *
+ * `ends` has a zero for each class, and gets the end of each in `places`. Return how many rows were
+ * placed: fewer than `count`, and `places` means nothing, if a class is not below `class_count`. */
+int64_t msgflow_split(const int64_t *order, int64_t count, const uint32_t *classes,
+                      int64_t class_count, int64_t *ends, int64_t *places)
+{
+    int64_t place, number, begin = 0;
+    for (place = 0; place < count; place++) {
+        if (classes[order[place]] >= class_count)
+            return place;
+        ends[classes[order[place]]]++;
+    }
+    for (number = 0; number < class_count; number++) {
+        int64_t of_class = ends[number];
+        ends[number] = begin;
+        begin += of_class;
+    }
+    for (place = 0; place < count; place++)
+        places[ends[classes[order[place]]]++] = place;
+    return count;
+}
+
+/* Numbers that lie at `offsets` from the begin of a body, by its residue. `out` has integers of
+ * `out_width` bytes; those that do not fit wrap round. */
+typedef struct {
+    int64_t width, is_big_endian, is_signed, out_width;
+    int64_t offsets[RESIDUES];
+    void *out;
+} Column;
+
+/* Columns are filled for so many rows at a time: what lies near them stays in the cache. */
+#define ROWS_AT_ONCE 256
+
+static int fill(const Memory *memory, const Column *column, const int64_t *bodies, int64_t residues,
+                int64_t begin, int64_t end)
+{
+    int64_t row, unused = 64 - 8 * column->width;
+    for (row = begin; row < end; row++) {
+        int64_t at = bodies[row] + column->offsets[bodies[row] & (residues - 1)];
+        uint64_t value;
+        if (bodies[row] < 0 || at > memory->size - column->width)
+            return 0;
+        value = load(memory->data + at, column->width, column->is_big_endian);
+        if (column->is_signed)
+            value = (uint64_t)((int64_t)(value << unused) >> unused);
+        switch (column->out_width) {
+        case 1:
+            ((uint8_t *)column->out)[row] = (uint8_t)value;
+            break;
+        case 2:
+            ((uint16_t *)column->out)[row] = (uint16_t)value;
+            break;
+        case 4:
+            ((uint32_t *)column->out)[row] = (uint32_t)value;
+            break;
+        default:
+            ((uint64_t *)column->out)[row] = value;
+        }
+    }
+    return 1;
+}
+
+/* Texts of `length` bytes, numbered as they are first seen.
+ *
+ * `known` has room for `room` of them, of which `count` are there; `slots` has a power of two of
+ * places, more than `room`, which are -1 where they are free. `offset` is from the begin of a body,
+ * by its residue. */
+typedef struct {
+    int64_t length, room, count, slot_count;
+    int64_t offsets[RESIDUES];
+    uint8_t *known;
+    int32_t *slots;
+    int32_t *out;
+} Texts;
+
+/* Number texts; return 0 where one is not in memory, or there is no room for it. */
+static int number(const Memory *memory, Texts *texts, const int64_t *bodies, int64_t residues,
+                  int64_t begin, int64_t end)
+{
+    int64_t row, length = texts->length;
+    for (row = begin; row < end; row++) {
+        int64_t place = bodies[row] + texts->offsets[bodies[row] & (residues - 1)];
+        const uint8_t *text = memory->data + place;
+        uint64_t hash = 0, word;
+        int64_t at, slot;
+        if (bodies[row] < 0 || place > memory->size - length)
+            return 0;
+        for (at = 0; at + 8 <= length; at += 8) {
+            memcpy(&word, text + at, 8);
+            hash = (hash ^ word) * 0x9E3779B97F4A7C15u;
+        }
+        for (; at < length; at++)
+            hash = (hash ^ text[at]) * 0x9E3779B97F4A7C15u;
+        slot = (int64_t)(hash >> 33) & (texts->slot_count - 1);
+        while (texts->slots[slot] >= 0
+               && memcmp(texts->known + texts->slots[slot] * length, text, (size_t)length) != 0)
+            slot = (slot + 1) & (texts->slot_count - 1);
+        if (texts->slots[slot] < 0) {
+            if (texts->count >= texts->room)
+                return 0;
+            memcpy(texts->known + texts->count * length, text, (size_t)length);
+            texts->slots[slot] = (int32_t)texts->count++;
+        }
+        texts->out[row] = texts->slots[slot];
+    }
+    return 1;
+}
+
+/* Gather numbers, and texts unless that is NULL, of events of one class.
+ *
+ * Return how many events: fewer where one is not in memory, or there is no room for a text. */
+int64_t msgflow_gather(const uint8_t *data, int64_t size, int64_t residues, const int64_t *bodies,
+                       int64_t count, const Column *columns, int64_t column_count, Texts *texts)
+{
+    Memory memory = {data, size};
+    int64_t begin, column, row;
+    for (begin = 0; begin < count; begin += ROWS_AT_ONCE) {
+        int64_t end = count - begin < ROWS_AT_ONCE ? count : begin + ROWS_AT_ONCE;
+        for (row = begin; row < end; row++)
+            if (bodies[row] >= 0 && bodies[row] < size)
+                __builtin_prefetch(data + bodies[row]);
+        for (column = 0; column < column_count; column++)
+            if (!fill(&memory, columns + column, bodies, residues, begin, end))
+                return begin;
+        if (texts && !number(&memory, texts, bodies, residues, begin, end))
+            return begin;
+    }
+    return count;
+}
