@@ -1,6 +1,7 @@
 # `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
 # is installed into .venv, except what only the distribution has: python3-venv, and for the tests
-# Babeltrace 2 to compare with and Chromium to look with. apt installs these where that is allowed.
+# Babeltrace 2 to compare with, Chromium to look with and a C compiler. apt installs these where that
+# is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -17,7 +18,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test test-all bench truth fuzz mutants babeltrace chromium clean
+.PHONY: help demo test test-all bench truth fuzz sanitize mutants babeltrace chromium compiler clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
@@ -26,6 +27,7 @@ help:
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth   precision and recall on systems of which everything is known, minutes'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
+	@echo 'make sanitize damaged traces through the compiled kernel, with sanitizers'
 	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
 	@echo 'make clean   remove what these made'
 
@@ -60,6 +62,9 @@ truth: $(VENV)/.installed
 fuzz: $(VENV)/.installed
 	$(BIN)/python benchmarks/fuzz.py
 
+sanitize: $(VENV)/.developed
+	$(BIN)/python benchmarks/sanitize.py
+
 mutants: $(VENV)/.developed
 	$(BIN)/python benchmarks/mutants.py
 
@@ -74,11 +79,11 @@ $(VENV)/.made:
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
 	@touch $@
 
-$(VENV)/.installed: pyproject.toml $(VENV)/.made
+$(VENV)/.installed: pyproject.toml msgflow/kernel/kernel.c $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable .
 	@touch $@
 
-$(VENV)/.developed: pyproject.toml $(VENV)/.made
+$(VENV)/.developed: pyproject.toml msgflow/kernel/kernel.c $(VENV)/.made | compiler
 	$(BIN)/python -m pip install --quiet --editable . --group dev
 	@touch $@ $(VENV)/.installed
 
@@ -91,6 +96,11 @@ chromium:
 	@$(APT); command -v chromium >/dev/null || apt_install chromium || true
 	@command -v chromium >/dev/null \
 		|| echo "note: no chromium: the tests that look at pages are skipped" >&2
+
+compiler:
+	@$(APT); command -v $(word 1,$(CC)) >/dev/null || apt_install gcc libc6-dev || true
+	@command -v $(word 1,$(CC)) >/dev/null \
+		|| echo "note: no C compiler: the tests of the compiled kernel are skipped" >&2
 
 clean:
 	rm -rf $(VENV) $(DEMO)

@@ -22,7 +22,10 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"msgflow {__version__}")
+        from msgflow import kernel
+
+        without = "" if kernel.library() else " (without the compiled kernel, see README)"
+        typer.echo(f"msgflow {__version__}{without}")
         raise typer.Exit()
 
 

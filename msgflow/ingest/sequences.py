@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from msgflow import kernel
 from msgflow.ingest.catalogue import Origin
+from msgflow.ingest.compiled_sequences import Latest, Numbers, OfTracepoint
 from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
+    import ctypes
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
@@ -95,6 +98,7 @@ class Sequences:
             name: _Latest([origin for origin in Origin if (name, origin) in asked])
             for name in catalogue.sequences
         }
+        self._compiled_latest = Latest(len(catalogue.sequences))
 
     def place(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> Placed:
         """Give the events of one round their threads and predecessors.
@@ -103,6 +107,9 @@ class Sequences:
             batches: (event name, batch) of all wanted events of the round, as the reader
                 delivers them.
         """
+        library = kernel.library()
+        if library is not None:
+            return self._place_compiled(library, batches)
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])
         known = self._threads.count
@@ -124,12 +131,56 @@ class Sequences:
         placed = tuple(
             (
                 name,
-                self._extended(name, batch, threads[begin:end], origins, groups.place[begin:end]),
+                self._extended(
+                    name,
+                    batch,
+                    threads[begin:end],
+                    [
+                        origins[each.sequence][each.origin][groups.place[begin:end]]
+                        for each in self._tracepoints[name].predecessors
+                    ],
+                ),
             )
             for (name, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True)
         )
         return Placed(
             placed, _new_threads(batches, threads, known), _names(batches, groups, events)
+        )
+
+    def _place_compiled(
+        self, library: ctypes.CDLL, batches: Sequence[tuple[str, pa.RecordBatch]]
+    ) -> Placed:
+        known = self._threads.count
+        threads = self._threads.of(batches)
+        ends = np.cumsum([0, *(batch.num_rows for _, batch in batches)])
+        names, codes = _coded_names(batches)
+        places = {name: place for place, name in enumerate(self._bits)}
+        given = [
+            OfTracepoint(
+                ids=to_numpy(batch["event_id"]),
+                times=to_numpy(batch["ts_ns"]),
+                threads=threads[begin:end],
+                names=of_batch,
+                sequences=int(self._memberships(name)),
+                label=self._label_of[name],
+                wanted=[
+                    (places[each.sequence], each.origin)
+                    for each in self._tracepoints[name].predecessors
+                ],
+            )
+            for (name, batch), begin, end, of_batch in zip(
+                batches, ends[:-1], ends[1:], codes, strict=True
+            )
+        ]
+        predecessors, stretches = self._compiled_latest.place(library, given, self._threads.count)
+        placed = tuple(
+            (name, self._extended(name, batch, of_batch.threads, values))
+            for (name, batch), of_batch, values in zip(batches, given, predecessors, strict=True)
+        )
+        return Placed(
+            placed,
+            _new_threads(batches, threads, known),
+            _name_rows(names, stretches.threads, stretches.names, stretches.extents),
         )
 
     def _memberships(self, name: str) -> np.uint8:
@@ -140,13 +191,13 @@ class Sequences:
         name: str,
         batch: pa.RecordBatch,
         threads: NDArray[np.int32],
-        origins: Mapping[str, Mapping[Origin, NDArray[Any]]],
-        places: NDArray[np.int32],
+        predecessors: Sequence[NDArray[Any]],
     ) -> pa.RecordBatch:
         columns = {column: batch[column] for column in _LEADING}
         columns["thread_index"] = to_arrow(threads)
-        for predecessor in self._tracepoints[name].predecessors:
-            values = origins[predecessor.sequence][predecessor.origin][places]
+        for predecessor, values in zip(
+            self._tracepoints[name].predecessors, predecessors, strict=True
+        ):
             is_missing = values == _NONE
             column = to_arrow(values, is_missing)
             if predecessor.origin is Origin.LABEL:
@@ -161,11 +212,11 @@ class _Threads:
     """Numbers threads, which are (host, PID namespace, pid, tid), from 0 as they are first seen."""
 
     def __init__(self, hosts: Sequence[int]) -> None:
+        library = kernel.library()
         self._hosts = np.asarray(hosts, np.int64)
-        self._names = _Numbers()
-        self._spaces = _Numbers()
-        self._namespaces = _Numbers()
-        self._threads = _Numbers()
+        self._names, self._spaces, self._namespaces, self._threads = (
+            _Numbers() if library is None else Numbers(library) for _ in range(4)
+        )
 
     @property
     def count(self) -> int:
@@ -313,25 +364,42 @@ def _names(
     groups: _Groups,
     events: Mapping[Origin, NDArray[Any]],
 ) -> pa.RecordBatch:
-    encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
-    codes = np.concatenate(
-        [
-            np.where(is_valid(chunk.indices), to_numpy(chunk.indices), _NONE)
-            for chunk in encoded.chunks
-        ]
-    )[groups.rows]
+    dictionary, of_batches = _coded_names(batches)
+    codes = np.concatenate(of_batches)[groups.rows]
     is_start = np.append(True, codes[1:] != codes[:-1])
     is_start[groups.starts] = True
     starts = np.flatnonzero(is_start)
     ends = np.append(starts[1:], codes.size) - 1
-    names = encoded.chunks[0].dictionary.take(to_arrow(codes[starts], codes[starts] == _NONE))
     extents = [
         events[origin][at] for origin in (Origin.EVENT_ID, Origin.TS_NS) for at in (starts, ends)
     ]
+    return _name_rows(dictionary, groups.threads[starts], codes[starts], extents)
+
+
+def _name_rows(
+    dictionary: pa.Array,
+    threads: NDArray[np.int32],
+    codes: NDArray[np.int32],
+    extents: Sequence[NDArray[np.int64]],
+) -> pa.RecordBatch:
+    names = dictionary.take(to_arrow(codes, codes == _NONE)).cast(pa.string())
     return pa.RecordBatch.from_arrays(
-        [to_arrow(groups.threads[starts]), names.cast(pa.string()), *map(to_arrow, extents)],
-        schema=THREAD_NAME_SCHEMA,
+        [to_arrow(threads), names, *map(to_arrow, extents)], schema=THREAD_NAME_SCHEMA
     )
+
+
+def _coded_names(
+    batches: Sequence[tuple[str, pa.RecordBatch]],
+) -> tuple[pa.Array, list[NDArray[np.int32]]]:
+    """Return all names of threads, and the place among them of each event's, -1 for none."""
+    encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
+    codes = []
+    for chunk in encoded.chunks:
+        numbers = to_numpy(chunk.indices)
+        if chunk.indices.null_count:
+            numbers = np.where(is_valid(chunk.indices), numbers, np.int32(_NONE))
+        codes.append(numbers)
+    return encoded.chunks[0].dictionary, codes
 
 
 def _gathered(batches: Sequence[tuple[str, pa.RecordBatch]], name: str) -> NDArray[Any]:

@@ -117,6 +117,32 @@ class Texts(ctypes.Structure):
     )
 
 
+class Wanted(ctypes.Structure):
+    """As in kernel.c."""
+
+    _fields_ = (
+        ("sequence", ctypes.c_int64),
+        ("origin", ctypes.c_int64),
+        ("out", ctypes.c_void_p),
+    )
+
+
+class Events(ctypes.Structure):
+    """As in kernel.c."""
+
+    _fields_ = (
+        ("ids", ctypes.c_void_p),
+        ("times", ctypes.c_void_p),
+        ("threads", ctypes.c_void_p),
+        ("names", ctypes.c_void_p),
+        ("count", ctypes.c_int64),
+        ("sequences", ctypes.c_int64),
+        ("label", ctypes.c_int64),
+        ("wanted", ctypes.c_void_p),
+        ("wanted_count", ctypes.c_int64),
+    )
+
+
 _COUNT, _ADDRESS = ctypes.c_int64, ctypes.c_void_p
 _ARGUMENTS = {
     "msgflow_scan": (
@@ -131,6 +157,14 @@ _ARGUMENTS = {
     "msgflow_gather": (
         *(_ADDRESS, _COUNT, _COUNT, _ADDRESS, _COUNT),
         *(_ADDRESS, _COUNT, _ADDRESS),
+    ),
+    "msgflow_numbers": (
+        *(_ADDRESS, _COUNT, _ADDRESS, _COUNT),
+        *(ctypes.POINTER(_COUNT), _ADDRESS, _COUNT, _ADDRESS),
+    ),
+    "msgflow_place": (
+        *(_ADDRESS, _COUNT, _COUNT, _COUNT, _ADDRESS, _ADDRESS, _COUNT),
+        *(_COUNT, _ADDRESS, _ADDRESS, _ADDRESS),
     ),
 }
 

@@ -347,3 +347,111 @@ int64_t msgflow_gather(const uint8_t *data, int64_t size, int64_t residues, cons
     }
     return count;
 }
+
+/* Number values as they are first seen.
+ *
+ * `known` has room for `room` of them, of which `*known_count` are there; `slots` has a power of two
+ * of places, more than `room`, which are -1 where they are free. Return how many were numbered:
+ * there is no room for the next one. */
+int64_t msgflow_numbers(const int64_t *values, int64_t count, int64_t *known, int64_t room,
+                        int64_t *known_count, int32_t *slots, int64_t slot_count, int32_t *numbers)
+{
+    int64_t row;
+    for (row = 0; row < count; row++) {
+        uint64_t hash = (uint64_t)values[row] * 0x9E3779B97F4A7C15u;
+        int64_t slot = (int64_t)(hash >> 32) & (slot_count - 1);
+        while (slots[slot] >= 0 && known[slots[slot]] != values[row])
+            slot = (slot + 1) & (slot_count - 1);
+        if (slots[slot] < 0) {
+            if (*known_count >= room)
+                break;
+            known[*known_count] = values[row];
+            slots[slot] = (int32_t)(*known_count)++;
+        }
+        numbers[row] = slots[slot];
+    }
+    return row;
+}
+
+enum { EVENT_ID, TS_NS, LABEL, ORIGINS };
+
+/* What is wanted of the latest event of a sequence on the same thread: labels are of one byte. */
+typedef struct {
+    int64_t sequence, origin;
+    void *out;
+} Wanted;
+
+/* Events of one tracepoint in order of their ids; `sequences` has a bit for each it belongs to. */
+typedef struct {
+    const int64_t *ids, *times;
+    const int32_t *threads, *names;
+    int64_t count, sequences, label;
+    const Wanted *wanted;
+    int64_t wanted_count;
+} Events;
+
+/* A stretch of events of a thread under one name: rows of these, in the order of their begins. */
+typedef struct {
+    int64_t thread, name, first_id, last_id, first_time, last_time;
+} Stretch;
+
+/* Go through the events of all batches in order of their ids, which lie in `id_count` from
+ * `first_id` on.
+ *
+ * `owners` has a zero for each id. `latest` has the origins of the latest event by thread and
+ * sequence, -1 for none, and is brought up to date. `stretch_of` has -1 for each thread;
+ * `stretches` has room for as many as there are events. Return how many stretches there are, -1 if
+ * ids or threads are not as they should be. */
+int64_t msgflow_place(const Events *batches, int64_t batch_count, int64_t first_id,
+                      int64_t id_count, int32_t *owners, int64_t *next, int64_t thread_count,
+                      int64_t sequence_count, int64_t *latest, int64_t *stretch_of,
+                      Stretch *stretches)
+{
+    int64_t batch, id, stretch_count = 0;
+    for (batch = 0; batch < batch_count; batch++) {
+        int64_t row;
+        for (row = 0; row < batches[batch].count; row++) {
+            int64_t place = batches[batch].ids[row] - first_id;
+            int64_t thread = batches[batch].threads[row];
+            if (place < 0 || place >= id_count || thread < 0 || thread >= thread_count)
+                return -1;
+            owners[place] = (int32_t)batch + 1;
+        }
+    }
+    for (id = 0; id < id_count; id++) {
+        const Events *events = batches + owners[id] - 1;
+        const Wanted *wanted;
+        int64_t row, thread, sequence, *of_thread, *stretch;
+        if (owners[id] == 0)
+            continue;
+        row = next[owners[id] - 1]++;
+        if (row >= events->count || events->ids[row] != first_id + id)
+            return -1;
+        thread = events->threads[row];
+        of_thread = latest + thread * sequence_count * ORIGINS;
+        for (wanted = events->wanted; wanted < events->wanted + events->wanted_count; wanted++) {
+            int64_t value = of_thread[wanted->sequence * ORIGINS + wanted->origin];
+            if (wanted->origin == LABEL)
+                ((int8_t *)wanted->out)[row] = (int8_t)value;
+            else
+                ((int64_t *)wanted->out)[row] = value;
+        }
+        for (sequence = 0; sequence < sequence_count; sequence++)
+            if (events->sequences >> sequence & 1) {
+                of_thread[sequence * ORIGINS + EVENT_ID] = first_id + id;
+                of_thread[sequence * ORIGINS + TS_NS] = events->times[row];
+                of_thread[sequence * ORIGINS + LABEL] = events->label;
+            }
+        stretch = stretch_of + thread;
+        if (*stretch < 0 || stretches[*stretch].name != events->names[row]) {
+            *stretch = stretch_count++;
+            stretches[*stretch] = (Stretch){.thread = thread,
+                                            .name = events->names[row],
+                                            .first_id = first_id + id,
+                                            .first_time = events->times[row]};
+        }
+        stretches[*stretch].last_id = first_id + id;
+        stretches[*stretch].last_time = events->times[row];
+    }
+    return stretch_count;
+}

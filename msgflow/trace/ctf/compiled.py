@@ -58,7 +58,7 @@ class CompiledLayout:
                 form_of[max(first, 0) : max(last + 1, 0)] = number
         body_of = np.full(max(layout.classes, default=0) + 1, -1, np.int32)
         steps: list[kernel.Step] = []
-        bodies = []
+        bodies: list[kernel.Body] = []
         for event_id, known in layout.classes.items():
             if event_id < 0:
                 raise UnusualError

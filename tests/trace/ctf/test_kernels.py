@@ -1,8 +1,8 @@
-"""The two ways to find events agree, whatever the layout and the damage."""
+"""Without a compiled kernel, the two ways to find events agree, whatever the layout and damage."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -14,6 +14,7 @@ from ctf_layouts import Style, TraceMaker
 from ctf_writer import Event, Packet, TraceContent, write_trace
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from kernels import without_kernel
 from mutations import flip_header, flip_stream, overwrite
 from same_batches import differences, read
 
@@ -21,6 +22,12 @@ from msgflow.errors import TraceError
 from msgflow.trace.ctf import events, lanes, lockstep, scan, steps
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
+
+
+@pytest.fixture(autouse=True)
+def numpy_alone() -> Iterator[None]:
+    with without_kernel():
+        yield
 
 
 ONE_BY_ONE = partial(lockstep.scan_lockstep, narrowest=1 << 30)
