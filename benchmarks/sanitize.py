@@ -119,6 +119,7 @@ def feed(trace: Path, random: Random) -> None:
     from mutations import streams
 
     import msgflow.trace
+    from msgflow.trace.ctf.compiled import compiled
     from msgflow.trace.ctf.layout import Span
     from msgflow.trace.ctf.memory import Memory
     from msgflow.trace.ctf.plans import make_plan
@@ -126,7 +127,8 @@ def feed(trace: Path, random: Random) -> None:
     stream = max(streams(trace), key=lambda path: path.stat().st_size).read_bytes()
     with msgflow.trace.open([trace]) as traces:
         for layout in traces._layouts:  # type: ignore[attr-defined]
-            if layout.compiled is None:
+            fast = compiled(layout)
+            if fast is None:
                 continue
             for _ in range(200):
                 begin = random.randrange(len(stream))
@@ -138,9 +140,9 @@ def feed(trace: Path, random: Random) -> None:
                 first = random.randrange(len(content)) // align * align
                 limit = random.randrange(first, len(content) + 1)
                 end = -(-limit // align) * align
-                found = layout.compiled.scan(memory, Span(0, first, end, limit))
+                found = fast.scan(layout, memory, Span(0, first, end, limit))
                 count = found.positions.size
-                headers = layout.compiled.headers(
+                headers = fast.headers(
                     memory, found.positions, np.array([count]), np.array([7], np.uint64)
                 )
                 for known in layout.classes.values():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -43,7 +44,6 @@ class CompiledLayout:
             UnusualError: it has something that only Python reads.
         """
         self._library = library
-        self._layout = layout
         header = layout.header
         if header is None or header.selector.mask >= _WIDEST_TABLE:
             raise UnusualError
@@ -91,8 +91,8 @@ class CompiledLayout:
         )
         self._address = ctypes.addressof(self._description)
 
-    def scan(self, memory: Memory, span: Span) -> Scanned:
-        """Find the events of a packet."""
+    def scan(self, layout: StreamLayout, memory: Memory, span: Span) -> Scanned:
+        """Find the events of a packet; it is the layout that was described."""
         parts: list[NDArray[np.int64]] = []
         position = ctypes.c_int64(span.begin)
         problem = None
@@ -112,7 +112,7 @@ class CompiledLayout:
             if count < found.size and position.value < span.end:
                 at = position.value
                 try:
-                    position.value = self._layout.next_event(memory.data, at, span)
+                    position.value = layout.next_event(memory.data, at, span)
                     parts.append(np.array([at]))
                 except FieldError as error:
                     problem = (at, str(error))
@@ -153,10 +153,15 @@ def compiled(layout: StreamLayout) -> CompiledLayout | None:
     library = kernel.library()
     if library is None:
         return None
-    try:
-        return CompiledLayout(library, layout)
-    except UnusualError:
-        return None
+    if layout not in _compiled:
+        try:
+            _compiled[layout] = CompiledLayout(library, layout)
+        except UnusualError:
+            _compiled[layout] = None
+    return _compiled[layout]
+
+
+_compiled: WeakKeyDictionary[StreamLayout, CompiledLayout | None] = WeakKeyDictionary()
 
 
 def _small(sizes: Iterable[int]) -> tuple[int, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msgflow.trace.ctf.compiled import compiled
 from msgflow.trace.ctf.headers import read_headers
 from msgflow.trace.ctf.lockstep import scan_lockstep
 from msgflow.trace.ctf.types import BYTE
@@ -66,9 +67,9 @@ def find_events(
         layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
         for entry in entries
     ]
-    fast = layout.compiled
+    fast = compiled(layout)
     if fast is not None:
-        scanned = [fast.scan(memory, span) for span in spans]
+        scanned = [fast.scan(layout, memory, span) for span in spans]
     else:
         scanned = scan_lockstep(layout, memory, spans)
     for entry, found in zip(entries, scanned, strict=True):
@@ -87,7 +88,7 @@ def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) 
     positions = np.concatenate([_begins(entry) for entry in entries])
     positions += np.repeat(bases, counts)
     befores = np.array([entry.clock_before for entry in entries], np.uint64)
-    fast = layout.compiled
+    fast = compiled(layout)
     if fast is not None:
         headers = fast.headers(memory, positions, counts, befores)
     else:

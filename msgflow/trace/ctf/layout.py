@@ -26,7 +26,6 @@ from msgflow.trace.ctf.walk import FieldError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from msgflow.trace.ctf.compiled import CompiledLayout
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
 GAP = 64
@@ -117,13 +116,6 @@ class StreamLayout:
         begin = base + aligned(events_at, align) // BYTE
         end = base + aligned(content_bits, align) // BYTE
         return Span(base, min(begin, end), end, base + (content_bits + BYTE - 1) // BYTE)
-
-    @cached_property
-    def compiled(self) -> CompiledLayout | None:
-        """How the compiled kernel reads it, None if it does not."""
-        from msgflow.trace.ctf.compiled import compiled
-
-        return compiled(self)
 
     @cached_property
     def only_id(self) -> int:
