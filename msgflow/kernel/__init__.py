@@ -153,7 +153,7 @@ _ARGUMENTS = {
         *(_ADDRESS, _ADDRESS, _COUNT, _ADDRESS, _COUNT, ctypes.c_uint64),
         *(_ADDRESS, _ADDRESS, _ADDRESS),
     ),
-    "msgflow_split": (_ADDRESS, _COUNT, _ADDRESS, _COUNT, _ADDRESS, _ADDRESS),
+    "msgflow_split": (_ADDRESS, _COUNT, _COUNT, _ADDRESS, _ADDRESS),
     "msgflow_gather": (
         *(_ADDRESS, _COUNT, _COUNT, _ADDRESS, _COUNT),
         *(_ADDRESS, _COUNT, _ADDRESS),

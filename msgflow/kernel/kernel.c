@@ -217,26 +217,26 @@ int64_t msgflow_headers(const Layout *layout, const uint8_t *data, int64_t size,
     return row;
 }
 
-/* Order rows by class, those of a class as they come in `order`: `places` are places in `order`.
+/* Order rows by class, those of a class as they come.
  *
- * `ends` has a zero for each class, and gets the end of each in `places`. Return how many rows were
- * placed: fewer than `count`, and `places` means nothing, if a class is not below `class_count`. */
-int64_t msgflow_split(const int64_t *order, int64_t count, const uint32_t *classes,
-                      int64_t class_count, int64_t *ends, int64_t *places)
+ * `ends` has a zero for each class, and gets the end of each in `rows`. Return how many rows were
+ * ordered: fewer than `count`, and `rows` means nothing, if a class is not below `class_count`. */
+int64_t msgflow_split(const uint32_t *classes, int64_t count, int64_t class_count, int64_t *ends,
+                      int64_t *rows)
 {
-    int64_t place, number, begin = 0;
-    for (place = 0; place < count; place++) {
-        if (classes[order[place]] >= class_count)
-            return place;
-        ends[classes[order[place]]]++;
+    int64_t row, number, begin = 0;
+    for (row = 0; row < count; row++) {
+        if (classes[row] >= class_count)
+            return row;
+        ends[classes[row]]++;
     }
     for (number = 0; number < class_count; number++) {
         int64_t of_class = ends[number];
         ends[number] = begin;
         begin += of_class;
     }
-    for (place = 0; place < count; place++)
-        places[ends[classes[order[place]]]++] = place;
+    for (row = 0; row < count; row++)
+        rows[ends[classes[row]]++] = row;
     return count;
 }
 

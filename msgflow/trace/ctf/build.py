@@ -49,7 +49,7 @@ class EventRows:
     has_cpu: NDArray[np.bool_] | None
     bodies: NDArray[np.int64]
     positions: NDArray[np.int64]
-    packets: NDArray[np.int64]
+    packets: NDArray[np.int32]
 
     def part(self, rows: slice) -> EventRows:
         """Return some of them."""

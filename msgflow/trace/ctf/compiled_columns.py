@@ -24,12 +24,11 @@ _LONGEST_TEXT = 256
 
 
 def split(
-    order: NDArray[np.int64], classes: NDArray[np.uint32], class_count: int
+    classes: NDArray[np.uint32], class_count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """Return the places in `order` class after class, and where each class ends among them.
+    """Return rows class after class, and where each class ends among them.
 
     Args:
-        order: rows.
         classes: number of the class of each row.
         class_count: numbers are below it.
 
@@ -40,17 +39,16 @@ def split(
     if library is None:
         return None
     ends = np.zeros(class_count, np.int64)
-    places = np.empty(order.size, np.int64)
+    rows = np.empty(classes.size, np.int64)
     count = library.msgflow_split(
-        order.ctypes.data,
-        order.size,
         classes.ctypes.data,
+        classes.size,
         class_count,
         ends.ctypes.data,
-        places.ctypes.data,
+        rows.ctypes.data,
     )
-    assert count == order.size
-    return places, ends
+    assert count == classes.size
+    return rows, ends
 
 
 class Texts:

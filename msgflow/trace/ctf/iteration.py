@@ -85,13 +85,12 @@ class Iteration:
         )
         try:
             for number, batch in enumerate(batches.items()):
-                packets.add(batch)
-                if batch.order.size:
-                    latest_ns = int(batch.ts_ns[batch.order[-1]])
+                packets.add(batch.packets)
+                if batch.ts_ns.size:
+                    latest_ns = int(batch.ts_ns[-1])
                 yield from self._events(batch, number)
                 yield from packets.take(self._batch_rows, number)
-                sizes = zip(batch.entries, batch.new, strict=True)
-                done += sum(entry.size for entry, new in sizes if new)
+                done += sum(packet.entry.size for packet in batch.packets)
                 if done < total:
                     self._report_progress(done / total, latest_ns)
         finally:
@@ -107,9 +106,8 @@ class Iteration:
         return plans
 
     def _events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
-        order = batch.order
         first_id = self.event_count
-        self.event_count += order.size
+        self.event_count += batch.ts_ns.size
         by_class, ends = _split(batch, len(self._classes))
         counts = np.diff(ends, prepend=0)
         self._counts += counts
@@ -129,7 +127,7 @@ class Iteration:
                 place = plan.layout.number
                 if counts[place]:
                     of_class = by_class[ends[place] - counts[place] : ends[place]]
-                    rows = _rows(batch, order[of_class], of_class + first_id)
+                    rows = _rows(batch, of_class, first_id)
                     parts.append(build_batch(plan, batch.memory, rows, self._names, walk_at))
             if parts:
                 whole = parts[0] if len(parts) == 1 else _in_order(parts)
@@ -143,18 +141,18 @@ class Iteration:
 
 def _split(batch: Batch, class_count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the events of a batch class after class, and where each class ends among them."""
-    fast = split(batch.order, batch.classes, class_count)
+    fast = split(batch.classes, class_count)
     if fast is not None:
         return fast
-    classes = batch.classes[batch.order].astype(np.uint16 if class_count < 1 << 16 else np.uint32)
+    classes = batch.classes.astype(np.uint16 if class_count < 1 << 16 else np.uint32)
     ends = np.cumsum(np.bincount(classes, minlength=class_count))
     return np.argsort(classes, kind="stable"), ends
 
 
-def _rows(batch: Batch, rows: NDArray[np.int64], event_ids: NDArray[np.int64]) -> EventRows:
-    packets = batch.packets[rows]
+def _rows(batch: Batch, rows: NDArray[np.int64], first_id: int) -> EventRows:
+    packets = batch.in_packet[rows]
     return EventRows(
-        event_ids=event_ids,
+        event_ids=rows + first_id,
         ts_ns=batch.ts_ns[rows],
         cpus=batch.cpus[packets],
         has_cpu=None if batch.has_cpu is None else batch.has_cpu[packets],

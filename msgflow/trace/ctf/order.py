@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,41 +25,77 @@ _MOST_EVENTS = 1 << 18
 
 @dataclass(frozen=True)
 class Batch:
-    """Events that follow those of the batch before in the total order.
-
-    The arrays have a row per event in memory; `order` picks those of the batch.
+    """Events that follow those of the batch before in the total order, and their packets.
 
     Attributes:
         memory: where the packets lie.
         entries: the packets in memory, in the order of their rows.
         bases: where they lie in memory; `Entry.base` may be of a later batch already.
-        new: which of them were not in the batch before.
-        counts: rows of each packet.
-        packets: which packet each row is in.
+        packets: of the packets that were not in a batch before, what their events say of them.
+        in_packet: which of `entries` each event is in.
         classes: numbers of the event classes.
-        clock: values of the clock.
         ts_ns: times.
         bodies: where contexts and payload begin.
         positions: where headers begin.
         cpus: the CPU of each packet.
         has_cpu: which packets have one; None if all have.
-        order: rows of the events, in the total order.
     """
 
     memory: Memory
     entries: list[Entry]
     bases: list[int]
-    new: list[bool]
-    counts: NDArray[np.int64]
-    packets: NDArray[np.int64]
+    packets: list[PacketEvents]
+    in_packet: NDArray[np.int32]
     classes: NDArray[np.uint32]
-    clock: NDArray[np.uint64]
     ts_ns: NDArray[np.int64]
     bodies: NDArray[np.int64]
     positions: NDArray[np.int64]
     cpus: NDArray[np.int32]
     has_cpu: NDArray[np.bool_] | None
-    order: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PacketEvents:
+    """What the events of a packet say of it.
+
+    Attributes:
+        entry: the packet.
+        count: of its events.
+        first: value of the clock at the first event, None if there is none.
+        last: at the last.
+        last_ns: time of the last.
+        falls_back: time runs backward in it.
+    """
+
+    entry: Entry
+    count: int
+    first: int | None
+    last: int | None
+    last_ns: int | None
+    falls_back: bool
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """All that is in memory.
+
+    Attributes:
+        new: which of the packets were not there before.
+        counts: rows of each packet.
+        clock: values of the clock.
+        rest: as in `Batch`, with a row per event in memory.
+    """
+
+    memory: Memory
+    entries: list[Entry]
+    new: list[bool]
+    counts: NDArray[np.int64]
+    in_packet: NDArray[np.int32]
+    classes: NDArray[np.uint32]
+    clock: NDArray[np.uint64]
+    ts_ns: NDArray[np.int64]
+    bodies: NDArray[np.int64]
+    positions: NDArray[np.int64]
 
 
 def ordered_batches(
@@ -88,11 +124,13 @@ def ordered_batches(
                 budget -= entries[done].size
                 done += 1
             until_ns = entries[done].order_ns if done < len(entries) else _NEVER_NS
-            batch = _load(loader, held, entries[first:done], report)
-            yield from _parts(_cut(batch, are_cut, since_ns, until_ns))
-            held, are_cut = _unfinished(batch, until_ns)
-            _forget(batch, held)
+            loaded = _load(loader, held, entries[first:done], report)
+            yield from _parts(loaded, _order(loaded, are_cut, since_ns, until_ns))
+            held, are_cut = _unfinished(loaded, until_ns)
+            _forget(loaded.entries, held)
             since_ns = until_ns
+            # It takes memory, and the next one will.
+            del loaded
     finally:
         loader.close()
 
@@ -102,7 +140,7 @@ def _load(
     held: Sequence[Entry],
     new: Sequence[Entry],
     report: Callable[[Entry, int, str], None],
-) -> Batch:
+) -> _Loaded:
     entries = sorted([*held, *new], key=lambda entry: entry.place)
     is_held = set(map(id, held))
 
@@ -126,34 +164,33 @@ def _load(
         assert clock is not None
         times.append(clock.to_ns_array(events.clock))
     counts = np.concatenate([part.counts for part in parts])
-    cpus = [entry.packet.header.cpu for entry in entries]
-    return Batch(
+    return _Loaded(
         memory=memory,
         entries=entries,
-        bases=[entry.base for entry in entries],
         new=[id(entry) not in is_held for entry in entries],
         counts=counts,
-        packets=np.repeat(np.arange(counts.size), counts),
-        classes=np.concatenate([part.classes for part in parts]),
-        clock=np.concatenate([part.clock for part in parts]),
-        ts_ns=np.concatenate(times),
-        bodies=np.concatenate([part.bodies for part in parts]),
-        positions=np.concatenate([part.positions for part in parts]),
-        cpus=np.array([cpu or 0 for cpu in cpus], np.uint64).astype(np.int32),
-        has_cpu=np.array([cpu is not None for cpu in cpus]) if None in cpus else None,
-        order=np.empty(0, np.int64),
+        in_packet=np.repeat(np.arange(counts.size, dtype=np.int32), counts),
+        classes=_joined([part.classes for part in parts]),
+        clock=_joined([part.clock for part in parts]),
+        ts_ns=_joined(times),
+        bodies=_joined([part.bodies for part in parts]),
+        positions=_joined([part.positions for part in parts]),
     )
 
 
-def _cut(batch: Batch, are_cut: bool, since_ns: int, until_ns: int) -> Batch:
-    """Pick the events before `until_ns`.
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDArray[np.int64]:
+    """Return the rows of the events before `until_ns` in the total order.
 
     Unless `are_cut`, held packets have events that are done: those before `since_ns`.
     """
-    ts_ns = batch.ts_ns
+    ts_ns = loaded.ts_ns
     rows: NDArray[np.int64] | None = None
     if not are_cut:
-        waits = np.repeat(np.array(batch.new), batch.counts) | (ts_ns >= since_ns)
+        waits = np.repeat(np.array(loaded.new), loaded.counts) | (ts_ns >= since_ns)
         rows = np.flatnonzero(waits)
     # Stable: at the same time, rows stay in the order of streams and of places in a stream.
     order = np.argsort(ts_ns if rows is None else ts_ns[rows], kind="stable")
@@ -161,29 +198,67 @@ def _cut(batch: Batch, are_cut: bool, since_ns: int, until_ns: int) -> Batch:
         order = rows[order]
     if until_ns < _NEVER_NS:
         order = order[: np.searchsorted(ts_ns[order], until_ns)]
-    return Batch(**{**vars(batch), "order": order})
+    return order
 
 
-def _parts(batch: Batch) -> Iterator[Batch]:
-    """Yield the batch in parts, as large packets make it large: columns of it take memory."""
-    new = batch.new
-    for begin in range(0, max(batch.order.size, 1), _MOST_EVENTS):
-        order = batch.order[begin : begin + _MOST_EVENTS]
-        yield Batch(**{**vars(batch), "order": order, "new": new})
-        new = [False] * len(new)
+def _parts(loaded: _Loaded, order: NDArray[np.int64]) -> Iterator[Batch]:
+    """Yield what is loaded in parts, as large packets make it large: columns of it take memory."""
+    packets = list(_packets(loaded))
+    bases = [entry.base for entry in loaded.entries]
+    cpus = [entry.packet.header.cpu for entry in loaded.entries]
+    for begin in range(0, max(order.size, 1), _MOST_EVENTS):
+        rows = order[begin : begin + _MOST_EVENTS]
+        yield Batch(
+            memory=loaded.memory,
+            entries=loaded.entries,
+            bases=bases,
+            packets=packets,
+            in_packet=loaded.in_packet[rows],
+            classes=loaded.classes[rows],
+            ts_ns=loaded.ts_ns[rows],
+            bodies=loaded.bodies[rows],
+            positions=loaded.positions[rows],
+            cpus=np.array([cpu or 0 for cpu in cpus], np.uint64).astype(np.int32),
+            has_cpu=np.array([cpu is not None for cpu in cpus]) if None in cpus else None,
+        )
+        packets = []
 
 
-def _unfinished(batch: Batch, until_ns: int) -> tuple[list[Entry], bool]:
+def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
+    """Yield what the events of new packets say of them."""
+    ts_ns, clock = loaded.ts_ns, loaded.clock
+    falls = np.flatnonzero(ts_ns[1:] < ts_ns[:-1]) + 1
+    owners = loaded.in_packet[falls]
+    backward = set(owners[owners == loaded.in_packet[falls - 1]].tolist())
+    ends = np.cumsum(loaded.counts).tolist()
+    counts = loaded.counts.tolist()
+    for place, (entry, new) in enumerate(zip(loaded.entries, loaded.new, strict=True)):
+        if not new:
+            continue
+        count, end = counts[place], ends[place]
+        yield PacketEvents(
+            entry,
+            count,
+            int(clock[end - count]) if count else None,
+            int(clock[end - 1]) if count else None,
+            int(ts_ns[end - 1]) if count else None,
+            place in backward,
+        )
+
+
+def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
     """Return the packets that have events at or after this time, and whether only these are left.
 
     That is so unless time runs backward in one of them.
     """
     if until_ns >= _NEVER_NS:
         return [], True
-    late = np.flatnonzero(batch.ts_ns >= until_ns)
-    packets, first, counts = np.unique(batch.packets[late], return_index=True, return_counts=True)
-    ends = np.cumsum(batch.counts)[packets]
-    begins = ends - batch.counts[packets]
+    late = np.flatnonzero(loaded.ts_ns >= until_ns)
+    packets, first, counts = np.unique(
+        loaded.in_packet[late], return_index=True, return_counts=True
+    )
+    ends = np.cumsum(loaded.counts)[packets]
+    begins = ends - loaded.counts[packets]
     held, are_cut = [], True
     for packet, begin, at, end, count in zip(
         packets.tolist(),
@@ -193,21 +268,21 @@ def _unfinished(batch: Batch, until_ns: int) -> tuple[list[Entry], bool]:
         counts.tolist(),
         strict=True,
     ):
-        entry = batch.entries[packet]
+        entry = loaded.entries[packet]
         held.append(entry)
         assert entry.events is not None
         if count == end - at and entry.events.size == end - begin:
             if at > begin:
                 entry.events = entry.events[at - begin :]
-                entry.clock_before = int(batch.clock[at - 1])
+                entry.clock_before = int(loaded.clock[at - 1])
         else:
             are_cut = False
     return held, are_cut
 
 
-def _forget(batch: Batch, held: Sequence[Entry]) -> None:
+def _forget(entries: Sequence[Entry], held: Sequence[Entry]) -> None:
     """Drop what was found in packets that are done."""
     kept = set(map(id, held))
-    for entry in batch.entries:
+    for entry in entries:
         if id(entry) not in kept:
             entry.events = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.ctf.quirks import events_may_follow_end
@@ -13,10 +12,10 @@ from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from msgflow.trace.ctf.entries import Entry
-    from msgflow.trace.ctf.order import Batch
+    from msgflow.trace.ctf.order import PacketEvents
 
 
 class PacketRows:
@@ -27,29 +26,16 @@ class PacketRows:
         self._report = report
         self._rows: list[tuple[Any, ...]] = []
 
-    def add(self, batch: Batch) -> None:
-        """Add the new packets of a batch."""
-        ends = np.cumsum(batch.counts)
-        backward = np.zeros(ends.size, np.bool_)
-        falls = np.flatnonzero(batch.ts_ns[1:] < batch.ts_ns[:-1]) + 1
-        backward[batch.packets[falls[batch.packets[falls] == batch.packets[falls - 1]]]] = True
-        for entry, new, count, end, falls_back in zip(
-            batch.entries,
-            batch.new,
-            batch.counts.tolist(),
-            ends.tolist(),
-            backward.tolist(),
-            strict=True,
-        ):
-            if not new:
-                continue
-            if falls_back:
+    def add(self, packets: Sequence[PacketEvents]) -> None:
+        """Add packets that were read."""
+        for packet in packets:
+            entry = packet.entry
+            if packet.falls_back:
                 self._report(entry, 0, "time runs backward in the packet")
-            if count and batch.clock[end - count] < entry.begin:
+            if packet.first is not None and packet.first < entry.begin:
                 self._report(entry, 0, "an event is earlier than the begin of its packet")
-            last = int(batch.clock[end - 1]) if count else None
-            last_ns = int(batch.ts_ns[end - 1]) if count and entry.stream.has_time else None
-            self._rows.append(self._row(entry, count, last, last_ns))
+            last_ns = packet.last_ns if entry.stream.has_time else None
+            self._rows.append(self._row(entry, packet.count, packet.last, last_ns))
 
     def take(self, most: int, number: int) -> Iterator[EventBatch]:
         """Give away what was collected in this round, at most so many rows at once."""
