@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-# Older clients (DBeaver, Grafana, notebooks) read files of this storage version.
-STORAGE_VERSION = "v1.4.0"
+# Older clients (DBeaver, Grafana, notebooks) read files of this storage version. One before it
+# would lose which parts of stored statements are MATERIALIZED.
+STORAGE_VERSION = "v1.5.0"
 
 
 def open_file(

@@ -151,7 +151,7 @@ sink AS (
 ),
 pair AS MATERIALIZED (
     SELECT
-        a.path_id, a.root_key, a.take_id, k.sink_event,
+        a.path_id, a.root_key, a.take_id,
         CASE k.sink_event
             WHEN 'take' THEN a.taken_ns
             WHEN 'callback_start' THEN a.start_ns
@@ -277,48 +277,18 @@ explained AS (
         AND s.publisher_id = c.publisher_id
         AND s.route = c.route
 ),
+-- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
-    SELECT
-        e.run_id,
-        e.path_id,
-        e.root_key,
-        e.root_ns,
-        a.take_id,
-        a.sink_event,
-        a.sink_ns,
-        'reached' AS status,
-        NULL::VARCHAR AS reason
+    SELECT a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns
     FROM pair AS a
     JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
     UNION ALL
-    SELECT
-        m.run_id,
-        m.path_id,
-        m.root_key,
-        m.root_ns,
-        NULL,
-        NULL,
-        NULL,
-        CASE
-            WHEN x.is_cut THEN 'cut_by_recording'
-            WHEN x.is_cached THEN 'superseded'
-            ELSE 'lost'
-        END,
-        CASE WHEN x.is_cached AND NOT x.is_cut THEN 'superseded' ELSE x.reason END
-    FROM missing AS m
-    JOIN explained AS x ON m.path_id = x.path_id AND m.root_key = x.root_key
+    SELECT path_id, root_key, root_ns, NULL, NULL FROM missing
 ),
 longest AS (
     SELECT path_id, max(sink_ns - root_ns) AS longest_ns
     FROM outcome
     GROUP BY path_id
-),
-timed AS (
-    SELECT
-        o.run_id, o.path_id, o.root_key, o.root_ns, o.take_id, o.sink_event, o.sink_ns, o.status,
-        o.reason, coalesce(o.sink_ns, o.root_ns + coalesce(l.longest_ns, 0)) AS until_ns
-    FROM outcome AS o
-    JOIN longest AS l ON o.path_id = l.path_id
 ),
 gap AS (
     SELECT
@@ -328,28 +298,43 @@ gap AS (
         ) AS covered_until_ns
     FROM main.gap
     WHERE list_contains(runs, run_id)
+),
+ranked AS (
+    SELECT
+        p.run_id, o.path_id, o.root_key, o.root_ns, o.take_id, o.sink_ns,
+        coalesce(o.sink_ns, o.root_ns + coalesce(l.longest_ns, 0)) AS until_ns,
+        row_number() OVER of_root = 1 AS is_first,
+        lead(true) OVER of_root IS NULL AS is_last,
+        o.take_id IS NULL OR row_number() OVER (
+            PARTITION BY o.path_id, o.take_id ORDER BY o.root_ns DESC, o.root_key DESC
+        ) = 1 AS is_newest
+    FROM outcome AS o
+    JOIN longest AS l ON o.path_id = l.path_id
+    JOIN path AS p ON o.path_id = p.path_id
+    WINDOW of_root AS (PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns, o.take_id)
 )
 SELECT
-    o.run_id,
-    o.path_id,
-    CASE WHEN o.root_key > 0 THEN 'callback_instance' ELSE 'publication' END AS root_kind,
-    abs(o.root_key) AS root_id,
-    o.root_ns,
-    o.take_id,
-    o.sink_event,
-    o.sink_ns,
-    o.sink_ns - o.root_ns AS latency_ns,
-    o.status,
-    o.reason,
-    row_number() OVER (
-        PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns, o.take_id
-    ) = 1 AS is_first,
-    row_number() OVER (
-        PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns DESC, o.take_id DESC
-    ) = 1 AS is_last,
-    o.take_id IS NULL OR row_number() OVER (
-        PARTITION BY o.path_id, o.take_id ORDER BY o.root_ns DESC, o.root_key DESC
-    ) = 1 AS is_newest,
-    coalesce(g.covered_until_ns >= o.root_ns, false) AS is_loss_affected
-FROM timed AS o
-ASOF LEFT JOIN gap AS g ON o.run_id = g.run_id AND o.until_ns >= g.start_ns
+    r.run_id,
+    r.path_id,
+    CASE WHEN r.root_key > 0 THEN 'callback_instance' ELSE 'publication' END AS root_kind,
+    abs(r.root_key) AS root_id,
+    r.root_ns,
+    r.take_id,
+    CASE WHEN r.take_id IS NOT NULL THEN k.sink_event END AS sink_event,
+    r.sink_ns,
+    r.sink_ns - r.root_ns AS latency_ns,
+    CASE
+        WHEN r.take_id IS NOT NULL THEN 'reached'
+        WHEN x.is_cut THEN 'cut_by_recording'
+        WHEN x.is_cached THEN 'superseded'
+        ELSE 'lost'
+    END AS status,
+    CASE WHEN x.is_cached AND NOT x.is_cut THEN 'superseded' ELSE x.reason END AS reason,
+    r.is_first,
+    r.is_last,
+    r.is_newest,
+    coalesce(g.covered_until_ns >= r.root_ns, false) AS is_loss_affected
+FROM ranked AS r
+ASOF LEFT JOIN gap AS g ON r.run_id = g.run_id AND r.until_ns >= g.start_ns
+LEFT JOIN sink AS k ON r.path_id = k.path_id
+LEFT JOIN explained AS x ON r.path_id = x.path_id AND r.root_key = x.root_key

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from thorough import few
 
 import msgflow
 from msgflow.clocks import apply_clocks, read_clock_sync
-from msgflow.db import definition, migrate
+from msgflow.db import definition, migrate, objects
 from msgflow.db.connection import connect
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
@@ -156,6 +157,30 @@ def test_the_definitions_are_those_of_a_new_file(tmp_path: Path) -> None:
     migrate.create(path)
     with duckdb.connect(str(path), read_only=True) as con:
         assert definition.rendered(con) == definition._made()
+
+
+def test_what_is_materialized_is_so_in_a_file_as_well(tmp_path: Path) -> None:
+    """Files of a storage version before v1.5.0 lose the word, and with it memory and time."""
+    path = tmp_path / "new.duckdb"
+    migrate.create(path)
+    with connect(path, read_only=True) as con:
+        macros = con.execute(
+            "SELECT schema_name || '.' || function_name, upper(macro_definition) "
+            "FROM duckdb_functions() WHERE macro_definition IS NOT NULL AND NOT internal"
+        ).fetchall()
+        views = con.execute(
+            "SELECT schema_name || '.' || view_name, upper(sql) FROM duckdb_views() "
+            "WHERE NOT internal"
+        ).fetchall()
+    stored = dict(macros) | dict(views)
+    said = {
+        header.name: len(
+            re.findall(r"AS (?:NOT )?MATERIALIZED \(", re.sub("--.*", "", header.body))
+        )
+        for header in objects.views()
+    }
+    assert sum(said.values()) > 30
+    assert said == {name: stored[name].count("MATERIALIZED (") for name in said}
 
 
 def test_the_cache_is_used_and_not_needed(

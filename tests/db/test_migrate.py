@@ -18,7 +18,7 @@ from msgflow.db.opening import open_file
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
 
-LABELS = Path(__file__).parents[1] / "data" / "migrations" / "0008_labels.py"
+LABELS = Path(__file__).parents[1] / "data" / "migrations" / "0009_labels.py"
 
 # All that a schema is, row by row.
 SCHEMA = {
@@ -90,11 +90,11 @@ def test_an_older_file_becomes_what_a_new_one_is(
     assert len(runs) == 2
 
     request.getfixturevalue("next_revision")
-    with pytest.raises(DatabaseError, match=f"has schema revision {before}, .* needs 0008") as told:
+    with pytest.raises(DatabaseError, match=f"has schema revision {before}, .* needs 0009") as told:
         connect(small_database, read_only=True)
     assert told.value.hint == f"msgflow db upgrade --db {small_database}"
     done = migrate.upgrade(small_database)
-    assert (done.before, done.after, done.views_changed) == (before, "0008", True)
+    assert (done.before, done.after, done.views_changed) == (before, "0009", True)
 
     new = tmp_path / "new.duckdb"
     migrate.create(new)
@@ -113,11 +113,11 @@ def test_a_failing_migration_leaves_the_file_as_it_was(small_database: Path) -> 
     with pytest.raises(duckdb.CatalogException, match="labels"):
         migrate.upgrade(small_database)
     with duckdb.connect(str(small_database), read_only=True) as con:
-        assert recorded_revision(con) == "0007"
+        assert recorded_revision(con) == "0008"
         assert con.execute("SELECT count(*) FROM main.run").fetchall() == [(2,)]
 
 
-@pytest.mark.parametrize("revision", ["0001", "0006"])
+@pytest.mark.parametrize("revision", ["0001", "0007"])
 def test_files_of_before_the_first_release_are_ingested_anew(database: Path, revision: str) -> None:
     with duckdb.connect(str(database)) as con:
         con.execute("UPDATE store.alembic_version SET version_num = ?", [revision])

@@ -11,7 +11,7 @@ import pytest
 
 from msgflow.db import migrate
 
-OLDEST = "1.4.0"
+OLDEST = "1.5.0"
 
 READ = """
 import json, sys

@@ -6,7 +6,7 @@ a file with others is refused, and its traces are ingested again. From then on e
 table is a revision after this one, with literal operations that do not follow later changes.
 """
 
-revision = "0007"
+revision = "0008"
 down_revision = None
 branch_labels = None
 depends_on = None
