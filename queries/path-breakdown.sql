@@ -61,10 +61,15 @@ FROM main.end_to_end_trail(
 );
 
 CREATE OR REPLACE TEMP TABLE breakdown_part AS
+SELECT path_id, flow_id, hop, position, part, duration_ns, callback_instance_id
+FROM main.end_to_end_piece('breakdown_flow', 'breakdown_trail', $runs);
+
+-- A step of its own: looked up while the parts are made, this would stay in memory beside them.
+CREATE OR REPLACE TEMP TABLE breakdown_callback AS
 SELECT
     e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_instance_id,
     i.callback_id
-FROM main.end_to_end_piece('breakdown_flow', 'breakdown_trail', $runs) AS e
+FROM breakdown_part AS e
 LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id;
 
 -- How long the executor was busy before each take.
@@ -73,7 +78,7 @@ SELECT callback_instance_id, busy_min_ns, busy_max_ns
 FROM main.executor_wait
 WHERE callback_instance_id IN (
     SELECT callback_instance_id
-    FROM breakdown_part
+    FROM breakdown_callback
     WHERE part IN ('publish_to_take', 'request_to_take')
 );
 
@@ -83,7 +88,7 @@ WITH taken AS (
         e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_id,
         least(coalesce(w.busy_min_ns, 0), greatest(e.duration_ns, 0)) AS busy_min_ns,
         least(coalesce(w.busy_max_ns, e.duration_ns), greatest(e.duration_ns, 0)) AS busy_max_ns
-    FROM breakdown_part AS e
+    FROM breakdown_callback AS e
     LEFT JOIN breakdown_wait AS w ON e.callback_instance_id = w.callback_instance_id
     WHERE e.part IN ('publish_to_take', 'request_to_take')
 ),
@@ -92,7 +97,7 @@ part AS (
         path_id, flow_id, hop, position, part, duration_ns,
         CASE WHEN part IN ('callback', 'cache', 'take_to_callback', 'service') THEN callback_id END
             AS callback_id
-    FROM breakdown_part
+    FROM breakdown_callback
     WHERE part NOT IN ('publish_to_take', 'request_to_take')
     UNION ALL
     SELECT
@@ -115,7 +120,7 @@ repeated AS (
     SELECT p.path_id, p.hop, p.part, p.callback_id, count(DISTINCT p.flow_id) AS flows
     FROM part AS p
     JOIN (
-        SELECT DISTINCT path_id, hop FROM breakdown_part WHERE part IN ('cache', 'service')
+        SELECT DISTINCT path_id, hop FROM breakdown_callback WHERE part IN ('cache', 'service')
     ) AS r ON p.path_id = r.path_id AND p.hop = r.hop
     GROUP BY p.path_id, p.hop, p.part, p.callback_id
 ),

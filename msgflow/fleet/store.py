@@ -29,12 +29,14 @@ _T = TypeVar("_T")
 
 S3 = "s3://"
 _CHUNK = 8 * 1024 * 1024
-# Of each request, by the client of AWS, which waits longer each time.
-_MOST_ATTEMPTS = 10
+# Of each request, by the client of AWS, which waits twice as long each time: together some 10 s.
+_MOST_ATTEMPTS = 6
 _CONNECT_SECONDS = 10
 _REQUEST_SECONDS = 60
 # What the environment may name an endpoint by, first the more special one.
 _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
+# What the client of AWS says where nobody answers: it has waited enough for that.
+_UNREACHABLE = "NETWORK_CONNECTION"
 # Seconds between tries.
 _PAUSES = (0.1, 0.3, 1.0, 3.0)
 _OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
@@ -192,6 +194,8 @@ class Store:
                 raise
             except OSError as error:
                 if error.errno is not None and error.errno in _OF_THIS_MACHINE:
+                    raise
+                if _UNREACHABLE in str(error):
                     raise
                 time.sleep(pause * random.uniform(0.5, 1.5))
         return work()

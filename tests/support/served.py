@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import threading
 from dataclasses import dataclass, field
+from decimal import ROUND_HALF_UP, Decimal
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -13,7 +14,7 @@ import duckdb
 
 from msgflow.view.server import running
 
-_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1, "ns"))
+_UNITS = ((10**9, "s"), (10**6, "ms"), (10**3, "µs"), (1, "ns"))
 
 
 class Served:
@@ -119,5 +120,8 @@ def shown(ns: int | None) -> str:
     if ns == 0:
         return "0"
     scale, unit = next((scale, unit) for scale, unit in _UNITS if abs(ns) >= scale)
-    text = f"{ns / scale:,.3f}".rstrip("0").rstrip(".") if scale > 1 else str(ns)
-    return f"{text} {unit}"
+    if scale == 1:
+        return f"{ns} {unit}"
+    # A half goes up, as it does in tables of the terminal.
+    value = (Decimal(ns) / scale).quantize(Decimal("0.001"), ROUND_HALF_UP)
+    return f"{f'{value:,}'.rstrip('0').rstrip('.')} {unit}"
