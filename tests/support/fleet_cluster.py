@@ -91,7 +91,9 @@ class Watcher:
 
     def _run(self) -> None:
         try:
-            while not self._ended.wait(0.3):
+            is_last = False
+            while not is_last:
+                is_last = self._ended.wait(0.3)
                 if Store(self._url).read("lake.json") is not None:
                     self._look()
         except BaseException as error:
