@@ -48,7 +48,7 @@ DEFAULT_PORT = 8642
 USUAL_MEMORY = "160MB"
 # By how much its limit grows: a little at first, as that mostly suffices and decides how large the
 # server gets; then a lot, as each try works nearly to its end before it fails.
-_GROWTH = (1.3, 2.6)
+_GROWTH = (1.25, 1.3, 2.6)
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1
