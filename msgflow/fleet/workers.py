@@ -88,11 +88,10 @@ class RayWorkers:
         self._ray: Any = ray
         self._is_ours = not ray.is_initialized()
         if self._is_ours:
-            more = (
-                {"include_dashboard": False, "object_store_memory": 100_000_000}
-                if address == LOCAL
-                else {"address": address}
-            )
+            # Ray knows the word, too: without it, it would join what runs here or RAY_ADDRESS names.
+            more: dict[str, Any] = {"address": address}
+            if address == LOCAL:
+                more |= {"include_dashboard": False, "object_store_memory": 100_000_000}
             try:
                 ray.init(
                     logging_level=logging.ERROR,

@@ -132,3 +132,13 @@ def test_much_goes_wrong(
     # Nothing is left to do: no worker is asked.
     last = start_ingest(SOURCES, LAKE, "127.0.0.1:1", scratch)
     assert last.communicate(timeout=60)[1].count(f"{GOOD} there before, 1 failed before") == 1
+
+
+def test_a_cluster_of_its_own_beside_another(
+    cluster: Any, recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RAY_ADDRESS", cluster.address)
+    ingesting = start_ingest([str(recordings / "r0")], str(tmp_path / "lake"), "local", tmp_path)
+    _, said = ingesting.communicate(timeout=120)
+    assert ingesting.returncode == 0, said
+    assert [run["name"] for run in Lake.open(str(tmp_path / "lake")).runs().to_pylist()] == ["r0"]
