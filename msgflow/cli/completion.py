@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
-import typer.core
 
 from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 
@@ -39,21 +38,6 @@ class _Word(str):
 def is_completing() -> bool:
     """Tell whether a shell asks for completions."""
     return VARIABLE in os.environ
-
-
-class _AsTyped:
-    """In the place of what makes values of words, and imports Pydantic for it."""
-
-    def coerce(self, value: Any, **_: Any) -> Any:
-        return value
-
-
-def take_as_typed() -> None:
-    """Let Typer take all words of this process as they are.
-
-    It saves a third of the time. Another Typer, without this function, takes that longer.
-    """
-    typer.core.build_runtime_param = lambda descriptor: _AsTyped()  # type: ignore
 
 
 def complete(kind: str, *more: str) -> Callable[[typer.Context, str], list[str]]:

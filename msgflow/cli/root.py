@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.core import TyperGroup
 
-from msgflow.cli.completion import is_completing, take_as_typed
+from msgflow.cli import words
+from msgflow.cli.completion import is_completing
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.stop import STOP
 from msgflow.cli.tilde import with_home
@@ -98,11 +99,10 @@ class RootGroup(TyperGroup):
 
     def _run(self, args: Sequence[str] | None = None, **options: Any) -> ExitCode:
         options["standalone_mode"] = False
-        if is_completing():
-            take_as_typed()
+        (words.as_typed if is_completing() else words.plainly)()
         try:
-            words = with_home(sys.argv[1:] if args is None else args)
-            return ExitCode(super().main(words, **options) or 0)
+            line = with_home(sys.argv[1:] if args is None else args)
+            return ExitCode(super().main(line, **options) or 0)
         except KeyboardInterrupt as error:
             return _code_of(error)
         except typer.Abort:

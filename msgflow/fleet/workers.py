@@ -88,7 +88,7 @@ class RayWorkers:
         self._ray: Any = ray
         self._is_ours = not ray.is_initialized()
         if self._is_ours:
-            # Ray knows the word, too: without it, it would join what runs here or RAY_ADDRESS names.
+            # Ray knows the word: without it, it would join what runs here or RAY_ADDRESS names.
             more: dict[str, Any] = {"address": address}
             if address == LOCAL:
                 more |= {"include_dashboard": False, "object_store_memory": 100_000_000}
