@@ -120,6 +120,51 @@ def test_where_few_differences_are_left_the_middle_one_else_one_near_the_greates
     assert rows == [(difference, least, greatest, 10)]
 
 
+@pytest.mark.parametrize(("rival", "count"), [(90, 2), (89, 1)])
+def test_a_difference_that_nearly_as_many_messages_allow_may_be_right(
+    rules: duckdb.DuckDBPyConnection, rival: int, count: int
+) -> None:
+    """Nine in ten of the messages that agree with the best one."""
+    rules.execute(
+        "CREATE TABLE allowed AS SELECT 1 AS clock_id, 0 AS stretch, 0 AS least_ns, "
+        "1000 AS greatest_ns FROM range(100) "
+        "UNION ALL SELECT 1, 0, 1000000, 1001000 FROM range(?)",
+        [rival],
+    )
+    rows = rules.execute("SELECT vote_count FROM derive.agreed_difference('allowed')").fetchall()
+    assert sorted(rows, reverse=True) == [(100,), (rival,)][:count]
+
+
+@pytest.mark.parametrize(
+    ("agreeing", "rival", "is_sharp"),
+    [
+        pytest.param(95, 95, True, id="nearly_all_agree"),
+        pytest.param(94, 94, False, id="fewer_do_and_may_be_wrong"),
+        pytest.param(50, 44, True, id="fewer_do_but_no_other_is_a_rival"),
+    ],
+)
+def test_a_difference_is_sharp_if_nearly_all_agree_or_no_other_is_a_rival(
+    rules: duckdb.DuckDBPyConnection, agreeing: int, rival: int, *, is_sharp: bool
+) -> None:
+    """Of a hundred messages; a few fit with no publication that another one fits with."""
+    rules.execute(
+        "CREATE TABLE pairs AS SELECT 1 AS clock_id, 0 AS stretch, n * 100 - apart AS written_ns, "
+        "apart - 10 AS least_ns, apart AS greatest_ns "
+        "FROM (SELECT n, unnest([CASE WHEN n < $agreeing THEN 10 ELSE 2000000 + n * 100 END, "
+        "CASE WHEN n < $rival THEN 1000000 END]) AS apart FROM range(100) AS r(n)) "
+        "WHERE apart IS NOT NULL",
+        {"agreeing": agreeing, "rival": rival},
+    )
+    rules.execute(
+        "CREATE TABLE course AS SELECT 1 AS clock_id, 0 AS place, 0 AS stretch, 0 AS at_ns, "
+        "0 AS offset_ns"
+    )
+    rows = rules.execute(
+        "SELECT is_sharp FROM derive.sharp_difference('pairs', 'course', 0)"
+    ).fetchall()
+    assert rows == [(is_sharp,)]
+
+
 def test_no_drift_of_one_stretch(rules: duckdb.DuckDBPyConnection) -> None:
     """Twelve messages are one stretch, in which no drift shows; twice as many are two."""
     rows = record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=12)
