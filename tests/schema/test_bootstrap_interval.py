@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import sqrt
 
 import duckdb
 import pytest
@@ -56,3 +57,18 @@ def test_intervals_are_as_much_wider_as_blocks_are_few(con: duckdb.DuckDBPyConne
         low, high = drawn[statistic]
         assert low < high
         assert wider[statistic] == pytest.approx([widening * low, widening * high])
+
+
+@pytest.mark.parametrize("number", [200, 1_000, 4_000])
+def test_means_of_four_times_as_many_values_vary_half_as_much(
+    con: duckdb.DuckDBPyConnection, number: int
+) -> None:
+    """Though of more than a thousand values only a thousand are drawn at once."""
+    con.execute(
+        "UPDATE measure SET number = $number, "
+        "series = list_transform(range($number), lambda i: i * 37 % 100 + 1) WHERE side = 'a'",
+        {"number": number},
+    )
+    low, high = ends(con, 1, [1, 1, 1, 1])["mean"]
+    of_one = sqrt((100**2 - 1) / 12)
+    assert high - low == pytest.approx(2 * 1.96 * of_one / sqrt(number), rel=0.15)
