@@ -39,8 +39,8 @@
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
 -- needs: derive.known_word, derive.flow_chain, store.flow_root, derive.flow_transport,
---     derive.flow_continuation,
---     main.publication, main.callback_instance, main.take, main.gap, store.undelivered
+--     derive.flow_continuation, derive.stuck_root, main.publication, main.callback_instance,
+--     main.take, main.gap
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,
@@ -103,19 +103,15 @@ transport AS NOT MATERIALIZED (
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
-continuation AS NOT MATERIALIZED (
-    SELECT take_id, subscription_id, publication_id, publisher_id, route
-    FROM derive.flow_continuation
-    WHERE list_contains(runs, run_id)
-),
 step AS MATERIALIZED (
     SELECT c.take_id AS from_take_id, w.way_id, t.take_id
-    FROM continuation AS c
+    FROM derive.flow_continuation AS c
     JOIN transport AS t ON c.publication_id = t.publication_id
     JOIN way AS w
         ON t.publisher_id = w.publisher_id
         AND t.subscription_id = w.subscription_id
         AND c.route = w.route
+    WHERE list_contains(runs, c.run_id)
 ),
 reached (path_id, root_key, take_id) AS (
     SELECT p.path_id, r.root_key, t.take_id
@@ -179,103 +175,8 @@ missing AS MATERIALIZED (
     FROM expected AS e
     ANTI JOIN pair AS a ON e.path_id = a.path_id AND e.root_key = a.root_key
 ),
--- How far each root that did not arrive came: its last take on the way, by depth, then time.
-progress AS (
-    SELECT
-        m.path_id, m.root_key,
-        max(
-            CASE WHEN r.take_id IS NOT NULL THEN
-                struct_pack(depth := l.depth, taken_ns := t.taken_ns, take_id := r.take_id)
-            END
-        ) AS last_take
-    FROM missing AS m
-    JOIN lineage AS l ON m.path_id = l.path_id
-    LEFT JOIN reached AS r ON l.prefix_id = r.path_id AND m.root_key = r.root_key
-    LEFT JOIN main.take AS t ON r.take_id = t.take_id
-    GROUP BY m.path_id, m.root_key
-),
--- The step at which each root that did not arrive got stuck; none where only the end is missing.
-stuck AS (
-    SELECT
-        m.path_id, m.root_key, p.last_take.take_id AS take_id, p.last_take.taken_ns AS taken_ns,
-        n.publisher_id, n.route, n.subscription_id, n.is_cached,
-        CASE WHEN p.last_take IS NULL THEN m.publication_id ELSE c.publication_id END
-            AS publication_id
-    FROM missing AS m
-    JOIN progress AS p ON m.path_id = p.path_id AND m.root_key = p.root_key
-    LEFT JOIN lineage AS l
-        ON m.path_id = l.path_id AND l.depth = coalesce(p.last_take.depth, 0) + 1
-    LEFT JOIN path AS n ON l.prefix_id = n.path_id
-    LEFT JOIN (
-        SELECT take_id, publisher_id, route, max(publication_id) AS publication_id
-        FROM continuation
-        WHERE take_id IN (SELECT last_take.take_id FROM progress)
-        GROUP BY take_id, publisher_id, route
-    ) AS c
-        ON p.last_take.take_id = c.take_id
-        AND n.publisher_id = c.publisher_id
-        AND n.route = c.route
-),
--- When messages passed each step, as far as a root got stuck there.
-delivered AS (
-    SELECT
-        t.publisher_id, t.subscription_id,
-        min(b.start_ns) AS first_ns,
-        max(b.start_ns) AS last_ns
-    FROM transport AS t
-    JOIN main.publication AS b ON t.publication_id = b.publication_id
-    WHERE t.publisher_id IN (SELECT publisher_id FROM stuck)
-    GROUP BY t.publisher_id, t.subscription_id
-),
-continued AS (
-    SELECT
-        c.subscription_id, c.publisher_id, c.route,
-        min(t.taken_ns) AS first_ns,
-        max(t.taken_ns) AS last_ns
-    FROM continuation AS c
-    JOIN main.take AS t ON c.take_id = t.take_id
-    WHERE c.publisher_id IN (SELECT publisher_id FROM stuck)
-    GROUP BY c.subscription_id, c.publisher_id, c.route
-),
-finished AS (
-    SELECT a.path_id, min(t.taken_ns) AS first_ns, max(t.taken_ns) AS last_ns
-    FROM pair AS a
-    JOIN main.take AS t ON a.take_id = t.take_id
-    WHERE a.path_id IN (SELECT path_id FROM stuck WHERE publisher_id IS NULL)
-    GROUP BY a.path_id
-),
 explained AS (
-    SELECT
-        s.path_id,
-        s.root_key,
-        CASE
-            WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
-            WHEN s.publication_id IS NOT NULL THEN coalesce(u.reason, 'unknown')
-            ELSE 'not_published'
-        END AS reason,
-        s.publication_id IS NULL AND s.is_cached AS is_cached,
-        coalesce(
-            CASE
-                WHEN s.publisher_id IS NULL THEN
-                    s.taken_ns < f.first_ns OR s.taken_ns > f.last_ns
-                WHEN s.publication_id IS NOT NULL THEN
-                    b.start_ns < d.first_ns OR b.start_ns > d.last_ns
-                ELSE s.taken_ns < c.first_ns OR s.taken_ns > c.last_ns
-            END,
-            false
-        ) AS is_cut
-    FROM stuck AS s
-    LEFT JOIN main.publication AS b ON s.publication_id = b.publication_id
-    LEFT JOIN delivered AS d
-        ON s.publisher_id = d.publisher_id AND s.subscription_id = d.subscription_id
-    LEFT JOIN finished AS f ON s.path_id = f.path_id
-    LEFT JOIN store.undelivered AS u
-        ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
-    LEFT JOIN main.take AS t ON s.take_id = t.take_id
-    LEFT JOIN continued AS c
-        ON t.subscription_id = c.subscription_id
-        AND s.publisher_id = c.publisher_id
-        AND s.route = c.route
+    FROM derive.stuck_root('missing', 'lineage', 'path', 'reached', 'pair', runs)
 ),
 -- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
