@@ -28,13 +28,15 @@ class Entry:
         packet: where it lies.
         position: its place in the stream, copies left out.
         begin: value of the clock at its begin.
-        order_ns: no event of it is earlier.
+        order_ns: no event of it is earlier, nor of what is read of it.
         discarded: events lost in it.
         lost: packets lost right before it.
         base: where it lies in memory, in bytes.
         events: begins of its events as found by the scan, relative to `base`, those that are done
             left out; None before.
         clock_before: value of the clock at the event before these, or at the begin.
+        skipped: of a piece of a packet, bytes in front of it, which are read before.
+        until: where the piece ends; None: what is read is the whole packet.
     """
 
     stream: Stream
@@ -47,19 +49,43 @@ class Entry:
     base: int = -1
     events: NDArray[np.int64] | None = field(default=None)
     clock_before: int = field(init=False)
+    skipped: int = 0
+    until: int | None = None
 
     def __post_init__(self) -> None:
         self.clock_before = self.begin
 
     @property
     def size(self) -> int:
-        """Bytes of content."""
-        return (self.packet.content_bits + 7) // 8
+        """Bytes of content that are read."""
+        content = (self.packet.content_bits + 7) // 8
+        return (content if self.until is None else self.until) - self.skipped
 
     @property
-    def place(self) -> tuple[int, int]:
+    def place(self) -> tuple[int, int, int]:
         """What orders events of the same time: rank of the stream, place in it."""
-        return self.stream.rank, self.position
+        return self.stream.rank, self.position, self.skipped
+
+
+@dataclass(frozen=True)
+class PacketEvents:
+    """What the events of a packet say of it.
+
+    Attributes:
+        entry: the packet.
+        count: of its events.
+        first: value of the clock at the first event, None if there is none.
+        last: at the last.
+        last_ns: time of the last.
+        falls_back: time runs backward in it.
+    """
+
+    entry: Entry
+    count: int
+    first: int | None
+    last: int | None
+    last_ns: int | None
+    falls_back: bool
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) 
     if layout.header is None:
         return _walk_headers(layout, memory, entries, counts)
     bases = np.array([entry.base for entry in entries], np.int64)
-    positions = np.concatenate([_begins(entry) for entry in entries])
+    positions = np.concatenate([_begins(entry) for entry in entries], dtype=np.int64)
     positions += np.repeat(bases, counts)
     befores = np.array([entry.clock_before for entry in entries], np.uint64)
     fast = compiled(layout)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.order import Batch
     from msgflow.trace.ctf.slow import PacketWalk
 
-_LARGEST_BATCH = 16 << 20
+_LARGEST_BATCH = 8 << 20
 _SMALLEST_BATCH = 64 << 10
 _BYTES_PER_ROW = 256
 _AHEAD = 1
@@ -81,7 +82,8 @@ class Iteration:
         packets = PacketRows(self._report_damage)
         # Events of the next batch are found while columns of this one are made and used.
         batches = Prefetch(
-            lambda: ordered_batches(self._entries, size, self._report_damage), _AHEAD
+            lambda: ordered_batches(self._entries, size, self._report_damage, self._walked()),
+            _AHEAD,
         )
         try:
             for number, batch in enumerate(batches.items()):
@@ -96,6 +98,12 @@ class Iteration:
         finally:
             batches.close()
         self._report_progress(1.0, latest_ns)
+
+    def _walked(self) -> set[StreamLayout]:
+        """Return the streams of which events are read field by field: that needs whole packets."""
+        plans = itertools.chain.from_iterable(self._plans.values())
+        slow = {layout for layout, _ in self._classes if layout.header is None}
+        return slow | {plan.stream for plan in plans if plan.is_slow}
 
     def _planned(self, wanted: Mapping[str, pa.Schema]) -> dict[str, list[ClassPlan]]:
         plans: dict[str, list[ClassPlan]] = {}

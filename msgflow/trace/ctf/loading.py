@@ -59,6 +59,13 @@ class Loader:
         self.memory = memory
         return missing
 
+    def alone(self, entry: Entry) -> Memory | None:
+        """Return a memory that begins with this packet, None if its file no longer holds it."""
+        memory = self._new_memory(room_for(entry.size))
+        with memoryview(memory.data) as target:
+            target[entry.size : entry.size + GAP] = _ONES
+            return memory if self._read(entry, target[: entry.size]) else None
+
     def close(self) -> None:
         """Close all files."""
         for descriptor in self._files.values():
@@ -81,6 +88,7 @@ class Loader:
                 if len(self._files) >= _MOST_FILES:
                     self.close()
                 self._files[path] = os.open(path, os.O_RDONLY)
-            return os.preadv(self._files[path], [target], entry.packet.offset) == len(target)
+            begin = entry.packet.offset + entry.skipped
+            return os.preadv(self._files[path], [target], begin) == len(target)
         except OSError:
             return False

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msgflow.trace.ctf.entries import PacketEvents
 from msgflow.trace.ctf.events import Events, find_events, read_events, without_absurd
 from msgflow.trace.ctf.loading import Loader
+from msgflow.trace.ctf.pieces import cut
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.entries import Entry
+    from msgflow.trace.ctf.layout import StreamLayout
     from msgflow.trace.ctf.memory import Memory
 
 _NEVER_NS = 1 << 64
@@ -55,27 +59,6 @@ class Batch:
 
 
 @dataclass(frozen=True)
-class PacketEvents:
-    """What the events of a packet say of it.
-
-    Attributes:
-        entry: the packet.
-        count: of its events.
-        first: value of the clock at the first event, None if there is none.
-        last: at the last.
-        last_ns: time of the last.
-        falls_back: time runs backward in it.
-    """
-
-    entry: Entry
-    count: int
-    first: int | None
-    last: int | None
-    last_ns: int | None
-    falls_back: bool
-
-
-@dataclass(frozen=True)
 class _Loaded:
     """All that is in memory.
 
@@ -102,30 +85,45 @@ def ordered_batches(
     entries: Sequence[Entry],
     size: int,
     report: Callable[[Entry, int, str], None],
+    whole: Collection[StreamLayout] = (),
 ) -> Iterator[Batch]:
     """Read packets, given in order of time, about `size` bytes of them at once.
 
     An event at or after the begin of the next unread packet may have to wait for events of that
-    one: its packet stays in memory for the next batch. So no more is held than a batch and a packet
-    or so per stream.
+    one: its packet stays in memory for the next batch. Of large packets it is a piece that stays.
+    So no more is held than a batch and a piece or so per stream.
 
-    `report` is called with a packet, the byte of it and a message for everything damaged.
+    Args:
+        entries: the packets.
+        size: bytes of a batch.
+        report: called with a packet, the byte of it and a message for everything damaged.
+        whole: packets of these streams cannot be cut.
     """
     loader = Loader()
     try:
         held: list[Entry] = []
         are_cut = True
-        done = 0
+        unread = [(entry.order_ns, entry.place, entry) for entry in entries]
+        heapq.heapify(unread)
         since_ns = -_NEVER_NS
-        while done < len(entries) or held:
+        while unread or held:
             budget = max(size, sum(entry.size for entry in held) // 2)
-            first = done
-            while done < len(entries) and budget > 0:
-                budget -= entries[done].size
-                done += 1
-            until_ns = entries[done].order_ns if done < len(entries) else _NEVER_NS
-            loaded = _load(loader, held, entries[first:done], report)
-            yield from _parts(loaded, _order(loaded, are_cut, since_ns, until_ns))
+            new: list[Entry] = []
+            packets: list[PacketEvents] = []
+            while unread and budget > 0:
+                _, _, entry = heapq.heappop(unread)
+                found = None if entry.stream.layout in whole else cut(loader, entry, report)
+                if found is not None:
+                    packets.append(found[0])
+                    for piece in found[1]:
+                        heapq.heappush(unread, (piece.order_ns, piece.place, piece))
+                    continue
+                new.append(entry)
+                budget -= entry.size
+            until_ns = unread[0][0] if unread else _NEVER_NS
+            loaded = _load(loader, held, new, report)
+            packets += _packets(loaded)
+            yield from _parts(loaded, packets, _order(loaded, are_cut, since_ns, until_ns))
             held, are_cut = _unfinished(loaded, until_ns)
             _forget(loaded.entries, held)
             since_ns = until_ns
@@ -201,9 +199,10 @@ def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDAr
     return order
 
 
-def _parts(loaded: _Loaded, order: NDArray[np.int64]) -> Iterator[Batch]:
+def _parts(
+    loaded: _Loaded, packets: list[PacketEvents], order: NDArray[np.int64]
+) -> Iterator[Batch]:
     """Yield what is loaded in parts, as large packets make it large: columns of it take memory."""
-    packets = list(_packets(loaded))
     bases = [entry.base for entry in loaded.entries]
     cpus = [entry.packet.header.cpu for entry in loaded.entries]
     for begin in range(0, max(order.size, 1), _MOST_EVENTS):
@@ -225,7 +224,7 @@ def _parts(loaded: _Loaded, order: NDArray[np.int64]) -> Iterator[Batch]:
 
 
 def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
-    """Yield what the events of new packets say of them."""
+    """Yield what the events of new packets say of them; of pieces `cut` says it."""
     ts_ns, clock = loaded.ts_ns, loaded.clock
     falls = np.flatnonzero(ts_ns[1:] < ts_ns[:-1]) + 1
     owners = loaded.in_packet[falls]
@@ -233,7 +232,7 @@ def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
     ends = np.cumsum(loaded.counts).tolist()
     counts = loaded.counts.tolist()
     for place, (entry, new) in enumerate(zip(loaded.entries, loaded.new, strict=True)):
-        if not new:
+        if not new or entry.until is not None:
             continue
         count, end = counts[place], ends[place]
         yield PacketEvents(

@@ -14,8 +14,7 @@ from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from msgflow.trace.ctf.entries import Entry
-    from msgflow.trace.ctf.order import PacketEvents
+    from msgflow.trace.ctf.entries import Entry, PacketEvents
 
 
 class PacketRows:

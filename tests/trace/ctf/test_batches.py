@@ -16,18 +16,21 @@ from mutations import flip_stream, overwrite
 from same_batches import Content, differences, read
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import iteration, order
+from msgflow.trace.ctf import iteration, order, pieces
+from msgflow.trace.ctf.layout import GAP
 from msgflow.trace.ctf.loading import Loader
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 
 
 def read_in_pieces(trace: Path, most_bytes: int, most_events: int) -> Content:
-    """Read so little at once that packets of other streams keep most packets waiting."""
+    """Read so little at once that packets of other streams keep most packets waiting, and cut."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(iteration, "_SMALLEST_BATCH", most_bytes)
         patch.setattr(iteration, "_LARGEST_BATCH", most_bytes)
         patch.setattr(order, "_MOST_EVENTS", most_events)
+        patch.setattr(pieces, "_PIECE", max(most_bytes // GAP, 1) * GAP)
+        patch.setattr(pieces, "_LARGEST_WHOLE", 0)
         return read(trace)
 
 
@@ -53,9 +56,9 @@ def test_in_pieces_as_at_once(
     except TraceError:
         return
     for most_bytes, most_events in ((1, 1 << 18), (1, 3), (2000, 7)):
-        pieces = read_in_pieces(trace, most_bytes, most_events)
-        assert not differences(whole, pieces)
-        assert whole.damages == pieces.damages
+        found = read_in_pieces(trace, most_bytes, most_events)
+        assert not differences(whole, found)
+        assert whole.damages == found.damages
 
 
 def test_time_that_runs_backward_in_a_packet_that_waits(tmp_path: Path) -> None:
@@ -90,3 +93,39 @@ def test_room_is_used_again_when_nobody_uses_it() -> None:
     loader.load([])
     assert loader.memory.data is room
     assert loader.memory.data is not second.data
+
+
+def test_large_packets_are_read_piece_by_piece(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of up to 1 MiB as they are; a batch has 8 MiB, and what waits of other streams."""
+    kinds = {"test:n": {"n": "u32", "rest": "text[10000]"}}
+    streams = {
+        stream: [
+            Packet(
+                [Event(4 * n + stream, "test:n", (n, b"x")) for n in range(first, first + count)],
+                sequence=number,
+            )
+            for number, (first, count) in enumerate(packets)
+        ]
+        for stream, packets in enumerate([[(0, 100), (100, 1400)], [(0, 1500)], [(200, 110)]])
+    }
+    loaded: list[list[Any]] = []
+    load = Loader.load
+
+    def noted(loader: Loader, entries: Any) -> Any:
+        loaded.append([(entry.position, entry.until, entry.size) for entry in entries])
+        return load(loader, entries)
+
+    monkeypatch.setattr(Loader, "load", noted)
+    content = read(write_trace(tmp_path / "trace", TraceContent(kinds, streams)))
+    assert [row[0] for row in content.rows["test:n"]] == [*range(3110)]
+    times = [row[1] for row in content.rows["test:n"]]
+    assert times == sorted(times)
+    assert content.event_counts == {(0, "test:n"): 3110}
+    entries = [entry for entries in loaded for entry in entries]
+    wholes = {size for _, until, size in entries if until is None}
+    assert len(wholes) == 1
+    assert 0.9 < wholes.pop() / 1e6 < 1.1
+    assert 0.5 < max(size for _, until, size in entries if until is not None) / 1e6 < 0.56
+    assert 8 < max(sum(size for *_, size in entries) for entries in loaded) / 1e6 < 10
