@@ -249,3 +249,33 @@ def test_students_t_is_close_where_runs_are_few() -> None:
     winsorized = [max(logs[1], min(logs[4], x)) for x in logs]
     error = math.sqrt(statistics.variance(winsorized) * 5 / (4 * 3))
     assert math.log(1 + row["high_percent"] / 100) / error == pytest.approx(3.182446, rel=0.003)
+
+
+@pytest.mark.parametrize(
+    ("number", "told_of"),
+    [
+        (19, ()),
+        (20, ("median", "mean", "max")),
+        (99, ("median", "mean", "max")),
+        (100, ("median", "mean", "p95", "max")),
+        (499, ("median", "mean", "p95", "max")),
+        (500, ("median", "mean", "p95", "p99", "max")),
+    ],
+)
+def test_five_values_of_a_run_beyond_a_quantile_are_enough(
+    number: int, told_of: tuple[str, ...]
+) -> None:
+    import duckdb
+
+    with duckdb.connect() as con:
+        con.execute(
+            "CREATE TABLE flow AS SELECT 'r' AS run, '/a' AS path, 'reached' AS status, "
+            "false AS is_loss_affected, true AS is_first, true AS is_last, true AS is_newest, "
+            "n AS latency_ns FROM range(?) AS r(n)",
+            [number],
+        )
+        con.execute("CREATE TABLE e2e_latency AS SELECT 'r' AS run, false AS is_cut")
+        con.execute("CREATE TABLE sided AS SELECT 'r' AS run, 'a' AS side, 'u' AS unit")
+        told = program().run(con, "fleet_run_value", {"case": "every_pair"}).to_arrow_table()
+    enough = [row["statistic"] for row in told.to_pylist() if row["is_enough"]]
+    assert enough == list(told_of)
