@@ -209,6 +209,21 @@ def test_values_that_are_held_count_once(fresh_database: Path) -> None:
     assert sum(widths) / len(widths) == pytest.approx(expected, rel=0.2)
 
 
+def test_each_statistic_is_worth_what_lies_beyond_it(fresh_database: Path) -> None:
+    """Every third value is longer, every 25th much longer, and longest are four in a row."""
+    _fill(fresh_database, shift_ns=0, callbacks=1, values=400)
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute(
+            "UPDATE store.callback_instance SET end_ns = start_ns + CASE "
+            "WHEN start_ns // 10_000_000 BETWEEN 201 AND 204 THEN 3000 "
+            "WHEN start_ns // 10_000_000 % 25 = 0 THEN 2000 "
+            "ELSE 1000 + start_ns // 10_000_000 % 3 // 2 END"
+        )
+    with msgflow.open_db(fresh_database) as database:
+        worth = {row["statistic"]: row["a_independent"] for row in _rows(database, "after")}
+    assert worth["p99"] < worth["p95"] < worth["median"], worth
+
+
 def test_what_is_alike_all_along_has_no_interval(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=1_000_000, callbacks=10, values=320, held=80)
     with msgflow.open_db(fresh_database) as database:
