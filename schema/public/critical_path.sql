@@ -48,7 +48,7 @@
 --     false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- needs: main.end_to_end_part, main.executor_wait, derive.executor_meanwhile,
+-- needs: main.end_to_end_part, derive.flow_piece, main.executor_wait, derive.executor_meanwhile,
 --     main.callback_instance, main.publication, main.take, derive.executor_busy,
 --     derive.executor_size, derive.callback_exclusion, derive.process_clock, derive.corrected_ns,
 --     store.link_transport, store.link_causal
@@ -202,58 +202,6 @@ candidate AS (
     FROM completing AS c
     JOIN waiting AS w ON c.position = w.position
 ),
-clipped AS MATERIALIZED (
-    SELECT
-        c.position, c.priority, c.activity, c.latest_ns, c.callback_instance_id, c.publication_id,
-        greatest(c.from_ns, w.from_ns) AS from_ns,
-        least(c.to_ns, w.to_ns) AS to_ns
-    FROM candidate AS c
-    JOIN waiting AS w ON c.position = w.position
-    WHERE c.to_ns > w.from_ns AND c.from_ns < w.to_ns AND c.to_ns > c.from_ns
-),
--- Pieces between any two moments at which something begins or ends, each with what counts then.
-boundary AS (
-    SELECT position, from_ns AS at_ns FROM part
-    UNION
-    SELECT position, from_ns FROM clipped
-    UNION
-    SELECT c.position, c.to_ns
-    FROM clipped AS c
-    JOIN part AS p ON c.position = p.position
-    WHERE c.to_ns < p.to_ns
-    UNION
-    SELECT position, latest_ns FROM clipped WHERE latest_ns > from_ns AND latest_ns < to_ns
-),
-piece AS MATERIALIZED (
-    SELECT
-        b.position,
-        row_number() OVER in_time AS number,
-        b.at_ns AS from_ns,
-        coalesce(lead(b.at_ns) OVER in_time, p.to_ns) AS to_ns
-    FROM boundary AS b
-    JOIN part AS p ON b.position = p.position
-    WINDOW in_time AS (PARTITION BY b.position ORDER BY b.at_ns)
-),
--- What lasts goes from one piece on to another: both ends of it are boundaries.
-covering AS (
-    SELECT
-        c.position, c.priority, c.activity, c.latest_ns, c.callback_instance_id, c.publication_id,
-        c.from_ns, unnest(range(f.number, l.number + 1)) AS number
-    FROM clipped AS c
-    JOIN piece AS f ON c.position = f.position AND c.from_ns = f.from_ns
-    JOIN piece AS l ON c.position = l.position AND c.to_ns = l.to_ns
-),
-chosen AS (
-    SELECT
-        p.position, p.from_ns, p.to_ns, c.priority, c.activity, c.latest_ns,
-        c.callback_instance_id, c.publication_id
-    FROM piece AS p
-    LEFT JOIN covering AS c ON p.position = c.position AND p.number = c.number
-    QUALIFY row_number() OVER (
-        PARTITION BY p.position, p.number
-        ORDER BY c.priority NULLS LAST, c.from_ns, c.callback_instance_id
-    ) = 1
-),
 named AS (
     SELECT
         p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.flow_rank, p.hop,
@@ -269,7 +217,7 @@ named AS (
             AS callback_instance_id,
         CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
             AS publication_id
-    FROM chosen AS c
+    FROM derive.flow_piece('part', 'candidate') AS c
     JOIN part AS p ON c.position = p.position
 ),
 -- Neighbours that are the same thing become one.
