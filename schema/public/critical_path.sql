@@ -48,10 +48,10 @@
 --     false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- needs: main.end_to_end_part, derive.flow_piece, main.executor_wait, derive.executor_meanwhile,
---     main.callback_instance, main.publication, main.take, derive.executor_busy,
---     derive.executor_size, derive.callback_exclusion, derive.process_clock, derive.corrected_ns,
---     store.link_transport, store.link_causal
+-- needs: main.end_to_end_part, derive.flow_piece, main.executor_wait, derive.callback_ready,
+--     derive.executor_meanwhile, main.callback_instance, main.publication, main.take,
+--     derive.executor_busy, derive.executor_size, derive.callback_exclusion, derive.process_clock,
+--     derive.corrected_ns, store.link_transport, store.link_causal
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
@@ -86,6 +86,11 @@ wait AS MATERIALIZED (
     FROM main.executor_wait
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
+ready AS (
+    SELECT run_id, executor_id, callback_instance_id, earliest_ns, latest_ns, start_ns
+    FROM derive.callback_ready
+    WHERE callback_instance_id IN (SELECT callback_instance_id FROM wait)
+),
 meanwhile AS MATERIALIZED (
     SELECT
         w.callback_instance_id, w.executor_id, w.callback_id, w.latest_ns,
@@ -95,9 +100,7 @@ meanwhile AS MATERIALIZED (
         r.process_id,
         greatest(r.start_ns, w.earliest_ns) AS from_ns,
         least(r.end_ns, w.start_ns) AS to_ns
-    FROM derive.executor_meanwhile(
-        (SELECT coalesce(list(callback_instance_id), []) FROM wait)
-    ) AS i
+    FROM derive.executor_meanwhile('ready') AS i
     JOIN wait AS w ON i.callback_instance_id = w.callback_instance_id
     JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
     WHERE i.overlap_ns > 0

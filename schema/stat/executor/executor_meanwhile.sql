@@ -1,12 +1,13 @@
 -- name: derive.executor_meanwhile
 -- kind: macro
--- description: What the threads of its executor ran while a callback instance waited, for some
---     instances; otherwise as main.executor_interference. The messages of a burst wait for each
---     other: the pairs of all instances would be many, those of one instance are few.
+-- description: What the threads of its executor ran while a callback instance waited. The messages
+--     of a burst wait for each other: the pairs of all instances are many, those of one instance
+--     are few.
 -- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
--- needs: derive.callback_ready, derive.executor_run, store.executor_thread
-CREATE OR REPLACE MACRO derive.executor_meanwhile(waiting) AS TABLE
-WITH ready AS (
+-- param: waits VARCHAR  Name of rows as of derive.callback_ready
+-- needs: derive.executor_run, store.executor_thread
+CREATE OR REPLACE MACRO derive.executor_meanwhile(waits) AS TABLE
+WITH waiting AS (
     SELECT
         r.run_id,
         r.executor_id,
@@ -15,13 +16,12 @@ WITH ready AS (
         r.latest_ns,
         r.start_ns,
         x.thread_id
-    FROM derive.callback_ready AS r
+    FROM query_table(waits) AS r
     JOIN store.executor_thread AS x ON r.executor_id = x.executor_id
     WHERE r.start_ns > coalesce(r.earliest_ns, r.latest_ns)
-        AND r.callback_instance_id IN (SELECT unnest(waiting::BIGINT[]))
 ),
 run AS (
-    SELECT thread_id, callback_instance_id, start_ns, end_ns, position
+    SELECT thread_id, callback_instance_id, callback_id, start_ns, end_ns, position
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
@@ -33,7 +33,7 @@ bounded AS (
         w.thread_id, l.position AS last_position,
         CASE WHEN f.end_ns > w.from_ns THEN f.position ELSE coalesce(f.position, 0) + 1 END
             AS first_position
-    FROM ready AS w
+    FROM waiting AS w
     ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
     ASOF LEFT JOIN run AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
 ),
@@ -48,6 +48,7 @@ SELECT
     p.run_id,
     p.callback_instance_id,
     r.callback_instance_id AS meanwhile_id,
+    r.callback_id AS meanwhile_callback_id,
     p.executor_id,
     p.thread_id,
     least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.from_ns) AS overlap_ns,
