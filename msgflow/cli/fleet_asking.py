@@ -16,7 +16,13 @@ from msgflow.cli.options import (
     OutputOption,
     WideOption,
 )
-from msgflow.cli.sql import DEFAULT_LIMIT, statements_of
+from msgflow.cli.sql import (
+    DEFAULT_LIMIT,
+    PrintedRowsOption,
+    StatementsArgument,
+    StatementsFileOption,
+    statements_of,
+)
 from msgflow.errors import UsageError
 
 _CHOICE = "Which rows"
@@ -140,21 +146,11 @@ def query(
 
 
 def sql(
-    text: Annotated[
-        str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
-    ] = None,
+    text: StatementsArgument = None,
     lake: LakeOption = "",
     where: LakeWhereOption = None,
-    file: Annotated[
-        Path | None,
-        typer.Option("-f", "--file", metavar="FILE", help="Read the statements from FILE"),
-    ] = None,
-    limit: Annotated[
-        int,
-        typer.Option(
-            "--limit", min=0, metavar="ROWS", help="Maximum number of rows to print; 0 for all"
-        ),
-    ] = DEFAULT_LIMIT,
+    file: StatementsFileOption = None,
+    limit: PrintedRowsOption = DEFAULT_LIMIT,
     form: FormatOption = None,
     wide: WideOption = False,
     output: OutputOption = None,

@@ -14,22 +14,25 @@ from msgflow.errors import UsageError
 from msgflow.text_file import read_text
 
 DEFAULT_LIMIT = 1_000
+StatementsArgument = Annotated[
+    str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
+]
+StatementsFileOption = Annotated[
+    Path | None,
+    typer.Option("-f", "--file", metavar="FILE", help="Read the statements from FILE"),
+]
+PrintedRowsOption = Annotated[
+    int,
+    typer.Option(
+        "--limit", min=0, metavar="ROWS", help="Maximum number of rows to print; 0 for all"
+    ),
+]
 
 
 def command(
-    text: Annotated[
-        str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
-    ] = None,
-    file: Annotated[
-        Path | None,
-        typer.Option("-f", "--file", metavar="FILE", help="Read the statements from FILE"),
-    ] = None,
-    limit: Annotated[
-        int,
-        typer.Option(
-            "--limit", min=0, metavar="ROWS", help="Maximum number of rows to print; 0 for all"
-        ),
-    ] = DEFAULT_LIMIT,
+    text: StatementsArgument = None,
+    file: StatementsFileOption = None,
+    limit: PrintedRowsOption = DEFAULT_LIMIT,
     form: FormatOption = None,
     wide: WideOption = False,
     output: OutputOption = None,

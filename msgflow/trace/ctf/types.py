@@ -99,8 +99,25 @@ class String:
     align: int = BYTE
 
 
+class _Elements:
+    """What fixed and variable numbers of elements have in common."""
+
+    element: Type
+    minimum_align: int
+
+    @property
+    def align(self) -> int:
+        """That of the element, even when there is none."""
+        return max(self.minimum_align, self.element.align)
+
+    @property
+    def is_text(self) -> bool:
+        """The elements are characters."""
+        return is_character(self.element)
+
+
 @dataclass(frozen=True)
-class Array:
+class Array(_Elements):
     """A fixed number of elements."""
 
     element: Type
@@ -108,34 +125,14 @@ class Array:
     minimum_align: int = 1
     roles: frozenset[str] = frozenset()
 
-    @property
-    def align(self) -> int:
-        """That of the element, even when there is none."""
-        return max(self.minimum_align, self.element.align)
-
-    @property
-    def is_text(self) -> bool:
-        """The elements are characters."""
-        return is_character(self.element)
-
 
 @dataclass(frozen=True)
-class Sequence:
+class Sequence(_Elements):
     """As many elements as another field says."""
 
     element: Type
     length: Reference
     minimum_align: int = 1
-
-    @property
-    def align(self) -> int:
-        """That of the element, even when there is none."""
-        return max(self.minimum_align, self.element.align)
-
-    @property
-    def is_text(self) -> bool:
-        """The elements are characters."""
-        return is_character(self.element)
 
 
 @dataclass(frozen=True)
