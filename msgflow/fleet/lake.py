@@ -13,6 +13,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
+from msgflow.db.opening import open_memory
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.layout import (
     ABOUT,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
+    import duckdb
     import pyarrow as pa
 
 COVERED = "msgflow.covered"
@@ -40,7 +42,12 @@ _TOGETHER = "together-"
 _WORTH_IT = 8
 _MANY = 10_000
 _READ_AT_ONCE = 16
-_LATEST = (("generation", "descending"), ("committed_ns", "descending"), ("part", "descending"))
+_VISIBLE = """
+FROM known
+WINDOW latest AS (PARTITION BY run ORDER BY generation DESC, committed_ns DESC, part DESC)
+QUALIFY row_number() OVER latest = 1 AND NOT is_removed
+ORDER BY run
+"""
 
 
 class Lake:
@@ -308,19 +315,23 @@ class Lake:
         return [view_path(view, part) for part in sorted(parts)]
 
 
-def visible(rows: pa.Table) -> pa.Table:
-    """Return the rows of the table `run` that count, by key."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
+def visible(rows: pa.Table, con: duckdb.DuckDBPyConnection | None = None) -> pa.Table:
+    """Return the rows of the table `run` that count, by key.
 
-    ordered = rows.sort_by([("run", "ascending"), *_LATEST])
-    if not len(ordered):
-        return ordered
-    keys = ordered["run"].combine_chunks()
-    before = pa.concat_arrays([pa.nulls(1, keys.type), keys[:-1]])
-    # Without a value of Python: for one, pyarrow imports pandas where it is installed.
-    is_first = pc.or_kleene(pc.is_null(before), pc.not_equal(keys, before))
-    return ordered.filter(pc.and_(is_first, pc.invert(ordered["is_removed"])))
+    Args:
+        rows: columns of `run_schema`.
+        con: a connection to use; one of its own when None.
+    """
+    import pyarrow as pa
+
+    if con is None:
+        with open_memory() as con:
+            return visible(rows, con)
+    # Not pyarrow.compute: importing that takes longer.
+    con.register("known", rows)
+    found = con.sql(_VISIBLE).to_arrow_table()
+    con.unregister("known")
+    return pa.Table.from_arrays(found.columns, schema=rows.schema)
 
 
 def _is_together(path: str) -> bool:

@@ -31,7 +31,7 @@ def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
     if schema is None:
         return table
     if table.schema.equals(schema):
-        return table.cast(schema)
+        return pa.Table.from_arrays(table.columns, schema=schema)
     columns = [
         table[field.name].cast(field.type)
         if field.name in table.column_names

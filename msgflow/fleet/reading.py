@@ -21,6 +21,7 @@ from msgflow.db.reading import require_condition
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import PACK
+from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
 from msgflow.nearest import nearest
 from msgflow.query.run import first_line
@@ -69,20 +70,18 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
         UsageError: no condition that only reads, a label that no run has, or no run fits.
         DatabaseError: the lake cannot be read.
     """
-    runs = lake.runs()
-    if not len(runs):
-        raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
-    labels = tuple(sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()}))
-    chosen = runs
-    if where is not None:
-        import pyarrow.compute as pc
-
-        with open_memory() as con:
-            shut_in(con)
+    with open_memory() as con:
+        shut_in(con)
+        runs = visible(lake.rows(), con)
+        if not len(runs):
+            raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
+        labels = tuple(
+            sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()})
+        )
+        chosen = runs
+        if where is not None:
             require_condition(con, where, _EXAMPLE)
-            chosen = runs.filter(
-                pc.is_in(runs["run"], value_set=_fitting(con, runs, labels, where))
-            )
+            chosen = _fitting(con, runs, labels, where)
     if not len(chosen):
         raise UsageError(
             f"none of the {len(runs):,} runs of the lake fits — --where {where}",
@@ -105,17 +104,20 @@ def quoted(name: str) -> str:
 
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
-) -> pa.Array:
-    """Return the keys of the runs that a condition holds for."""
+) -> pa.Table:
+    """Return the runs that a condition holds for, by key."""
+    import pyarrow as pa
+
     con.register("known_run", runs)
     named = label_columns(labels, runs.column_names)
     columns = [f"labels[$label_{n}] AS {quoted(key)}" for n, key in enumerate(named)]
     # A comment at its end ends with the line.
     table = f"SELECT {', '.join(['*', *columns])} FROM known_run"
-    text = f"SELECT run FROM ({table}) WHERE (\n{where}\n)"
+    own = ", ".join(map(quoted, runs.column_names))
+    text = f"SELECT {own} FROM ({table}) WHERE (\n{where}\n) ORDER BY run"
     try:
         found = con.sql(text, params={f"label_{n}": key for n, key in enumerate(named)})
-        return found.to_arrow_table()["run"].combine_chunks()
+        return pa.Table.from_arrays(found.to_arrow_table().columns, schema=runs.schema)
     except duckdb.Error as error:
         match = _COLUMN.search(str(error))
         if match is None:
