@@ -228,7 +228,7 @@ def remove(
     from msgflow.fleet.lake import Lake
 
     Lake.open(lake).remove(keys)
-    print_status(f"{count(len(keys), 'run')} removed from {lake}")
+    print_status(f"{count(len(set(keys)), 'run')} removed from {lake}")
 
 
 @app.command("compact")

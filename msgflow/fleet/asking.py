@@ -51,7 +51,9 @@ _LAYER = "fleet"
 _OF_LAKE = "lake."
 _MADE = ("run", "run_group")
 # What looks at tables without naming them.
-_LISTS = re.compile(r"\b(show|describe|summarize|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE)
+_LISTS = re.compile(
+    r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
+)
 _BUCKETS = "distributed"
 
 
@@ -146,7 +148,8 @@ def fleet_query(
         notes.append(f"internal rows are hidden ({hidden:,}); --internal shows them")
     if cut:
         notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
-    if f"{_LAYER}.{_BUCKETS}" in header.needs and len(choice.runs) > 1:
+    is_each_alone = len(choice.runs) == 1 or "run" in group_by
+    if f"{_LAYER}.{_BUCKETS}" in header.needs and not is_each_alone:
         notes.append("medians and other quantiles of several runs are off by less than 1 %")
     return QueryResult(table, grouped, notes=notes)
 
@@ -218,6 +221,9 @@ def fleet_worst(
     table = table.append_column("command", pa.array(commands, pa.string()))
     table = table.drop_columns(["has_database"])
     notes = []
+    if commands[0] is not None:
+        # Where the screen has no room for the column.
+        notes.append(f"the slowest one: {commands[0]}")
     if None in commands:
         notes.append("runs without a command were written with --no-database")
     meaning = Column("command", "VARCHAR", None, "What opens the flow")
@@ -268,7 +274,7 @@ def _group(
 ) -> Header:
     """Make the table that says which run is of which group; return the query with their labels."""
     taken = {column.name.lower() for column in header.columns}
-    fields = set(choice.runs.column_names) - {"labels"}
+    fields = set(choice.runs.column_names) - {"labels", "is_removed"}
     values, bound = [], {}
     columns: list[Column] = []
     for name in dict.fromkeys(group_by):

@@ -79,9 +79,9 @@ def compare(
     Args:
         lake: the lake.
         by: key of the label.
-        base: its value in side A; with `other` None where the runs have two values of it: the
-            lesser is A, numbers in them by their size.
-        other: its value in side B.
+        base: its value in side A; None where the runs have two values of it: the lesser is A,
+            numbers in them by their size.
+        other: its value in side B; None where they have one besides `base`.
         where: condition on the runs, as `choose` has it; all when None.
         unit: key of a label of which each value counts as one run, such as the robot: where runs
             of one are more alike than those of several, as many runs tell less.
@@ -163,6 +163,8 @@ def _sides(
     values = sorted(known, key=_natural)
     have = ", ".join(f"{value} ({known[value]:,})" for value in values[:_MOST_NAMED])
     have += ", …" if len(values) > _MOST_NAMED else ""
+    if base in known and other is None and len(values) == 2:
+        (other,) = set(values) - {base}
     if base is None or other is None:
         if base is not None or len(values) != 2:
             raise UsageError(

@@ -13,12 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from msgflow.errors import MsgflowError, TraceError
+from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.failure import forget_failure, read_failures, write_failure
 from msgflow.fleet.lake import Lake, visible
 from msgflow.fleet.recording import is_archive_name, look_at
 from msgflow.fleet.sources import find_recordings
-from msgflow.fleet.store import S3
+from msgflow.fleet.store import S3, normal_url
 from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _LOOKING_AT_ONCE = 8
 _SECONDS_BETWEEN_LOOKS = 0.5
+_SECONDS_BETWEEN_LOOKS_AT_RUNS = 1.0
 _LONGEST_PAUSE = 60.0
 
 
@@ -143,6 +144,11 @@ def fleet_ingest(
         DatabaseError: the lake cannot be written, is none, or newer than this msgflow.
     """
     recordings = find_recordings(sources, labels)
+    url = normal_url(lake)
+    # A pattern for the folder that the lake is in fits it as well.
+    recordings = [each for each in recordings if not f"{each.source}/".startswith(f"{url}/")]
+    if not recordings:
+        raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
     opened = Lake.open_or_create(lake)
     return _Ingest(opened, recordings, options or Options(), progress).run(ray)
 
@@ -175,7 +181,19 @@ class _Ingest:
         # What is there stays as it is, for those who read it, until the new part is committed.
         self._edition = secrets.token_hex(4) if options.replace else ""
         self._progress = FleetProgress(len(recordings))
-        rows = lake.rows()
+        self._read_runs()
+        # Runs that this call wrote, and what else it found to have the packets of a run.
+        self._written: set[str] = set()
+        self._alike: dict[str, Mapping[str, Any]] = {}
+        self._failed = {row["source"]: row for row in read_failures(lake).to_pylist()}
+        # (when, tie, item): what is tried again after a pause.
+        self._paused: list[tuple[float, int, _Item]] = []
+        self._ties = itertools.count()
+
+    def _read_runs(self) -> None:
+        """Read which runs the lake has, where others may have changed that since the last time."""
+        self._files = set(self._lake.run_files())
+        rows = self._lake.rows()
         self._runs = {row["run"]: row for row in visible(rows).to_pylist()}
         self._sources = {row["source"]: key for key, row in self._runs.items()}
         self._generations: dict[str, int] = {}
@@ -183,10 +201,15 @@ class _Ingest:
             rows["run"].to_pylist(), rows["generation"].to_pylist(), strict=True
         ):
             self._generations[key] = max(generation, self._generations.get(key, 0))
-        self._failed = {row["source"]: row for row in read_failures(lake).to_pylist()}
-        # (when, tie, item): what is tried again after a pause.
-        self._paused: list[tuple[float, int, _Item]] = []
-        self._ties = itertools.count()
+        self._looked = time.monotonic()
+
+    def _look_again(self) -> None:
+        """Read anew which runs the lake has, where somebody else has written or removed some."""
+        if time.monotonic() - self._looked < _SECONDS_BETWEEN_LOOKS_AT_RUNS:
+            return
+        if set(self._lake.run_files()) != self._files:
+            self._read_runs()
+        self._looked = time.monotonic()
 
     def run(self, ray: str | None) -> FleetProgress:
         """Do all that is left."""
@@ -238,6 +261,7 @@ class _Ingest:
     def _new(self, index: int, recording: Recording, found: State | MsgflowError) -> _Item | None:
         """Return what is to be done of a recording; None where nothing is."""
         item = _Item(index, recording)
+        self._look_again()
         if isinstance(found, MsgflowError):
             item.tries = 1
             reason = Reason.BROKEN if isinstance(found, TraceError) else Reason.UNREACHABLE
@@ -255,13 +279,14 @@ class _Ingest:
         run = self._runs.get(self._sources.get(recording.source, ""))
         if run is not None and self._is_there(run, found):
             self._relabel(run, recording)
+            self._forget(item)
             self._progress.there += 1
             self._tell()
             return None
         failure = self._failed.get(recording.source)
         if (
             failure is not None
-            and not self._options.retry_failed
+            and not (self._options.retry_failed or self._options.replace)
             and failure["source_signature"] == found.signature
         ):
             self._progress.failed_before += 1
@@ -329,38 +354,67 @@ class _Ingest:
         if outcome.values is None:
             self._failed_now(item, outcome)
             return
+        self._look_again()
         key = outcome.values["run"]
         there = self._runs.get(key)
-        is_other = there is not None and there["source"] != item.recording.source
-        if there is not None and is_other and not self._options.replace:
-            self._same_packets(item, there, outcome)
+        if (
+            there is not None
+            and there["source"] != item.recording.source
+            and (not self._options.replace or key in self._written)
+        ):
+            self._same_packets(item, there, outcome, outcome.values)
             return
+        before = self._before(item, key)
+        # Who says nothing of a recording leaves what was said of it.
+        labels = dict(item.recording.labels) or dict((there or before or {}).get("labels") or ())
         row = {
             **outcome.values,
-            "labels": dict(item.recording.labels),
+            "labels": labels,
             "seconds": outcome.seconds,
             "tries": item.tries,
             "worker": outcome.worker,
         }
-        before = self._sources.get(item.recording.source)
-        # What the same source gave before, when it held something else.
-        gone = [{**self._runs[before], "is_removed": True}] if before not in (None, key) else []
-        self._commit([row, *gone])
+        self._commit([row, *self._gone(before)])
+        self._written.add(key)
         self._forget(item)
-        if there is not None or gone:
+        if there is not None or before is not None:
             self._progress.replaced += 1
         else:
             self._progress.added += 1
         self._progress.events += row["event_count"] or 0
         self._tell()
 
-    def _same_packets(self, item: _Item, there: Mapping[str, Any], outcome: Outcome) -> None:
+    def _before(self, item: _Item, key: str) -> Mapping[str, Any] | None:
+        """Return the run that the same source gave before, when it held something else."""
+        before = self._sources.get(item.recording.source)
+        return None if before is None or before == key else self._runs.get(before)
+
+    def _gone(self, before: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+        """Return the row that takes a run away whose source holds something else by now.
+
+        Another recording of this call may have its packets: then it is that one's run.
+        """
+        if before is None:
+            return []
+        if before["run"] not in self._alike:
+            return [{**before, "is_removed": True}]
+        other = self._alike[before["run"]]
+        own = {name: other[name] for name in ("source", "source_signature", "name")}
+        return [{**before, **own}]
+
+    def _same_packets(
+        self, item: _Item, there: Mapping[str, Any], outcome: Outcome, values: Mapping[str, Any]
+    ) -> None:
         labels = dict(item.recording.labels)
         if not labels or labels == dict(there["labels"] or ()):
+            self._alike[there["run"]] = values
+            if gone := self._gone(self._before(item, there["run"])):
+                self._commit(gone)
             self._forget(item)
             self._progress.same += 1
             self._tell()
             return
+        hint = "leave out one of the two"
         self._failed_now(
             item,
             Outcome(
@@ -368,7 +422,7 @@ class _Ingest:
                 stage="committing",
                 error=f"its packets are in the lake already, with other labels, from"
                 f" {there['source']} (run {there['run']})",
-                hint="leave out one of the two, or give --replace",
+                hint=hint if self._options.replace else f"{hint}, or give --replace",
                 signature=outcome.signature,
                 worker=outcome.worker,
             ),
@@ -380,8 +434,11 @@ class _Ingest:
             key = row["run"]
             self._generations[key] = self._generations.get(key, 0) + 1
             numbered.append({**row, "generation": self._generations[key]})
-        self._lake.commit(numbered)
+        self._files.add(self._lake.commit(numbered))
         for row in numbered:
+            known = self._runs.get(row["run"])
+            if known is not None and self._sources.get(known["source"]) == row["run"]:
+                del self._sources[known["source"]]
             if row["is_removed"]:
                 self._runs.pop(row["run"], None)
             else:
@@ -431,3 +488,6 @@ def _look(recording: Recording) -> State | MsgflowError:
         return look_at(recording.source)
     except MsgflowError as error:
         return error
+    except (OSError, ValueError) as error:
+        words = error.strerror if isinstance(error, OSError) and error.strerror else error
+        return TraceError(f"cannot be read: {words} — {recording.source!r}", "check the path")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import secrets
+import shlex
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -221,7 +222,7 @@ class Lake:
         """
         return visible(self.rows())
 
-    def commit(self, rows: Iterable[Mapping[str, Any]]) -> None:
+    def commit(self, rows: Iterable[Mapping[str, Any]]) -> str:
         """Make runs visible, or those that are replaced or removed: all of them at once.
 
         What the rows name has to be in the lake already.
@@ -230,6 +231,9 @@ class Lake:
             rows: values of columns of `run_schema`. A higher `generation` takes the place of what
                 counts so far, whatever else is written at the same time; an equal one only where
                 nothing else is.
+
+        Returns:
+            The file that has them; '' without rows.
 
         Raises:
             DatabaseError: the lake cannot be written.
@@ -246,11 +250,13 @@ class Lake:
             for row in rows
         ]
         if not whole:
-            return
+            return ""
         table = pa.Table.from_pylist(whole, schema=run_schema())
         first = whole[0]["run"] if len(whole) == 1 else "several"
         revision = next((row["schema_revision"] for row in whole if row["schema_revision"]), "")
-        self.put_table(f"{RUN}/{first}-{secrets.token_hex(6)}.parquet", RUN, table, revision)
+        path = f"{RUN}/{first}-{secrets.token_hex(6)}.parquet"
+        self.put_table(path, RUN, table, revision)
+        return path
 
     def remove(self, keys: Sequence[str]) -> None:
         """Take runs out of the lake; `msgflow fleet compact` deletes their files.
@@ -260,9 +266,13 @@ class Lake:
             DatabaseError: the lake cannot be read or written.
         """
         known = {row["run"]: row for row in self.runs().to_pylist()}
+        keys = tuple(dict.fromkeys(keys))
         for key in keys:
             if key not in known:
-                raise UsageError(f"the lake has no such run — {key}", "msgflow fleet runs")
+                raise UsageError(
+                    f"the lake has no such run — {key}",
+                    f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
+                )
         self.commit(
             known[key] | {"is_removed": True, "generation": known[key]["generation"] + 1}
             for key in keys

@@ -25,6 +25,7 @@ from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
 from msgflow.nearest import nearest
 from msgflow.query.run import first_line
+from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 _COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')
 # What DuckDB says where pyarrow, which reads a bucket for it, failed.
 _STREAM = "reading the stream registered as"
-_EXAMPLE = "such as --where \"robot = 'r1' AND software_version >= '2.4'\""
+_EXAMPLE = "such as --where \"robot LIKE 'r%' AND software_version = '2.4'\""
 _NONE_YET = "msgflow fleet ingest SOURCE --lake adds some"
 
 
@@ -219,8 +220,11 @@ class Reading:
         """Return the parts with a table, those together whose files have the same columns.
 
         What an earlier version wrote may lack the table, or columns of it; one part of each tells.
+
+        Raises:
+            FileNotFoundError: a part lacks a table that it was written with.
         """
-        alike: dict[str, list[str]] = {}
+        alike: dict[tuple[str, str], list[str]] = {}
         seen = set()
         runs = self.choice.runs
         for part, version in zip(
@@ -228,14 +232,20 @@ class Reading:
         ):
             if part is not None and part not in seen:
                 seen.add(part)
-                kind = part if part.startswith(PACK) else f"of {version}"
-                alike.setdefault(kind, []).append(part)
-        store = self.choice.lake.store
-        return {
-            parts[0]: sorted(parts)
-            for parts in alike.values()
-            if store.entry(part_path(table, parts[0])) is not None
-        }
+                kind = part if part.startswith(PACK) else ""
+                alike.setdefault((kind, version), []).append(part)
+        found = {}
+        for (_, version), parts in alike.items():
+            if self._has(table, parts[0]):
+                found[parts[0]] = sorted(parts)
+                continue
+            is_ours = version == __version__ and table in {each.table for each in answers()}
+            if is_ours or any(self._has(table, part) for part in parts[1:]):
+                raise FileNotFoundError(f"a file is gone: {part_path(table, parts[0])}")
+        return found
+
+    def _has(self, table: str, part: str) -> bool:
+        return self.choice.lake.store.entry(part_path(table, part)) is not None
 
     def _scan(self, table: str, found: dict[str, list[str]]) -> str:
         """Return what reads the rows of a table in SQL, with a column `part`."""

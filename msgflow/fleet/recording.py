@@ -50,6 +50,7 @@ def look_at(source: str) -> State:
     Raises:
         TraceError: there is nothing, or it cannot be read.
         DatabaseError: its store cannot be reached.
+        OSError: a folder or file of it cannot be looked at.
     """
     store = Store(source)
     file = store.entry()
@@ -95,7 +96,14 @@ def is_archive_name(source: str) -> bool:
 
 
 def _local_files(source: str) -> Iterator[tuple[str, int, int]]:
-    for directory, _, names in os.walk(source, followlinks=True):
+    seen = {os.path.realpath(source)}
+    for directory, folders, names in os.walk(source, onerror=_raise, followlinks=True):
+        for folder in sorted(folders):
+            # A link may lead back.
+            place = os.path.realpath(Path(directory, folder))
+            if place in seen:
+                folders.remove(folder)
+            seen.add(place)
         for name in names:
             path = Path(directory, name)
             try:
@@ -103,3 +111,8 @@ def _local_files(source: str) -> Iterator[tuple[str, int, int]]:
             except FileNotFoundError:  # a link that leads nowhere, or gone meanwhile
                 continue
             yield str(path.relative_to(source)), status.st_size, status.st_mtime_ns
+
+
+def _raise(error: OSError) -> None:
+    if not isinstance(error, FileNotFoundError | NotADirectoryError):
+        raise error

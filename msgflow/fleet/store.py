@@ -307,6 +307,10 @@ def _s3() -> Any:
     options: dict[str, Any] = {}
     if (url := endpoint()) is not None:
         parts = urlsplit(url)
+        if parts.scheme not in ("http", "https") or not parts.netloc:
+            raise UsageError(
+                f"no address of a store — {url}", "AWS_ENDPOINT_URL=http://HOST:PORT, or https://"
+            )
         options = {"endpoint_override": parts.netloc, "scheme": parts.scheme}
     region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION")
     if region:

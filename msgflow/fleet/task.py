@@ -22,6 +22,7 @@ class Reason(StrEnum):
     SAME_PACKETS = "same_packets"
     UNREACHABLE = "unreachable"
     NO_SPACE = "no_space"
+    NO_SCRATCH = "no_scratch"
     CRASHED = "crashed"
     WORKER_LOST = "worker_lost"
     ERROR = "error"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import shutil
@@ -39,11 +40,13 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
         with _scratch(task.scratch) as directory:
             outcome = _watched(task, directory, begin)
     except OSError as error:
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         outcome = Outcome(
-            reason=Reason.NO_SPACE,
+            reason=Reason.NO_SPACE if is_full else Reason.NO_SCRATCH,
             stage="making scratch space",
             error=f"{error.strerror or error} — {task.scratch or tempfile.gettempdir()}",
-            hint="give a folder with free space with --scratch",
+            hint=f"give a folder {'with free space' if is_full else 'that can be written'} with"
+            " --scratch",
             seconds=time.monotonic() - begin,
         )
     return {**outcome.as_dict(), "worker": worker_name()}

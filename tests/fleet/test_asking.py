@@ -159,6 +159,11 @@ def test_groups_are_of_labels_and_of_columns(night: Lake) -> None:
     assert fleet_query(night, "findings", group_by=["name"]).columns[0] == "label_name"
     with pytest.raises(UsageError, match=r"(?s)such a label — robo.*did you mean robot"):
         fleet_query(night, "e2e-latency", group_by=["robo"])
+    with pytest.raises(UsageError, match="such a label — is_removed"):
+        fleet_query(night, "e2e-latency", group_by=["is_removed"])
+    # Of one run each, quantiles are its own.
+    assert "off by less" in str(fleet_query(night, "callback-duration").notes)
+    assert "off by less" not in str(fleet_query(night, "callback-duration", group_by=["run"]).notes)
 
 
 def test_rows_are_chosen(night: Lake) -> None:
@@ -248,6 +253,7 @@ def test_the_worst_flows_come_with_what_opens_them(night: Lake) -> None:
     assert found.notes == ["runs without a command were written with --no-database"]
     first = fleet_worst(night, path.split(" ")[2], where="name = 'first'", limit=1)
     (row,) = first.table.to_pylist()
+    assert first.notes == [f"the slowest one: {row['command']}"]
     kind = row["root_kind"].replace("_", "-")
     assert row["command"] == (
         f"msgflow fleet open {row['run']} --lake {night.store.url} && "
@@ -264,7 +270,7 @@ def test_the_worst_flows_come_with_what_opens_them(night: Lake) -> None:
 def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) -> None:
     lake = Lake.open_or_create(tmp_path / "lake")
     row = night.runs().to_pylist()[0]
-    lake.commit([row | {"labels": dict(row["labels"] or ())}])
+    lake.commit([row | {"labels": dict(row["labels"] or ()), "msgflow_version": "0.0.1"}])
     with pytest.raises(UsageError, match="an earlier msgflow wrote them — delivery"):
         fleet_query(lake, "delivery")
 

@@ -123,7 +123,7 @@ def test_much_goes_wrong(
     assert watcher.seen == {
         (run["run"], run["part"]): row_counts(lake, run["run"], run["part"]) for run in runs
     }
-    assert not [path for path in scratch.iterdir() if path.name.endswith(".duckdb")]
+    assert not list(scratch.rglob("*.duckdb"))
     secret = KEYS["AWS_SECRET_ACCESS_KEY"].encode()
     for entry in lake.store.entries():
         assert secret not in (lake.store.read(entry.path) or b"")

@@ -183,7 +183,7 @@ def test_paths_of_one_side_are_said(tmp_path: Path) -> None:
     [
         (["--by", "versoin"], "no run of the lake has such a label — versoin"),
         (["--by", "robot"], "two values of robot are compared, the runs have 15: r0 (4), r1 (4)"),
-        (["--by", "version", "2.9"], "two values of version are compared, the runs have 2"),
+        (["--by", "version", "3"], "two values of version are compared, the runs have 2"),
         (["--by", "version", "2.9", "3"], "no run has version=3"),
         (["--by", "version", "2.9", "2.9"], "both sides are the same"),
         (["--by", "version", "--unit", "site"], "has such a label — site"),
@@ -200,6 +200,14 @@ def test_what_makes_no_sense_is_a_usage_error(
     assert result.exit_code == 2
     assert words in result.stderr
     assert not result.stdout
+
+
+def test_the_other_of_two_values_need_not_be_named(slower: Lake) -> None:
+    given = ("--by", "version", "--format", "json")
+    both = run(slower, "2.10", "2.9", *given)
+    assert both.exit_code == 0, both.stderr
+    assert run(slower, "2.10", *given).stdout == both.stdout
+    assert run(slower, *given).stdout != both.stdout
 
 
 def test_nothing_in_common_is_an_error(tmp_path: Path) -> None:

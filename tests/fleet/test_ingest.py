@@ -233,7 +233,7 @@ def test_what_hangs_or_grows_is_ended(task: Task, tmp_path: Path) -> None:
     assert (full.reason, full.stage) == ("no_space", "looking at the source")
     no_folder = tmp_path / "file"
     no_folder.write_text("")
-    assert outcome(task, scratch=str(no_folder)).reason == "no_space"
+    assert outcome(task, scratch=str(no_folder)).reason == "no_scratch"
     assert list(tmp_path.iterdir()) == [no_folder]
 
 

@@ -236,6 +236,12 @@ def test_addresses_that_are_none(url: str, words: str) -> None:
     assert "secret@" not in str(raised.value)
 
 
+def test_the_address_of_a_store_has_a_scheme(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "127.0.0.1:9")
+    with pytest.raises(UsageError, match="no address of a store — 127.0.0.1:9"):
+        Store("s3://bucket/lake").read("x")
+
+
 def test_a_file_appears_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = Store(tmp_path)
     store.put("a/b", b"before")

@@ -1,0 +1,246 @@
+"""Which run a source is, when sources change or have equal packets, or others write meanwhile.
+
+A recording here is a folder with a file that says which packets it has; nobody ingests it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from msgflow.errors import UsageError
+from msgflow.fleet import ingest as ingesting
+from msgflow.fleet import work
+from msgflow.fleet.compact import compact
+from msgflow.fleet.failure import read_failures
+from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.recording import look_at
+from msgflow.fleet.task import Outcome, Task
+
+BROKEN = "broken"
+
+
+class Workers:
+    """Says what a worker would say, without doing anything."""
+
+    def __init__(self) -> None:
+        self._tasks: list[Task] = []
+
+    def has_room(self) -> bool:
+        return not self._tasks
+
+    def is_too_large(self, task: Task) -> str | None:
+        return None
+
+    def submit(self, task: Task) -> None:
+        self._tasks.append(task)
+
+    def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
+        while self._tasks:
+            task = self._tasks.pop(0)
+            key = (Path(task.source) / "packets").read_text()
+            if key == BROKEN:
+                yield task, Outcome(reason="broken", stage="ingesting", error="no trace")
+                continue
+            values: dict[str, Any] = {
+                "run": key,
+                "is_removed": False,
+                "part": f"{key}-{task.edition}",
+                "name": Path(task.source).name,
+                "source": task.source,
+                "source_signature": look_at(task.source).signature,
+                "options": json.dumps(task.options, sort_keys=True),
+                "event_count": 1,
+                "schema_revision": "",
+            }
+            yield task, Outcome(values=values)
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture(autouse=True)
+def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ingesting, "make_workers", lambda ray: Workers())
+    monkeypatch.setattr(ingesting, "_SECONDS_BETWEEN_LOOKS_AT_RUNS", 0)
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def record(name: str, packets: str) -> str:
+    Path(name).mkdir(exist_ok=True)
+    Path(name, "packets").write_text(packets)
+    # A change within a tick of the clock shows as well.
+    os.utime(Path(name, "packets"), ns=(0, sum(map(ord, packets)) * 10**9))
+    return name
+
+
+def ingest(
+    *sources: str,
+    replace: bool = False,
+    labels: dict[str, str] | None = None,
+    progress: Callable[[FleetProgress], None] | None = None,
+) -> FleetProgress:
+    options = Options(views=False, database=False, replace=replace)
+    return fleet_ingest(sources, "lake", options=options, labels=labels, progress=progress)
+
+
+def runs() -> dict[str, str]:
+    """Return which source each run is of."""
+    return {row["run"]: Path(row["source"]).name for row in Lake.open("lake").runs().to_pylist()}
+
+
+def labels_of(run: str) -> dict[str, str]:
+    rows = {row["run"]: row["labels"] for row in Lake.open("lake").runs().to_pylist()}
+    return dict(rows[run])
+
+
+def failures() -> dict[str, str]:
+    rows = read_failures(Lake.open("lake")).to_pylist()
+    return {Path(row["source"]).name: row["reason"] for row in rows}
+
+
+@pytest.mark.parametrize("order", [("a", "z"), ("z", "a")])
+def test_a_recording_that_was_moved_stays(place: Path, order: tuple[str, str]) -> None:
+    ingest(record("z", "first"))
+    record("a", "first")
+    record("z", "second")
+    done = ingest(*order)
+    assert runs() == {"first": "a", "second": "z"}
+    assert done.in_lake == 2
+    assert ingest(*order).there == 2
+
+
+def test_a_recording_that_becomes_like_another_leaves_nothing(place: Path) -> None:
+    ingest(record("a", "first"), record("c", "second"))
+    record("a", "second")
+    done = ingest("a", "c")
+    assert runs() == {"second": "c"}
+    assert (done.same, done.there) == (1, 1)
+
+
+def test_what_a_source_held_before_goes(place: Path) -> None:
+    ingest(record("a", "first"))
+    done = ingest(record("a", "second"))
+    assert runs() == {"second": "a"}
+    assert (done.replaced, done.added) == (1, 0)
+
+
+def test_equal_packets_with_other_labels_are_said_where_runs_are_replaced(place: Path) -> None:
+    record("a", "first")
+    record("b", "first")
+    Path("night.csv").write_text("path,robot\na,A\nb,B\n")
+    for replace in (True, False):
+        ingest("night.csv", replace=replace)
+        assert failures() == {"b": "same_packets"}
+        assert (runs(), labels_of("first")) == ({"first": "a"}, {"robot": "A"})
+    # Of different calls, the later one is meant.
+    ingest("b", replace=True, labels={"robot": "B"})
+    assert (runs(), labels_of("first")) == ({"first": "b"}, {"robot": "B"})
+
+
+def test_labels_stay_where_none_are_given(place: Path) -> None:
+    ingest(record("a", "first"), labels={"robot": "A", "site": "x"})
+    ingest("a", replace=True)
+    assert labels_of("first") == {"robot": "A", "site": "x"}
+    ingest(record("a", "second"))
+    assert labels_of("second") == {"robot": "A", "site": "x"}
+    ingest("a", labels={"robot": "B"})
+    assert labels_of("second") == {"robot": "B"}
+
+
+def test_what_others_do_meanwhile_stays_done(place: Path) -> None:
+    record("a", "first")
+    record("b", "second")
+    ingest("a", "b")
+    removed: list[str] = []
+
+    def remove(progress: FleetProgress) -> None:
+        if not removed:
+            removed.append("second")
+            Lake.open("lake").remove(removed)
+
+    # The second is looked at once the first is done, and has to go in anew.
+    done = ingest("a", "b", labels={"robot": "A"}, progress=remove)
+    assert (done.there, done.added) == (1, 1)
+    assert runs() == {"first": "a", "second": "b"}
+
+
+def test_labels_are_those_of_the_part_that_counts(place: Path) -> None:
+    ingest(record("a", "first"), record("b", "second"))
+    seen: list[str] = []
+
+    def replace(progress: FleetProgress) -> None:
+        if not seen:
+            lake = Lake.open("lake")
+            (row,) = [each for each in lake.runs().to_pylist() if each["run"] == "second"]
+            new = {"part": "packed", "generation": row["generation"] + 1, "labels": {}}
+            seen.append(lake.commit([row | new]))
+
+    ingest("a", "b", labels={"robot": "A"}, progress=replace)
+    rows = {row["run"]: row for row in Lake.open("lake").runs().to_pylist()}
+    assert rows["second"]["part"] == "packed"
+    assert labels_of("second") == {"robot": "A"}
+
+
+def test_what_is_in_the_lake_did_not_fail(place: Path) -> None:
+    ingest(record("a", "first"))
+    record("a", BROKEN)
+    assert ingest("a").failed == 1
+    assert failures() == {"a": "broken"}
+    # It is as it was before.
+    assert ingest(record("a", "first")).there == 1
+    assert failures() == {}
+    record("a", BROKEN)
+    ingest("a")
+    assert ingest("a").failed_before == 1
+    assert ingest("a", replace=True).failed == 1
+
+
+def test_what_cannot_be_looked_at_ends_nothing(place: Path) -> None:
+    record("a", "first")
+    Path("night.jsonl").write_text('{"path": "x\\u0000y"}\n{"path": "a"}\n')
+    done = ingest("night.jsonl")
+    assert (done.added, done.failed) == (1, 1)
+    assert set(failures().values()) == {"broken"}
+
+
+def test_a_link_that_leads_back_is_followed_once(place: Path) -> None:
+    record("a", "first")
+    before = look_at(str(place / "a"))
+    Path("a", "self").symlink_to(".")
+    assert look_at(str(place / "a")) == before
+    assert ingest("a").added == 1
+
+
+def test_the_lake_is_no_recording(place: Path) -> None:
+    record("a", "first")
+    for _ in range(2):
+        done = ingest("[al]*")
+        assert (done.total, done.in_lake, failures()) == (1, 1, {})
+    with pytest.raises(UsageError, match="the lake itself is no recording"):
+        ingest("lake/run")
+
+
+def test_compaction_keeps_what_counts(place: Path) -> None:
+    ingest(record("a", "first"), labels={"robot": "A"})
+    compact(Lake.open("lake"), older_than=0)
+    ingest("a", labels={"robot": "B"})
+    assert labels_of("first") == {"robot": "B"}
+
+
+def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
+    Path("file").write_text("")
+    task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
+    found = Outcome(**work.run_task(task.as_dict()))
+    assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
