@@ -40,6 +40,9 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
             of 1.
         is_handle: an address, shown in hexadecimal.
     """
+    # A map, such as labels.
+    if isinstance(value, list) and value and all(isinstance(item, tuple) for item in value):
+        return ", ".join("=".join(map(format_cell, item)) for item in value)
     value = plain(value)
     if value is None:
         return NULL

@@ -68,6 +68,11 @@ def test_handles_are_hexadecimal() -> None:
     assert format_cell(2**64 - 1, is_handle=True) == "0xffffffffffffffff"
 
 
+def test_a_map_has_its_keys() -> None:
+    assert format_cell([("robot", "r1"), ("site", None)]) == "robot=r1, site=-"
+    assert format_cell([[1, 2], [3]]) == "1, 2, 3"
+
+
 def test_the_suffix_goes_where_the_unit_stands_in_the_cells() -> None:
     assert shown_name("median_ns", "ns", ("median_ns",)) == "median"
     assert shown_name("start_ns", "epoch ns", ("start_ns",)) == "start"
