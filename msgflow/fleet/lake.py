@@ -60,6 +60,8 @@ class Lake:
 
     def __init__(self, store: Store) -> None:
         self.store = store
+        # A file of the table `run` is never changed.
+        self._known: dict[str, tuple[pa.Table, list[str]]] = {}
 
     @classmethod
     def open(cls, url: str | Path) -> Lake:
@@ -144,15 +146,15 @@ class Lake:
     def _read_runs(self, files: Sequence[str]) -> dict[str, tuple[pa.Table, list[str]]]:
         """Return the rows of files of the table `run`, and the files that each stands for."""
         schema = run_schema()
+        unknown = [path for path in files if path not in self._known]
         with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
-            contents = list(pool.map(self.store.read, files))
-        found = {}
-        for path, content in zip(files, contents, strict=True):
+            contents = list(pool.map(self.store.read, unknown))
+        for path, content in zip(unknown, contents, strict=True):
             if content is None:
                 raise FileNotFoundError(path)
             covered = _covered(content) if _is_together(path) else []
-            found[path] = (read_parquet(content, schema), covered)
-        return found
+            self._known[path] = (read_parquet(content, schema), covered)
+        return {path: self._known[path] for path in files}
 
     def put_together(self) -> int:
         """Write the rows of many small files of the table `run` into one that stands for them.

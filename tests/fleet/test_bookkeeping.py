@@ -21,6 +21,7 @@ from msgflow.fleet.failure import read_failures
 from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.recording import look_at
+from msgflow.fleet.store import Store
 from msgflow.fleet.task import Outcome, Task
 
 BROKEN = "broken"
@@ -230,6 +231,23 @@ def test_the_lake_is_no_recording(place: Path) -> None:
         assert (done.total, done.in_lake, failures()) == (1, 1, {})
     with pytest.raises(UsageError, match="the lake itself is no recording"):
         ingest("lake/run")
+
+
+def test_what_others_write_is_read_once(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else two ingests into one lake would read all that is there for each recording."""
+    ingest(*(record(f"r{number}", f"run{number}") for number in range(5)))
+    read: list[str] = []
+    before = Store.read
+    monkeypatch.setattr(Store, "read", lambda self, path: read.append(path) or before(self, path))
+    row = Lake.open("lake").runs().to_pylist()[0]
+
+    def write(progress: FleetProgress) -> None:
+        Lake.open("lake").commit([{**row, "run": f"other {progress.done}", "labels": {}}])
+
+    done = ingest(*(f"r{number}" for number in range(5)), progress=write)
+    assert done.there == 5
+    assert len(runs()) == 10
+    assert max(read.count(path) for path in set(read) if path.startswith("run/")) <= 3
 
 
 def test_compaction_keeps_what_counts(place: Path) -> None:
