@@ -274,7 +274,7 @@ def test_files_of_runs_are_put_together_and_nothing_changes(tmp_path: Path) -> N
     assert len(lake.rows()) == 10
     # What the new file stands for is not read any more.
     lake.store.put(loose[0], b"no parquet")
-    assert lake.runs().equals(before)
+    assert Lake.open(tmp_path / "lake").runs().equals(before)
     lake.commit([{**base, "run": f"{0:020}", "part": "again", "generation": 2}])
     for number in range(20, 28):
         lake.commit([{**base, "run": f"{number:020}", "part": f"{number}-x"}])
@@ -291,4 +291,4 @@ def test_files_of_runs_are_put_together_and_nothing_changes(tmp_path: Path) -> N
     assert lake.runs()["run"].equals(after["run"])
     lake.store.put(lake.run_files()[0].replace("together-", "together-x"), b"no parquet")
     with pytest.raises(DatabaseError, match="cannot read the runs"):
-        lake.runs()
+        Lake.open(tmp_path / "lake").runs()
