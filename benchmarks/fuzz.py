@@ -18,7 +18,8 @@ Counted are, by kind of input:
 Bytes of a payload, and names in the metadata, are protected by nothing in the format: such changes
 are made as well, but cannot be unreported. A case is the same for the same seed and number;
 `--case N` runs it alone and prints what was said, `--first` begins with another than the first.
-Every hundred cases a line tells how many there were. The exit code is 1 where anything was counted.
+Every hundred cases a line tells how many there were. The exit code is 1 where anything was counted,
+or where a case was not done.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -267,8 +269,6 @@ def run(work: Callable[[], dict[str, Any]], directory: Path) -> tuple[str, dict[
             result.write_text(json.dumps(work()))
             status = 0
         except BaseException as error:
-            import traceback
-
             traceback.print_exception(error)
         finally:
             with contextlib.suppress(Exception):
@@ -422,6 +422,8 @@ def outcomes(
                 os.close(read)
                 try:
                     worker(numbers[job::jobs], seed, bases, kinds, write)
+                except BaseException:
+                    traceback.print_exc()
                 finally:
                     os._exit(0)
             os.close(write)
@@ -496,7 +498,10 @@ def main() -> None:
         print(f"{kind:15}{len(of_kind):8}{refused:9}" + "".join(f"{counts[bad]:12}" for bad in BAD))
     bad = sum(bool(outcome.bad) for outcome in found)
     print(f"\n{len(found)} cases in {time.monotonic() - begin:.0f} s, {bad} of them not well")
-    sys.exit(bool(bad))
+    # A process that does cases may have been killed itself.
+    if left := set(numbers) - {outcome.number for outcome in found}:
+        print(f"{len(left)} cases were not done, from {min(left)} on", file=sys.stderr)
+    sys.exit(bool(bad or left))
 
 
 if __name__ == "__main__":

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
+from mutations import flip_metadata
 from thorough import thorough
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -78,6 +81,21 @@ with tempfile.TemporaryDirectory() as temporary:
 print(json.dumps(found))
 """
 
+# A process that does cases ends before it has done them.
+KILLED = """
+import json, os, signal, sys
+import fuzz
+
+fuzz.prepare = lambda directory: []
+fuzz.warm_up = lambda bases: None
+fuzz.case = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+sys.argv = ["fuzz.py", "--cases", "3", "--jobs", "1"]
+try:
+    fuzz.main()
+except SystemExit as end:
+    print(json.dumps(end.code))
+"""
+
 
 def run(program: str, *arguments: object) -> Any:
     # In a process of its own: cases are forked from it, and what pytest has loaded would count
@@ -106,3 +124,14 @@ def test_a_slice_of_the_campaign(count: int) -> None:
     assert sorted(number for number, *_ in found) == list(range(count))
     assert {ending for _, ending, *_ in found} >= {"ended", "refused"}
     assert [outcome for outcome in found if outcome[2]] == []
+
+
+def test_cases_that_were_not_done_are_no_success() -> None:
+    assert run(KILLED) is True
+
+
+def test_a_file_that_nobody_can_read_is_not_flipped(tmp_path: Path) -> None:
+    (tmp_path / "metadata").touch()
+    os.truncate(tmp_path / "metadata", 1 << 33)
+    with pytest.raises(OSError, match="too large"):
+        flip_metadata(tmp_path, Random(1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -17,7 +18,7 @@ Mutation = Callable[[Path, Random], str]
 def cut_stream(trace: Path, random: Random) -> str:
     path = random.choice(streams(trace))
     size = random.randrange(path.stat().st_size)
-    path.write_bytes(path.read_bytes()[:size])
+    path.write_bytes(_content(path)[:size])
     return f"{path.name} cut to {size}"
 
 
@@ -29,7 +30,7 @@ def flip_stream(trace: Path, random: Random) -> str:
 def flip_header(trace: Path, random: Random) -> str:
     """In the header or context of a packet."""
     path = random.choice(streams(trace))
-    begins = packet_begins(path.read_bytes())
+    begins = packet_begins(_content(path))
     begin = random.choice(begins)
     return _flip(path, random, begin, begin + 84)
 
@@ -37,7 +38,7 @@ def flip_header(trace: Path, random: Random) -> str:
 def overwrite(trace: Path, random: Random) -> str:
     """Random bytes over a part of a stream."""
     path = random.choice(streams(trace))
-    content = bytearray(path.read_bytes())
+    content = bytearray(_content(path))
     begin = random.randrange(len(content))
     length = random.choice([1, 4, 8, 64, 1000])
     content[begin : begin + length] = random.randbytes(min(length, len(content) - begin))
@@ -56,7 +57,7 @@ def cut_index(trace: Path, random: Random) -> str:
         return cut_stream(trace, random)
     path = random.choice(indexes)
     size = random.randrange(path.stat().st_size)
-    path.write_bytes(path.read_bytes()[:size])
+    path.write_bytes(_content(path)[:size])
     return f"{path.name} cut to {size}"
 
 
@@ -67,13 +68,13 @@ def flip_metadata(trace: Path, random: Random) -> str:
 def cut_metadata(trace: Path, random: Random) -> str:
     path = trace / "metadata"
     size = random.randrange(path.stat().st_size)
-    path.write_bytes(path.read_bytes()[:size])
+    path.write_bytes(_content(path)[:size])
     return f"metadata cut to {size}"
 
 
 def swap_streams(trace: Path, random: Random) -> str:
     one, other = random.choice(streams(trace)), random.choice(streams(trace))
-    first, second = one.read_bytes(), other.read_bytes()
+    first, second = _content(one), _content(other)
     one.write_bytes(second)
     other.write_bytes(first)
     return f"{one.name} and {other.name} swapped"
@@ -95,13 +96,14 @@ MUTATIONS: tuple[Mutation, ...] = (
 # What these change may be payload, or names, which nothing protects.
 ANYWHERE: set[Mutation] = {flip_stream, overwrite, flip_metadata}
 
+_MOST_BYTES = 256 << 20
 ABSURD = (0, 1, (1 << 31) - 1, 1 << 32, 1 << 48, 1 << 62, 1 << 63, (1 << 64) - 1, (1 << 64) - 5)
 
 
 def put_in_header(trace: Path, random: Random) -> str:
     """An absurd value in the context of a packet."""
     path = random.choice(streams(trace))
-    content = bytearray(path.read_bytes())
+    content = bytearray(_content(path))
     begin = random.choice(packet_begins(bytes(content)))
     at = begin + random.choice((24, 32, 40, 48, 56, 64, 72, 76))
     value = random.choice(ABSURD)
@@ -113,7 +115,7 @@ def put_in_header(trace: Path, random: Random) -> str:
 def put_in_event(trace: Path, random: Random) -> str:
     """An absurd value anywhere in a stream."""
     path = random.choice(streams(trace))
-    content = bytearray(path.read_bytes())
+    content = bytearray(_content(path))
     at = random.randrange(len(content) - 8)
     value = random.choice(ABSURD)
     struct.pack_into("<Q", content, at, value)
@@ -124,7 +126,7 @@ def put_in_event(trace: Path, random: Random) -> str:
 def put_in_metadata(trace: Path, random: Random) -> str:
     """An absurd number in the metadata."""
     path = trace / "metadata"
-    content = path.read_bytes()
+    content = _content(path)
     numbers = list(re.finditer(rb"(?<=[ =\[(-])\d+(?=[;\]) ])", content))
     if not numbers:
         return flip_metadata(trace, random)
@@ -143,7 +145,7 @@ def copy_stream(trace: Path, random: Random) -> str:
 def copy_packet(trace: Path, random: Random) -> str:
     """Behind the end of its file."""
     path = random.choice(streams(trace))
-    content = path.read_bytes()
+    content = _content(path)
     begin, end = random.choice(_packets(content))
     path.write_bytes(content + content[begin:end])
     return f"bytes {begin} to {end} of {path.name} copied to its end"
@@ -151,7 +153,7 @@ def copy_packet(trace: Path, random: Random) -> str:
 
 def drop_packet(trace: Path, random: Random) -> str:
     path = random.choice(streams(trace))
-    content = path.read_bytes()
+    content = _content(path)
     begin, end = random.choice(_packets(content))
     path.write_bytes(content[:begin] + content[end:])
     return f"bytes {begin} to {end} of {path.name} left out"
@@ -160,7 +162,7 @@ def drop_packet(trace: Path, random: Random) -> str:
 def zero(trace: Path, random: Random) -> str:
     """A block that the disk lost."""
     path = random.choice(streams(trace))
-    content = bytearray(path.read_bytes())
+    content = bytearray(_content(path))
     begin = random.randrange(len(content)) // 512 * 512
     length = len(content[begin : begin + 4096])
     content[begin : begin + length] = bytes(length)
@@ -220,7 +222,7 @@ ANYWHERE |= {put_in_event, put_in_metadata, zero}
 
 def damage_file(path: Path, random: Random) -> str:
     """Change a file of any kind."""
-    content = bytearray(path.read_bytes())
+    content = bytearray(_content(path))
     at = random.randrange(len(content))
     kind = random.choice(("flip", "flip", "cut", "overwrite", "empty"))
     if kind == "flip":
@@ -300,8 +302,19 @@ def _packets(content: bytes) -> list[tuple[int, int]]:
     return list(zip(begins, [*begins[1:], len(content)], strict=True))
 
 
+def _content(path: Path) -> bytes:
+    """Return what a file holds.
+
+    Raises:
+        OSError: another mutation has made it so large that nobody can read it.
+    """
+    if path.stat().st_size > _MOST_BYTES:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
+    return path.read_bytes()
+
+
 def _flip(path: Path, random: Random, begin: int = 0, end: int | None = None) -> str:
-    content = bytearray(path.read_bytes())
+    content = bytearray(_content(path))
     at = random.randrange(begin, min(end or len(content), len(content)))
     content[at] ^= 1 << random.randrange(8)
     path.write_bytes(content)
