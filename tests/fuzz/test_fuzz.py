@@ -130,8 +130,15 @@ def test_cases_that_were_not_done_are_no_success() -> None:
     assert run(KILLED) is True
 
 
-def test_a_file_that_nobody_can_read_is_not_flipped(tmp_path: Path) -> None:
-    (tmp_path / "metadata").touch()
-    os.truncate(tmp_path / "metadata", 1 << 33)
+@pytest.mark.parametrize("kind", ["sparse", "device", "pipe"])
+def test_a_file_that_nobody_can_read_is_not_flipped(kind: str, tmp_path: Path) -> None:
+    file = tmp_path / "metadata"
+    if kind == "device":
+        file.symlink_to("/dev/zero")
+    elif kind == "pipe":
+        os.mkfifo(file)
+    else:
+        file.touch()
+        os.truncate(file, 1 << 33)
     with pytest.raises(OSError, match="too large"):
         flip_metadata(tmp_path, Random(1))

@@ -306,9 +306,9 @@ def _content(path: Path) -> bytes:
     """Return what a file holds.
 
     Raises:
-        OSError: another mutation has made it so large that nobody can read it.
+        OSError: another mutation has made it endless, or no file at all.
     """
-    if path.stat().st_size > _MOST_BYTES:
+    if not path.is_file() or path.stat().st_size > _MOST_BYTES:
         raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
     return path.read_bytes()
 
