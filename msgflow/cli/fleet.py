@@ -227,8 +227,8 @@ def remove(
     from msgflow.cli.output import count, print_status
     from msgflow.fleet.lake import Lake
 
-    Lake.open(lake).remove(keys)
-    print_status(f"{count(len(set(keys)), 'run')} removed from {lake}")
+    removed = Lake.open(lake).remove(keys)
+    print_status(f"{count(removed, 'run')} removed from {lake}")
 
 
 @app.command("compact")

@@ -13,7 +13,8 @@ from typing import Any, get_args
 import typer.core
 
 _core: Any = typer.core
-_by_typer = _core.build_runtime_param
+# Another Typer may lack it: then its words go their own way, and take longer.
+_by_typer = getattr(_core, "build_runtime_param", None)
 _NOT_PLAIN = object()
 
 
@@ -33,7 +34,7 @@ class _Plainly(_AsTyped):
     def coerce(self, value: Any, **place: Any) -> Any:
         made = self._made(value, **place)
         if made is _NOT_PLAIN:
-            return _by_typer(self._parameter).coerce(value, **place)
+            return _by_typer(self._parameter).coerce(value, **place)  # type: ignore[misc]
         return made
 
     def _made(self, value: Any, param: Any, ctx: Any) -> Any:
@@ -74,9 +75,14 @@ def _is_checked(path: Any) -> bool:
 
 def as_typed() -> None:
     """Let Typer take all words of this process as they are: a third of the time of a completion."""
-    _core.build_runtime_param = _AsTyped
+    _let_make(_AsTyped)
 
 
 def plainly() -> None:
     """Let Typer ask Pydantic only for words that are not plain."""
-    _core.build_runtime_param = _Plainly
+    _let_make(_Plainly)
+
+
+def _let_make(maker: type[_AsTyped]) -> None:
+    if _by_typer is not None:
+        _core.build_runtime_param = maker

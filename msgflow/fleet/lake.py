@@ -260,8 +260,11 @@ class Lake:
         self.put_table(path, RUN, table, revision)
         return path
 
-    def remove(self, keys: Sequence[str]) -> None:
+    def remove(self, keys: Sequence[str]) -> int:
         """Take runs out of the lake; `msgflow fleet compact` deletes their files.
+
+        Returns:
+            How many they were: a key may be there twice.
 
         Raises:
             UsageError: there is no such run.
@@ -279,6 +282,7 @@ class Lake:
             known[key] | {"is_removed": True, "generation": known[key]["generation"] + 1}
             for key in keys
         )
+        return len(keys)
 
     def put_table(
         self,

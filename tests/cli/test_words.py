@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from typing import Any
 
 import pytest
 import typer
+import typer.core
 import typer.main
 
 from msgflow.cli import words
@@ -92,3 +94,15 @@ def test_a_query_does_without_pydantic(small_database: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "/chatter" in done.stdout
     assert done.stderr.splitlines()[-1] == "False"
+
+
+def test_another_typer_goes_its_own_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("typer.core.build_runtime_param")
+    spec = importlib.util.find_spec(words.__name__)
+    assert spec is not None
+    assert spec.loader is not None
+    again = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(again)
+    again.plainly()
+    again.as_typed()
+    assert not hasattr(typer.core, "build_runtime_param")

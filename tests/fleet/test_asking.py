@@ -208,6 +208,8 @@ def test_sql_reads_the_chosen_runs_and_nothing_else(night: Lake, tmp_path: Path)
     assert chosen.table["n"].to_pylist() == [2]
     tables = fleet_sql(night, "SHOW ALL TABLES").table
     assert {"flow", "publication", "run"} <= set(tables["name"].to_pylist())
+    listed = fleet_sql(night, "SELECT table_name FROM information_schema.tables").table
+    assert {"flow", "publication", "run"} <= set(listed["table_name"].to_pylist())
     capped = fleet_sql(night, "FROM view.topic", limit=1)
     assert (len(capped), len(capped.notes)) == (1, 1)
     target = tmp_path / "x.csv"

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
+from msgflow.cli.app import app
 from msgflow.errors import UsageError
 from msgflow.fleet import ingest as ingesting
-from msgflow.fleet import work
+from msgflow.fleet import work, workers
 from msgflow.fleet.compact import compact
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest
@@ -27,48 +29,29 @@ from msgflow.fleet.task import Outcome, Task
 BROKEN = "broken"
 
 
-class Workers:
-    """Says what a worker would say, without doing anything."""
-
-    def __init__(self) -> None:
-        self._tasks: list[Task] = []
-
-    def has_room(self) -> bool:
-        return not self._tasks
-
-    def is_too_large(self, task: Task) -> str | None:
-        return None
-
-    def submit(self, task: Task) -> None:
-        self._tasks.append(task)
-
-    def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
-        while self._tasks:
-            task = self._tasks.pop(0)
-            key = (Path(task.source) / "packets").read_text()
-            if key == BROKEN:
-                yield task, Outcome(reason="broken", stage="ingesting", error="no trace")
-                continue
-            values: dict[str, Any] = {
-                "run": key,
-                "is_removed": False,
-                "part": f"{key}-{task.edition}",
-                "name": Path(task.source).name,
-                "source": task.source,
-                "source_signature": look_at(task.source).signature,
-                "options": json.dumps(task.options, sort_keys=True),
-                "event_count": 1,
-                "schema_revision": "",
-            }
-            yield task, Outcome(values=values)
-
-    def close(self) -> None:
-        pass
+def run_task(given: dict[str, Any]) -> dict[str, Any]:
+    """Return what a worker would say, without doing anything."""
+    task = Task(**given)
+    key = (Path(task.source) / "packets").read_text()
+    if key == BROKEN:
+        return Outcome(reason="broken", stage="ingesting", error="no trace").as_dict()
+    values = {
+        "run": key,
+        "is_removed": False,
+        "part": f"{key}-{task.edition}",
+        "name": Path(task.source).name,
+        "source": task.source,
+        "source_signature": look_at(task.source).signature,
+        "options": json.dumps(task.options, sort_keys=True),
+        "event_count": 1,
+        "schema_revision": "",
+    }
+    return Outcome(values=values).as_dict()
 
 
 @pytest.fixture(autouse=True)
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ingesting, "make_workers", lambda ray: Workers())
+    monkeypatch.setattr(workers, "run_task", run_task)
     monkeypatch.setattr(ingesting, "_SECONDS_BETWEEN_LOOKS_AT_RUNS", 0)
 
 
@@ -262,3 +245,14 @@ def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
     task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
     found = Outcome(**work.run_task(task.as_dict()))
     assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
+
+
+def test_a_run_is_removed_once(place: Path) -> None:
+    ingest(record("a", "first"), record("b", "second"))
+    given = ["fleet", "remove", "first", "first", "--lake", "lake"]
+    result = CliRunner().invoke(app, given)
+    assert result.exit_code == 0
+    assert "1 run removed" in result.stderr
+    assert runs() == {"second": "b"}
+    with pytest.raises(UsageError, match=r"(?s)no such run — first.*--lake .*lake"):
+        Lake.open("lake").remove(["first"])
