@@ -28,7 +28,8 @@ class Entry:
         packet: where it lies.
         position: its place in the stream, copies left out.
         begin: value of the clock at its begin.
-        order_ns: no event of it is earlier, nor of what is read of it.
+        order_ns: what is read of it comes at this time at the earliest. Events that are earlier,
+            in a damaged packet, are put there.
         discarded: events lost in it.
         lost: packets lost right before it.
         base: where it lies in memory, in bytes.

@@ -66,6 +66,8 @@ class _Loaded:
         new: which of the packets were not there before.
         counts: rows of each packet.
         clock: values of the clock.
+        rank_ns: times that the events are ordered by: none is before `Entry.order_ns`, where
+            batches are cut. The order would differ with their size.
         rest: as in `Batch`, with a row per event in memory.
     """
 
@@ -77,6 +79,7 @@ class _Loaded:
     classes: NDArray[np.uint32]
     clock: NDArray[np.uint64]
     ts_ns: NDArray[np.int64]
+    rank_ns: NDArray[np.int64]
     bodies: NDArray[np.int64]
     positions: NDArray[np.int64]
 
@@ -162,6 +165,7 @@ def _load(
         assert clock is not None
         times.append(clock.to_ns_array(events.clock))
     counts = np.concatenate([part.counts for part in parts])
+    ts_ns = _joined(times)
     return _Loaded(
         memory=memory,
         entries=entries,
@@ -170,7 +174,8 @@ def _load(
         in_packet=np.repeat(np.arange(counts.size, dtype=np.int32), counts),
         classes=_joined([part.classes for part in parts]),
         clock=_joined([part.clock for part in parts]),
-        ts_ns=_joined(times),
+        ts_ns=ts_ns,
+        rank_ns=_ranks(entries, counts, ts_ns),
         bodies=_joined([part.bodies for part in parts]),
         positions=_joined([part.positions for part in parts]),
     )
@@ -180,22 +185,34 @@ def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
+def _ranks(
+    entries: Sequence[Entry], counts: NDArray[np.int64], ts_ns: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    begins = np.array([entry.order_ns for entry in entries], np.int64)
+    filled = np.flatnonzero(counts)
+    first = (np.cumsum(counts) - counts)[filled]
+    if not filled.size or (np.minimum.reduceat(ts_ns, first) >= begins[filled]).all():
+        return ts_ns
+    # A damaged packet: events of it are earlier than its begin.
+    return np.maximum(ts_ns, np.repeat(begins, counts))
+
+
 def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDArray[np.int64]:
     """Return the rows of the events before `until_ns` in the total order.
 
     Unless `are_cut`, held packets have events that are done: those before `since_ns`.
     """
-    ts_ns = loaded.ts_ns
+    rank_ns = loaded.rank_ns
     rows: NDArray[np.int64] | None = None
     if not are_cut:
-        waits = np.repeat(np.array(loaded.new), loaded.counts) | (ts_ns >= since_ns)
+        waits = np.repeat(np.array(loaded.new), loaded.counts) | (rank_ns >= since_ns)
         rows = np.flatnonzero(waits)
     # Stable: at the same time, rows stay in the order of streams and of places in a stream.
-    order = np.argsort(ts_ns if rows is None else ts_ns[rows], kind="stable")
+    order = np.argsort(rank_ns if rows is None else rank_ns[rows], kind="stable")
     if rows is not None:
         order = rows[order]
     if until_ns < _NEVER_NS:
-        order = order[: np.searchsorted(ts_ns[order], until_ns)]
+        order = order[: np.searchsorted(rank_ns[order], until_ns)]
     return order
 
 
@@ -252,7 +269,7 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
     """
     if until_ns >= _NEVER_NS:
         return [], True
-    late = np.flatnonzero(loaded.ts_ns >= until_ns)
+    late = np.flatnonzero(loaded.rank_ns >= until_ns)
     packets, first, counts = np.unique(
         loaded.in_packet[late], return_index=True, return_counts=True
     )

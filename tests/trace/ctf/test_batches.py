@@ -79,6 +79,22 @@ def test_time_that_runs_backward_in_a_packet_that_waits(tmp_path: Path) -> None:
     assert not differences(whole, read_in_pieces(trace, 1, 2))
 
 
+def test_events_earlier_than_their_packet(tmp_path: Path) -> None:
+    """They come where the packet begins: before that, nobody knows of them."""
+    kinds = {"test:n": {"n": "u32"}}
+    early = [Event(time, "test:n", (time,)) for time in (5, 12, 40, 41)]
+    others = [
+        Packet([Event(time, "test:n", (time,))], begin=time, sequence=number)
+        for number, time in enumerate((10, 15, 25, 45))
+    ]
+    content = TraceContent(kinds, {0: [Packet(early, begin=20, end=50)], 1: others})
+    trace = write_trace(tmp_path / "trace", content)
+    whole = read(trace)
+    assert [row[-1] for row in whole.rows["test:n"]] == [10, 15, 5, 12, 25, 40, 41, 45]
+    for most_bytes, most_events in ((1, 1 << 18), (1, 2), (40, 2)):
+        assert not differences(whole, read_in_pieces(trace, most_bytes, most_events))
+
+
 def test_room_is_used_again_when_nobody_uses_it() -> None:
     """Columns of a batch may be made while the packets after it are loaded."""
     loader = Loader()
