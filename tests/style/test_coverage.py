@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-import pytest
+from each import each
 from golden import SYSTEMS, read_case
 from sql_files import SqlFile, sql_files
 
@@ -46,27 +46,27 @@ def cases(folder: Path) -> list[Path]:
     return list(folder.glob("*.case"))
 
 
-@pytest.mark.parametrize("file", QUERIES, ids=str)
+@each(QUERIES)
 def test_every_query_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "query" / "cases" / file.header.name)
 
 
-@pytest.mark.parametrize("file", [file for file in PUBLIC if has_logic(file)], ids=str)
+@each([file for file in PUBLIC if has_logic(file)])
 def test_every_public_view_with_logic_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 
-@pytest.mark.parametrize("file", PROGRAM, ids=str)
+@each(PROGRAM)
 def test_everything_that_the_program_asks_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 
-@pytest.mark.parametrize("file", FINDINGS, ids=str)
+@each(FINDINGS)
 def test_every_finding_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 
-@pytest.mark.parametrize("name", PAGE_QUERIES)
+@each(PAGE_QUERIES)
 def test_every_page_query_has_a_case(name: str) -> None:
     assert cases(TESTS / "view" / "cases" / name)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from each import each
 from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.query_command import COMMON_OPTIONS
@@ -44,6 +45,29 @@ def connection(empty_database: Path) -> Iterator[duckdb.DuckDBPyConnection]:
         yield con
 
 
+@pytest.fixture(scope="module")
+def stored(connection: duckdb.DuckDBPyConnection) -> set[str]:
+    """The tables of the store."""
+    return {
+        name
+        for (name,) in connection.execute(
+            "SELECT 'store.' || table_name FROM duckdb_tables() WHERE schema_name = 'store'"
+        ).fetchall()
+    }
+
+
+@pytest.fixture(scope="module")
+def defined(connection: duckdb.DuckDBPyConnection) -> set[str]:
+    """The views and macros of the database."""
+    return {
+        name
+        for (name,) in connection.execute(
+            "SELECT schema_name || '.' || view_name FROM duckdb_views() "
+            "UNION SELECT schema_name || '.' || function_name FROM duckdb_functions()"
+        ).fetchall()
+    }
+
+
 def is_defined_in_sql(name: str) -> bool:
     """Tell staged events, whose tables ingest makes, from everything else."""
     return name in LAYER_OF or name.startswith(("store.", "derive.", "main."))
@@ -62,12 +86,12 @@ def test_every_sql_file_lies_in_a_known_folder() -> None:
     assert FILES
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
+@each(FILES)
 def test_the_name_is_the_place(file: SqlFile) -> None:
     assert file.header.name == file.expected_name
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
+@each(FILES)
 def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
     needs = [
         name for name in file.header.needs if is_defined_in_sql(name) and not name.startswith(PARTS)
@@ -75,7 +99,7 @@ def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
     assert sorted(needs) == sorted(filter(is_defined_in_sql, file.references))
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
+@each(FILES)
 def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
     position = LAYERS.index(file.layer)
     for name in file.references:
@@ -87,16 +111,13 @@ def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
         assert {name.partition(".")[0] for name in file.references} <= {"main"}
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
-def test_tables_of_the_store_exist(file: SqlFile, connection: duckdb.DuckDBPyConnection) -> None:
-    tables = connection.execute(
-        "SELECT 'store.' || table_name FROM duckdb_tables() WHERE schema_name = 'store'"
-    ).fetchall()
+@each(FILES)
+def test_tables_of_the_store_exist(file: SqlFile, stored: set[str]) -> None:
     used = {name for name in file.references if name.startswith("store.")}
-    assert used <= {name for (name,) in tables}
+    assert used <= stored
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
+@each(FILES)
 def test_units_agree_with_names(file: SqlFile) -> None:
     for column in file.header.columns:
         is_time = column.unit in {"ns", "epoch ns"}
@@ -105,7 +126,7 @@ def test_units_agree_with_names(file: SqlFile) -> None:
             assert column.type == "BIGINT", f"{column.name} {column.type}"
 
 
-@pytest.mark.parametrize("file", QUERIES, ids=str)
+@each(QUERIES)
 def test_parameters_of_a_query_are_those_of_its_sql(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -120,7 +141,7 @@ def test_parameters_of_a_query_are_those_of_its_sql(
     assert ("start_ns" in used) == ("end_ns" in used) == file.header.has_window
 
 
-@pytest.mark.parametrize("file", QUERIES, ids=str)
+@each(QUERIES)
 def test_columns_of_a_query_are_those_of_its_output(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -137,7 +158,7 @@ def test_columns_of_a_query_are_those_of_its_output(
         assert described(cursor.sql(file.header.body, params=bound)) == declared(file)
 
 
-@pytest.mark.parametrize("file", QUERIES, ids=str)
+@each(QUERIES)
 def test_a_query_is_ordered_and_hides_only_truth_values(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -150,7 +171,7 @@ def test_a_query_is_ordered_and_hides_only_truth_values(
     assert types.get(INTERNAL_COLUMN, "BOOLEAN") == "BOOLEAN"
 
 
-@pytest.mark.parametrize("file", QUERIES, ids=str)
+@each(QUERIES)
 def test_columns_say_what_they_name(file: SqlFile) -> None:
     """So that the query has the options that choose rows by it."""
     kinds = {"topic_name": "topic", "hostname": "host"} | {kind: kind for kind in (*KINDS, PATH)}
@@ -159,13 +180,13 @@ def test_columns_say_what_they_name(file: SqlFile) -> None:
             assert column.unit == kinds[column.name], column.name
 
 
-@pytest.mark.parametrize("file", QUERIES, ids=str)
+@each(QUERIES)
 def test_a_query_has_a_title_and_a_grain(file: SqlFile) -> None:
     assert file.header.title != file.header.name
     assert file.header.grain.startswith("one row per ")
 
 
-@pytest.mark.parametrize("file", PROGRAM, ids=str)
+@each(PROGRAM)
 def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -196,7 +217,7 @@ def test_methods_have_the_defaults_that_are_declared(
     assert declared == {name: parameters[name] for name in declared}
 
 
-@pytest.mark.parametrize("file", VIEWS, ids=str)
+@each(VIEWS)
 def test_columns_of_a_view_are_those_of_its_output(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -205,7 +226,7 @@ def test_columns_of_a_view_are_those_of_its_output(
         assert output == declared(file)
 
 
-@pytest.mark.parametrize("file", MACROS, ids=str)
+@each(MACROS)
 def test_parameters_and_columns_of_a_public_macro_are_declared(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -231,7 +252,7 @@ def test_parameters_and_columns_of_a_public_macro_are_declared(
         assert output == declared(file)
 
 
-@pytest.mark.parametrize("file", MACROS, ids=str)
+@each(MACROS)
 def test_defaults_of_a_public_macro_are_those_that_it_declares(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
@@ -244,16 +265,7 @@ def test_defaults_of_a_public_macro_are_those_that_it_declares(
         assert connection.execute(typed).fetchone() == (declared[name].default,)
 
 
-@pytest.mark.parametrize("file", [*VIEWS, *MACROS], ids=str)
-def test_the_database_has_the_object_in_its_schema(
-    file: SqlFile, connection: duckdb.DuckDBPyConnection
-) -> None:
-    row = connection.execute(
-        "SELECT (SELECT count(*) FROM duckdb_views() WHERE schema_name || '.' || view_name = $name)"
-        " + (SELECT count(*) FROM duckdb_functions()"
-        "    WHERE schema_name || '.' || function_name = $name)",
-        {"name": file.header.name},
-    ).fetchone()
-    assert row is not None
-    assert row[0] > 0
+@each([*VIEWS, *MACROS])
+def test_the_database_has_the_object_in_its_schema(file: SqlFile, defined: set[str]) -> None:
+    assert file.header.name in defined
     assert file.header.name.startswith(f"{SCHEMAS[file.layer]}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pytest
+from each import each
 from sql_files import SqlFile, sql_files
 
 from msgflow.db import check, finding
@@ -27,7 +27,7 @@ NAMES = {header.name.partition(".")[2] for header in diagnostics()}
 CODE = [*(ROOT / "msgflow").rglob("*.py"), *(ROOT / "schema").rglob("*.sql")]
 
 
-@pytest.mark.parametrize("header", diagnostics(), ids=lambda header: header.name)
+@each(diagnostics(), name=lambda header: header.name)
 def test_a_diagnostic_says_what_it_means_and_what_to_do(header: Header) -> None:
     """In words of its own, or by the finding that tells it to people."""
     assert header.title != header.name
@@ -42,7 +42,7 @@ def test_a_diagnostic_says_what_it_means_and_what_to_do(header: Header) -> None:
         assert f"finding.{header.finding}" in {one.name for one in FINDINGS}
 
 
-@pytest.mark.parametrize("header", diagnostics(), ids=lambda header: header.name)
+@each(diagnostics(), name=lambda header: header.name)
 def test_what_is_stored_of_a_phase_has_a_parameter(header: Header) -> None:
     """Of what was read and built there is one run; of the others, it has to be named."""
     if header.phase in ("reading", "model"):
@@ -61,7 +61,7 @@ def test_diagnostics_are_written_in_one_place() -> None:
     assert found == {"noted.py"}
 
 
-@pytest.mark.parametrize("file", READERS, ids=str)
+@each(READERS)
 def test_diagnostics_that_sql_asks_for_are_declared(file: SqlFile) -> None:
     body = file.header.body
     lists = re.findall(r"\bname (?:=|IN) \(?('\w+'(?:, '\w+')*)", body)
@@ -77,7 +77,7 @@ def test_diagnostics_and_findings_that_documents_name_are_declared() -> None:
             assert name in (NAMES if kind == "diagnostic" else findings), path
 
 
-@pytest.mark.parametrize("name", sorted(NAMES))
+@each(sorted(NAMES))
 def test_every_diagnostic_is_tested(name: str) -> None:
     """By a golden case of its own, or by a test that tells what leads to it."""
     cases = TESTS / "schema" / "cases"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-import pytest
+from each import each
 from sql_files import SqlFile, sql_files
 
 FILES = sql_files()
@@ -23,7 +23,7 @@ def code_lines(file: SqlFile) -> list[str]:
     return text.splitlines()
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
+@each(FILES)
 def test_lines_are_short_and_indented_by_spaces(file: SqlFile) -> None:
     for line in file.path.read_text().splitlines():
         assert len(line) <= 100, line
@@ -31,19 +31,19 @@ def test_lines_are_short_and_indented_by_spaces(file: SqlFile) -> None:
         assert line == line.rstrip(), line
 
 
-@pytest.mark.parametrize("file", FILES, ids=str)
+@each(FILES)
 def test_keywords_are_upper_case(file: SqlFile) -> None:
     for line in code_lines(file):
         assert not KEYWORDS.search(line), line
 
 
-@pytest.mark.parametrize("file", SHOWN, ids=str)
+@each(SHOWN)
 def test_columns_are_listed(file: SqlFile) -> None:
     last = "\n".join(code_lines(file)).rpartition("SELECT")[2]
     assert not re.match(r"\s*(DISTINCT\s+)?\*", last)
 
 
-@pytest.mark.parametrize("file", MACROS, ids=str)
+@each(MACROS)
 def test_parameters_for_runs_have_one_name(file: SqlFile) -> None:
     """A run that a macro is of is `only_run`, of which no column has the name; several are `runs`.
 
