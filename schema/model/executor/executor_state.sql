@@ -23,10 +23,11 @@ WITH state AS (
 ),
 -- The first callback instance after the event: the callback event before it was earlier.
 first_run AS (
-    SELECT p.executor_event_id, c.callback_instance_id
+    SELECT p.executor_event_id, min(c.callback_instance_id) AS callback_instance_id
     FROM staging.callback_pair AS p
     JOIN staging.callback_instance AS c ON p.start_event_id = c.start_event_id
     WHERE coalesce(p.previous_callback_event_id < p.executor_event_id, true)
+    GROUP BY p.executor_event_id
 )
 SELECT
     t.executor_id,
@@ -34,8 +35,10 @@ SELECT
     s.state,
     s.start_ns,
     s.end_ns,
-    r.callback_instance_id,
+    -- Not a join: DuckDB would keep the states in memory for it, which are five times as many.
+    (
+        SELECT callback_instance_id FROM first_run WHERE executor_event_id = s.start_event_id
+    ) AS callback_instance_id,
     s.start_event_id
 FROM state AS s
 LEFT JOIN staging.executor_thread AS t ON s.thread_id = t.thread_id
-LEFT JOIN first_run AS r ON s.start_event_id = r.executor_event_id
