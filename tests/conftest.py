@@ -11,6 +11,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from hypothesis import settings
 
 from msgflow.db.migrate import create
 from msgflow.trace import bt2_library
@@ -18,6 +19,7 @@ from msgflow.trace import bt2_library
 pytest_plugins = ["golden"]
 
 ROOT = Path(__file__).resolve().parents[1]
+_QUICK = "not thorough"
 _LEFT_OUT = pytest.StashKey[int]()
 
 
@@ -36,6 +38,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # `make test` tries the same examples each time: who changes one thing is not told of another.
+    settings.register_profile("same", derandomize=True)
+    if config.option.markexpr == _QUICK:
+        settings.load_profile("same")
     if config.getoption("--without-bt2"):
         # An import of it fails then as where it is missing, and no other place is searched.
         sys.modules["bt2"] = None  # type: ignore[assignment]
@@ -62,7 +68,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Say how many tests `make test` leaves to `make test-all`."""
     config = terminalreporter.config
     count = config.stash.get(_LEFT_OUT, 0)
-    if count and config.option.markexpr == "not thorough":
+    if count and config.option.markexpr == _QUICK:
         terminalreporter.write_line(f"{count:,} thorough tests not run: make test-all")
 
 
