@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.diagnostic import diagnostics
-from msgflow.db.tables import metadata
+from msgflow.db.tables import TABLES
 from msgflow.query.catalogue import load_queries
 from msgflow.sql.header import PHASES
 
@@ -179,10 +179,10 @@ def _diagram() -> str:
     """Return the relations between tables as a Mermaid diagram, without those to `run`."""
     relations = sorted(
         {
-            (column.info["references"].partition(".")[0], table.name, column.name)
-            for table in metadata.tables.values()
-            for column in table.columns
-            if column.info["references"] is not None
+            (column.references.partition(".")[0], table.name, column.name)
+            for table in TABLES.values()
+            for column in table.columns.values()
+            if column.references is not None
         }
     )
     lines = [

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.tables import SCHEMA, metadata
+from msgflow.db.tables import SCHEMA, TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -61,13 +61,12 @@ def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[Chec
 
 def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
     relations = {
-        table: [
-            (column.name, reference)
-            for column in table.columns
-            if (reference := column.info.get("references")) is not None
-            and reference != f"{table.name}.{column.name}"
+        table.name: [
+            (column.name, column.references)
+            for column in table.columns.values()
+            if column.references not in (None, f"{table.name}.{column.name}")
         ]
-        for table in metadata.tables.values()
+        for table in TABLES.values()
     }
     blocks = _blocks(con, {reference for each in relations.values() for _, reference in each})
     for table, references in relations.items():
@@ -77,13 +76,13 @@ def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[C
         counts = ", ".join(
             _broken(column, reference, blocks[reference]) for column, reference in references
         )
-        rows = con.execute(f"SELECT {counts} FROM {table.fullname} AS child{of_run}").fetchall()
+        rows = con.execute(f"SELECT {counts} FROM {SCHEMA}.{table} AS child{of_run}").fetchall()
         for (column, reference), row_count in zip(references, rows[0], strict=True):
             yield CheckResult(
-                f"relation.{table.name}.{column}",
+                f"relation.{table}.{column}",
                 RELATION_SEVERITY,
                 row_count,
-                f"Every {column} of {table.name} is a row of {reference.partition('.')[0]}.",
+                f"Every {column} of {table} is a row of {reference.partition('.')[0]}.",
             )
 
 

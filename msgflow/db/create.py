@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from sqlalchemy import Table
-
+    from msgflow.db.tables import Table
 
 _KIND = "database"
 
@@ -45,10 +44,10 @@ def write_new(path: Path) -> None:
 
 
 def _statements() -> Iterator[str]:
-    from msgflow.db.tables import SCHEMA, metadata
+    from msgflow.db.tables import SCHEMA, TABLES
 
     yield f"CREATE SCHEMA {SCHEMA}"
-    for table in metadata.tables.values():
+    for table in TABLES.values():
         yield from _table(table)
     # As Alembic makes it.
     yield (
@@ -61,15 +60,15 @@ def _statements() -> Iterator[str]:
 
 def _table(table: Table) -> Iterator[str]:
     columns = ", ".join(
-        f'"{column.name}" {column.type.compile()}'
-        + (" PRIMARY KEY" if column.primary_key else "" if column.nullable else " NOT NULL")
-        + (" DEFAULT false" if column.server_default is not None else "")
-        for column in table.columns
+        f'"{column.name}" {column.type}'
+        + (" PRIMARY KEY" if column.is_key else " NOT NULL" if column.is_required else "")
+        + (f" DEFAULT {column.default}" if column.default is not None else "")
+        for column in table.columns.values()
     )
-    yield f"CREATE TABLE {table.fullname} ({columns})"
-    yield f"COMMENT ON TABLE {table.fullname} IS {objects.literal(table.comment or '')}"
-    for column in table.columns:
+    yield f"CREATE TABLE {table.full_name} ({columns})"
+    yield f"COMMENT ON TABLE {table.full_name} IS {objects.literal(table.comment)}"
+    for column in table.columns.values():
         yield (
-            f'COMMENT ON COLUMN {table.fullname}."{column.name}" IS '
-            f"{objects.literal(column.comment or '')}"
+            f'COMMENT ON COLUMN {table.full_name}."{column.name}" IS '
+            f"{objects.literal(column.comment)}"
         )

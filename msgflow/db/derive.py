@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.conditions import has_no_row
 from msgflow.db.noted import forget, note
-from msgflow.db.tables import SCHEMA, metadata
+from msgflow.db.tables import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,7 +70,7 @@ def derived_tables() -> tuple[str, ...]:
         name
         for header in objects.views()
         for schema, _, name in [header.name.partition(".")]
-        if schema == "derive" and f"{SCHEMA}.{name}" in metadata.tables
+        if schema == "derive" and name in TABLES
     )
 
 
@@ -93,7 +93,7 @@ def derivation_hash() -> str:
 
 def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
     """Derive one of `derived_tables` anew, inside the open transaction."""
-    columns = ", ".join(metadata.tables[f"{SCHEMA}.{name}"].columns.keys())
+    columns = ", ".join(TABLES[name].columns)
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     if has_no_row(con, f"derive.{name}", run_id):
         return

@@ -33,7 +33,7 @@ VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 SCHEMAS = ("store", "derive", "main")
 
 _REVISION = re.compile(r"[0-9]{4}")
-# What makes tables, and views of them, beside `schema/`: read as text, as SQLAlchemy takes long.
+# What makes tables, and views of them, beside `schema/`: read as text, not run.
 _DECLARATION = ("tables.py", "table_view.py", "create.py", "diagnostic.py")
 
 

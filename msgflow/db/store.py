@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.db.tables import metadata
+from msgflow.db.tables import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import duckdb
-    from sqlalchemy import Column, Table
+
+    from msgflow.db.tables import Column, Table
 
 
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
@@ -28,7 +29,7 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         ).fetchall()
     }
     bases = _bases(con)
-    for table in metadata.tables.values():
+    for table in TABLES.values():
         if table.name in staged:
             _copy(con, table, run_id, bases)
 
@@ -36,33 +37,34 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
     """Delete runs from every table, inside the open transaction."""
     for run_id in run_ids:
-        for table in metadata.tables.values():
+        for table in TABLES.values():
             if "run_id" in table.columns:
-                con.execute(f"DELETE FROM {table.fullname} WHERE run_id = ?", [run_id])
+                con.execute(f"DELETE FROM {table.full_name} WHERE run_id = ?", [run_id])
 
 
 def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     bases = {}
-    for table in metadata.tables.values():
+    for table in TABLES.values():
         key = f"{table.name}_id"
         if key in table.columns:
-            row = con.execute(f"SELECT coalesce(max({key}), 0) FROM {table.fullname}").fetchone()
+            row = con.execute(f"SELECT coalesce(max({key}), 0) FROM {table.full_name}").fetchone()
             bases[key] = 0 if row is None else int(row[0])
     return bases
 
 
 def _copy(con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]) -> None:
-    names = ", ".join(column.name for column in table.columns)
-    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns)
-    con.execute(f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}")
+    names = ", ".join(table.columns)
+    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns.values())
+    con.execute(
+        f"INSERT INTO {table.full_name} ({names}) SELECT {values} FROM staging.{table.name}"
+    )
 
 
-def _value(table: Table, column: Column[object], run_id: int, bases: dict[str, int]) -> str:
+def _value(table: Table, column: Column, run_id: int, bases: dict[str, int]) -> str:
     if column.name == "run_id":
         return str(run_id)
     if column.name == f"{table.name}_id":
         return f"{column.name} + {bases[column.name]}"
-    reference = column.info.get("references")
-    if reference is None:
+    if column.references is None:
         return f'"{column.name}"'
-    return f"{column.name} + {bases[reference.split('.')[1]]}"
+    return f"{column.name} + {bases[column.references.split('.')[1]]}"

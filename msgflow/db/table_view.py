@@ -11,28 +11,23 @@ from msgflow.sql.header import Column, Header
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    import sqlalchemy
-
 # Where the way from a row to its clock ends: who has it, with which key.
 _CLOCKS = {"process": "derive.process_clock", "clock": "store.clock"}
 
 
 def table_views() -> tuple[Header, ...]:
     """Return a header for each table that says what its view is."""
-    return tuple(
-        _view(table) for table in tables.metadata.tables.values() if table.info["view"] is not None
-    )
+    return tuple(_view(table) for table in tables.TABLES.values() if table.view is not None)
 
 
 def declared_columns(name: str) -> dict[str, Column]:
     """Return the columns by name that a table of `store` declares for public views."""
-    table = tables.metadata.tables[f"{tables.SCHEMA}.{name}"]
-    return {column.name: _described(column) for column in table.info["columns"]}
+    return {column.name: _described(column) for column in tables.TABLES[name].declared}
 
 
-def _view(table: sqlalchemy.Table) -> Header:
-    columns = [column for column in table.info["columns"] if column.info["is_public"]]
-    ways = dict.fromkeys(column.info["clock_of"] for column in columns)
+def _view(table: tables.Table) -> Header:
+    columns = [column for column in table.declared if column.is_public]
+    ways = dict.fromkeys(column.clock_of for column in columns)
     joins = [join for way in ways if way is not None for join in _joins(table, way)]
     selected = ",\n".join(f"    {_expression(column)}" for column in columns)
     joined = "".join(
@@ -43,30 +38,29 @@ def _view(table: sqlalchemy.Table) -> Header:
     return Header(
         name=f"main.{table.name}",
         title=f"main.{table.name}",
-        description=table.info["view"],
-        grain=f"{table.comment[:1].lower()}{table.comment[1:]}" if table.comment else "",
+        description=table.view or "",
+        grain=f"{table.comment[:1].lower()}{table.comment[1:]}",
         kind="view",
         params=(),
         columns=tuple(_described(column) for column in columns),
         needs=tuple(
-            sorted({table.fullname, *is_corrected, *(relation for _, relation, _, _ in joins)})
+            sorted({table.full_name, *is_corrected, *(relation for _, relation, _, _ in joins)})
         ),
         severity=None,
         cause=None,
         cure=None,
         note=None,
-        body=f"SELECT\n{selected}\nFROM {table.fullname} AS self{joined}\n",
+        body=f"SELECT\n{selected}\nFROM {table.full_name} AS self{joined}\n",
         path=Path(tables.__file__),
     )
 
 
-def _described(column: sqlalchemy.Column[object]) -> Column:
-    about = column.info
-    return Column(column.name, column.type.compile(), about["unit"], about["description"])
+def _described(column: tables.Column) -> Column:
+    return Column(column.name, column.type, column.unit, column.description)
 
 
-def _expression(column: sqlalchemy.Column[object]) -> str:
-    sql, way = column.info["sql"], column.info["clock_of"]
+def _expression(column: tables.Column) -> str:
+    sql, way = column.sql, column.clock_of
     if sql is not None:
         return f"{sql} AS {column.name}"
     if way is None:
@@ -78,7 +72,7 @@ def _expression(column: sqlalchemy.Column[object]) -> str:
     )
 
 
-def _joins(table: sqlalchemy.Table, way: str) -> Iterator[tuple[str, str, str, str]]:
+def _joins(table: tables.Table, way: str) -> Iterator[tuple[str, str, str, str]]:
     """Yield (kind, relation, alias, condition) of the joins from a row to its clock.
 
     Args:
@@ -89,8 +83,8 @@ def _joins(table: sqlalchemy.Table, way: str) -> Iterator[tuple[str, str, str, s
     column = table.columns[way]
     while True:
         # Who has no thread or node has no clock either, and stays all the same.
-        kind = "LEFT JOIN" if column.nullable else kind
-        reference = column.info["references"] or f"{column.table.name}.{column.name}"
+        kind = kind if column.is_required else "LEFT JOIN"
+        reference = column.references or f"{table.name}.{column.name}"
         target, _, key = reference.partition(".")
         if target in _CLOCKS:
             clock = _clock_alias(way)
@@ -98,10 +92,11 @@ def _joins(table: sqlalchemy.Table, way: str) -> Iterator[tuple[str, str, str, s
             return
         alias = way.removesuffix("_id") if at == "self" else f"{at}_{target}"
         yield kind, f"{tables.SCHEMA}.{target}", alias, f"{at}.{column.name} = {alias}.{key}"
-        at, column = alias, _way_on(tables.metadata.tables[f"{tables.SCHEMA}.{target}"])
+        at, table = alias, tables.TABLES[target]
+        column = _way_on(table)
 
 
-def _way_on(table: sqlalchemy.Table) -> sqlalchemy.Column[object]:
+def _way_on(table: tables.Table) -> tables.Column:
     """Return the column of a table that leads to a clock: where several do, the shortest way."""
     return next(
         table.columns[key] for key in ("clock_id", "host_id", "process_id") if key in table.columns

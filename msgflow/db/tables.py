@@ -6,128 +6,114 @@ the documentation (`table_view.py`). Other public views over a table are files o
 what their columns share with the table stands only here.
 
 Every table has one comment that states its grain; every column one that states its meaning.
-Relations are declared in `info["references"]`: DuckDB's foreign keys would forbid replacing a run
+Relations are declared in `references`: DuckDB's foreign keys would forbid replacing a run
 in one transaction, so `schema/health/check` proves them instead.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-from sqlalchemy import (
-    TIMESTAMP,
-    BigInteger,
-    Boolean,
-    Column,
-    DefaultClause,
-    Integer,
-    LargeBinary,
-    MetaData,
-    String,
-    Table,
-)
-from sqlalchemy.types import UserDefinedType
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sqlalchemy.types import TypeEngine
-
-
-class UBigInteger(UserDefinedType[int]):
-    """UBIGINT; duckdb-engine has that, too, but takes as long to import as all of SQLAlchemy."""
-
-    cache_ok = True
-
-    def get_col_spec(self, **_: object) -> str:
-        """Return the name of the type in SQL."""
-        return "UBIGINT"
-
-
-class Texts(UserDefinedType[list[str]]):
-    """VARCHAR[]."""
-
-    cache_ok = True
-
-    def get_col_spec(self, **_: object) -> str:
-        """Return the name of the type in SQL."""
-        return "VARCHAR[]"
-
-
-class Identities(UserDefinedType[list[int]]):
-    """BIGINT[]."""
-
-    cache_ok = True
-
-    def get_col_spec(self, **_: object) -> str:
-        """Return the name of the type in SQL."""
-        return "BIGINT[]"
-
+    from collections.abc import Mapping
 
 SCHEMA = "store"
-metadata = MetaData(schema=SCHEMA)
-
 RUN_COMMENT = "Run that the row belongs to"
 
 
-def _column(
-    name: str,
-    type_: TypeEngine[Any] | type[TypeEngine[Any]],
-    comment: str,
-    *,
-    unit: str | None = None,
-    key: bool = False,
-    required: bool = False,
-    references: str | None = None,
-    hidden: bool = False,
-    clock_of: str | None = None,
-    sql: str | None = None,
-) -> Column[Any]:
-    info = {
-        "description": comment,
-        "unit": unit,
-        "references": references,
-        "is_public": not hidden,
-        "clock_of": clock_of,
-        "sql": sql,
-    }
-    return Column(
-        name,
-        type_,
-        comment=comment if unit is None else f"{comment} [{unit}]",
-        primary_key=key,
-        autoincrement=False,
-        nullable=not (required or key),
-        info=info,
-    )
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table, or of its public view alone.
+
+    Attributes:
+        name: of both.
+        type: as DuckDB calls it.
+        description: what it means.
+        unit: of its values, None where they have none.
+        is_key: it tells the rows apart.
+        is_required: it is never NULL.
+        default: in SQL, where nobody gives a value.
+        references: the column of a table that each value stands in.
+        is_public: the view shows it.
+        clock_of: of a moment, the column that leads to the clock that showed it.
+        sql: where only the view has it, what it is made of.
+    """
+
+    name: str
+    type: str
+    description: str
+    unit: str | None = None
+    is_key: bool = False
+    is_required: bool = False
+    default: str | None = None
+    references: str | None = None
+    is_public: bool = True
+    clock_of: str | None = None
+    sql: str | None = None
+
+    @property
+    def comment(self) -> str:
+        """What databases say of it."""
+        return self.description if self.unit is None else f"{self.description} [{self.unit}]"
 
 
-def _key(name: str, comment: str) -> Column[Any]:
-    return _column(name, BigInteger, comment, key=True)
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of the schema `store`.
+
+    Attributes:
+        name: of the table, and of its public view.
+        comment: what a row is.
+        view: what the public view is, where that shows the table as it is.
+        declared: its columns and those of the view alone, in order.
+        columns: its columns by name, in order.
+    """
+
+    name: str
+    comment: str
+    view: str | None
+    declared: tuple[Column, ...]
+    columns: Mapping[str, Column]
+
+    @property
+    def full_name(self) -> str:
+        """The name with its schema."""
+        return f"{SCHEMA}.{self.name}"
 
 
-def _id(name: str, comment: str) -> Column[Any]:
+TABLES: dict[str, Table] = {}
+"""Every table by name, in the order in which rows are stored."""
+
+
+def _key(name: str, comment: str) -> Column:
+    return Column(name, "BIGINT", comment, is_key=True, is_required=True)
+
+
+def _id(name: str, comment: str) -> Column:
     """Key of an instance or link table: unique, but not worth an index."""
-    return _column(name, BigInteger, comment, required=True)
+    return Column(name, "BIGINT", comment, is_required=True)
 
 
-def _reference(name: str, comment: str, *, to: str, required: bool = False) -> Column[Any]:
-    return _column(name, BigInteger, comment, required=required, references=to)
+def _reference(name: str, comment: str, *, to: str, required: bool = False) -> Column:
+    return Column(name, "BIGINT", comment, is_required=required, references=to)
 
 
-def _run() -> Column[Any]:
+def _run() -> Column:
     return _reference("run_id", RUN_COMMENT, to="run.run_id", required=True)
 
 
-def _trace(comment: str = "Trace it was recorded in", required: bool = True) -> Column[Any]:
+def _trace(comment: str = "Trace it was recorded in", required: bool = True) -> Column:
     return _reference("trace_id", comment, to="trace.trace_id", required=required)
 
 
-def _process() -> Column[Any]:
+def _process() -> Column:
     return _reference("process_id", "Process it lives in", to="process.process_id", required=True)
 
 
 def _thread(
     comment: str = "Thread it happened on", name: str = "thread_id", required: bool = True
-) -> Column[Any]:
+) -> Column:
     return _reference(name, comment, to="thread.thread_id", required=required)
 
 
@@ -138,60 +124,58 @@ def _time(
     clock_of: str | None = None,
     required: bool = False,
     hidden: bool = False,
-) -> Column[Any]:
+) -> Column:
     """A moment; `clock_of` is the column of the table that leads to the clock that showed it.
 
     The view has such times on the common axis, those without as they were recorded.
     """
-    return _column(
+    return Column(
         name,
-        BigInteger,
+        "BIGINT",
         comment,
         unit="epoch ns",
-        required=required,
-        hidden=hidden,
+        is_required=required,
+        is_public=not hidden,
         clock_of=clock_of,
     )
 
 
-def _order(name: str, comment: str) -> Column[Any]:
-    return _column(name, BigInteger, comment, unit="event order", hidden=True)
+def _order(name: str, comment: str) -> Column:
+    return Column(name, "BIGINT", comment, unit="event order", is_public=False)
 
 
-def _text(name: str, comment: str, *, required: bool = False) -> Column[Any]:
-    return _column(name, String, comment, required=required)
+def _text(name: str, comment: str, *, required: bool = False) -> Column:
+    return Column(name, "VARCHAR", comment, is_required=required)
 
 
-def _count(name: str, comment: str, *, unit: str | None = None) -> Column[Any]:
-    return _column(name, BigInteger, comment, unit=unit)
+def _count(name: str, comment: str, *, unit: str | None = None) -> Column:
+    return Column(name, "BIGINT", comment, unit=unit)
 
 
-def _flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
+def _flag(name: str, comment: str, *, hidden: bool = False) -> Column:
     """A truth value, false where nobody says otherwise."""
-    column = _column(name, Boolean, comment, required=True, hidden=hidden)
-    column.server_default = DefaultClause("false")
-    return column
+    return Column(name, "BOOLEAN", comment, is_required=True, default="false", is_public=not hidden)
 
 
-def _handle(name: str, comment: str) -> Column[Any]:
-    return _column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
+def _handle(name: str, comment: str) -> Column:
+    return Column(name, "UBIGINT", f"{comment}; an address, valid in its process until reused")
 
 
-def _route() -> Column[Any]:
-    return _column(
+def _route() -> Column:
+    return Column(
         "route",
-        Identities,
+        "BIGINT[]",
         "Node (or, negative, process) that called, then services; empty: by no service",
-        required=True,
+        is_required=True,
     )
 
 
-def _computed(name: str, type_: type[TypeEngine[Any]], comment: str, *, sql: str) -> Column[Any]:
+def _computed(name: str, type_: str, comment: str, *, sql: str) -> Column:
     """A column of the view alone, from those of the table, which is called `self`."""
-    return _column(name, type_, comment, sql=sql)
+    return Column(name, type_, comment, sql=sql)
 
 
-def _table(name: str, comment: str, *parts: str | Column[Any]) -> Table:
+def _table(name: str, comment: str, *parts: str | Column) -> Table:
     """Declare a table.
 
     Args:
@@ -200,17 +184,11 @@ def _table(name: str, comment: str, *parts: str | Column[Any]) -> Table:
         parts: what the public view is, where that shows the table as it is: the view is made of
             this declaration then; and the columns in order.
     """
-    declared = [part for part in parts if not isinstance(part, str)]
-    return Table(
-        name,
-        metadata,
-        *(column for column in declared if column.info["sql"] is None),
-        comment=comment,
-        info={
-            "view": next((part for part in parts if isinstance(part, str)), None),
-            "columns": declared,
-        },
-    )
+    declared = tuple(part for part in parts if isinstance(part, Column))
+    view = next((part for part in parts if isinstance(part, str)), None)
+    columns = {column.name: column for column in declared if column.sql is None}
+    TABLES[name] = Table(name, comment, view, declared, columns)
+    return TABLES[name]
 
 
 # --- the database itself -------------------------------------------------------------------------
@@ -218,7 +196,9 @@ def _table(name: str, comment: str, *parts: str | Column[Any]) -> Table:
 definition = _table(
     "definition",
     "One row per part of the schema that is re-applied rather than migrated",
-    _column("name", String, "'views': the SQL of all views and macros", key=True),
+    Column(
+        "name", "VARCHAR", "'views': the SQL of all views and macros", is_key=True, is_required=True
+    ),
     _text("hash", "SHA-256 of the SQL that was last applied", required=True),
     _text("msgflow_version", "Version of msgflow that applied it", required=True),
 )
@@ -232,13 +212,15 @@ run = _table(
     _text(
         "name", "Name given by the user, or the name of the first trace directory", required=True
     ),
-    _column("created_at", TIMESTAMP, "When the run was ingested, UTC", required=True),
+    Column("created_at", "TIMESTAMP", "When the run was ingested, UTC", is_required=True),
     _text("msgflow_version", "Version of msgflow that ingested the run", required=True),
     _text("derivation_hash", "SHA-256 of the SQL that derived the links", required=True),
     _time("start_ns", "First event of any trace"),
     _time("end_ns", "Last event of any trace"),
     _count("event_count", "Events read"),
-    _column("labels", Texts, "What users say of the run, KEY=VALUE each, sorted; NULL: nothing"),
+    Column(
+        "labels", "VARCHAR[]", "What users say of the run, KEY=VALUE each, sorted; NULL: nothing"
+    ),
 )
 
 trace = _table(
@@ -265,7 +247,7 @@ packet = _table(
     _trace(),
     _count("stream_class_id", "Stream class (channel) of the packet"),
     _count("stream_instance_id", "Stream (buffer) of the packet"),
-    _column("cpu_id", Integer, "CPU that wrote the packet"),
+    Column("cpu_id", "INTEGER", "CPU that wrote the packet"),
     _count("position", "Position in its stream, from 0"),
     _time("begin_ns", "Begin of the packet"),
     _time("end_ns", "End of the packet"),
@@ -281,7 +263,7 @@ gap = _table(
     "Gaps in the traces: no two events are paired across one.",
     _run(),
     _trace("Trace it was recorded in; between two chunks of a recording, the later"),
-    _column("cpu", Integer, "CPU concerned; NULL: all"),
+    Column("cpu", "INTEGER", "CPU concerned; NULL: all"),
     _text(
         "kind",
         "'loss' (discarded events), 'packets' (lost packets) or 'pause' (not tracing)",
@@ -299,19 +281,19 @@ clock = _table(
     _key("clock_id", "Identity of the clock"),
     _run(),
     _text("uuid", "UUID of the clock (LTTng: boot identity)"),
-    _column(
+    Column(
         "offset_ns",
-        BigInteger,
+        "BIGINT",
         "Added to a time of this clock to correct it",
         unit="ns",
-        required=True,
+        is_required=True,
     ),
-    _column(
+    Column(
         "drift_ppb",
-        BigInteger,
+        "BIGINT",
         "Added per unit of time since reference_ns",
         unit="1e-9",
-        required=True,
+        is_required=True,
     ),
     _time("reference_ns", "Moment at which the correction is offset_ns alone", required=True),
     _count("uncertainty_ns", "Bound of the error of the correction at reference_ns", unit="ns"),
@@ -340,12 +322,12 @@ clock_uncertainty = _table(
     _run(),
     _reference("clock_id", "The clock", to="clock.clock_id", required=True),
     _time("at_ns", "Moment, as the clock showed it", required=True),
-    _column(
+    Column(
         "uncertainty_ns",
-        BigInteger,
+        "BIGINT",
         "Bound of the error of the correction at that moment",
         unit="ns",
-        required=True,
+        is_required=True,
     ),
 )
 
@@ -366,18 +348,20 @@ process = _table(
     _key("process_id", "Identity of the process life"),
     _run(),
     _reference("host_id", "Host it ran on", to="host.host_id", required=True),
-    _column(
+    Column(
         "pid",
-        Integer,
+        "INTEGER",
         "Process id; the one inside its PID namespace if the trace has no other",
-        required=True,
+        is_required=True,
     ),
     _text("name", "Name of the process (its first thread)"),
     _text("tracetools_version", "Version that rcl_init reported; for display only"),
     _time("first_seen_ns", "First event", clock_of="process_id"),
     _time("last_seen_ns", "Last event", clock_of="process_id"),
-    _column("pid_namespace", BigInteger, "PID namespace, where the trace has it"),
-    _column("life", Integer, "Number of this life among those of the pid, from 1", required=True),
+    Column("pid_namespace", "BIGINT", "PID namespace, where the trace has it"),
+    Column(
+        "life", "INTEGER", "Number of this life among those of the pid, from 1", is_required=True
+    ),
 )
 
 thread = _table(
@@ -387,11 +371,11 @@ thread = _table(
     _key("thread_id", "Identity of the thread"),
     _run(),
     _process(),
-    _column(
+    Column(
         "tid",
-        Integer,
+        "INTEGER",
         "Thread id; the one inside its PID namespace if the trace has no other",
-        required=True,
+        is_required=True,
     ),
     _text("name", "Name of the thread"),
     _order("first_event_id", "First event"),
@@ -403,7 +387,7 @@ thread = _table(
 # --- entities ------------------------------------------------------------------------------------
 
 
-def _node_reference() -> Column[Any]:
+def _node_reference() -> Column:
     return _reference("node_id", "Node it belongs to", to="node.node_id")
 
 
@@ -433,7 +417,7 @@ publisher = _table(
     _text("topic_name", "Fully expanded topic name"),
     _handle("publisher_handle", "rcl publisher handle"),
     _handle("rmw_handle", "rmw publisher handle"),
-    _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
+    Column("gid", "BLOB", "Global identifier, 16 bytes; NULL: none"),
     _count("queue_depth", "History depth asked for"),
     _time("created_ns", "First initialisation event", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
@@ -452,7 +436,7 @@ subscription = _table(
     _text("topic_name", "Fully expanded topic name"),
     _handle("subscription_handle", "rcl subscription handle"),
     _handle("rmw_handle", "rmw subscription handle"),
-    _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
+    Column("gid", "BLOB", "Global identifier, 16 bytes; NULL: none"),
     _count("queue_depth", "History depth asked for"),
     _time("created_ns", "First initialisation event", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
@@ -472,7 +456,7 @@ timer = _table(
     _handle("timer_handle", "rcl timer handle"),
     _time("created_ns", "rcl_timer_init", clock_of="process_id"),
     _computed(
-        "is_inferred", Boolean, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+        "is_inferred", "BOOLEAN", "Its initialisation was not traced", sql="self.created_ns IS NULL"
     ),
 )
 
@@ -487,11 +471,11 @@ service = _table(
     _text("service_name", "Fully expanded service name"),
     _handle("service_handle", "rcl service handle"),
     _handle("rmw_handle", "rmw service handle"),
-    _column("gid", LargeBinary, "Global identifier, 16 bytes; NULL: none"),
+    Column("gid", "BLOB", "Global identifier, 16 bytes; NULL: none"),
     _time("created_ns", "rcl_service_init", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
     _computed(
-        "is_inferred", Boolean, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+        "is_inferred", "BOOLEAN", "Its initialisation was not traced", sql="self.created_ns IS NULL"
     ),
 )
 
@@ -506,11 +490,11 @@ client = _table(
     _text("service_name", "Fully expanded service name"),
     _handle("client_handle", "rcl client handle"),
     _handle("rmw_handle", "rmw client handle"),
-    _column("gid", LargeBinary, "Identifier that servers see, 16 bytes; NULL: none"),
+    Column("gid", "BLOB", "Identifier that servers see, 16 bytes; NULL: none"),
     _time("created_ns", "rcl_client_init", clock_of="process_id"),
     _flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
     _computed(
-        "is_inferred", Boolean, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+        "is_inferred", "BOOLEAN", "Its initialisation was not traced", sql="self.created_ns IS NULL"
     ),
 )
 
@@ -740,7 +724,7 @@ callback_instance = _table(
         "Callback instance that it is nested in",
         to="callback_instance.callback_instance_id",
     ),
-    _column("depth", Integer, "Nesting depth on its thread, from 1", required=True),
+    Column("depth", "INTEGER", "Nesting depth on its thread, from 1", is_required=True),
     _order("start_event_id", "callback_start"),
     _order("end_event_id", "callback_end; NULL: never seen to end"),
     _order("effective_end_event_id", "callback_end, else the first event that cannot be inside"),
@@ -844,19 +828,19 @@ stamp_clock = _table(
     _time("at_ns", "Middle of the stretch, time of the traces", required=True),
     _time("start_ns", "Begin of the stretch", required=True),
     _time("end_ns", "End of the stretch, exclusive", required=True),
-    _column(
+    Column(
         "difference_ns",
-        BigInteger,
+        "BIGINT",
         "Clock of ROS less clock of the traces, with the shortest delay of a stamp",
         unit="ns",
-        required=True,
+        is_required=True,
     ),
     _count("drift_ppb", "Change of the difference in the stretch", unit="ppb"),
     _count("message_count", "Messages that agree with it"),
     _count("segment", "Number of jumps of the clock before it"),
-    _column(
+    Column(
         "is_sharp",
-        Boolean,
+        "BOOLEAN",
         "The drift is known: publications microseconds apart are told apart; NULL: yes",
     ),
 )
@@ -909,10 +893,10 @@ link_packet = _table(
     _time("received_ns", "Came from the network device", required=True),
     _text("protocol", "'tcp' or 'udp'", required=True),
     _text("source_address", "IP address that it was sent from", required=True),
-    _column("source_port", Integer, "Port that it was sent from", required=True),
+    Column("source_port", "INTEGER", "Port that it was sent from", is_required=True),
     _text("destination_address", "IP address that it was sent to", required=True),
-    _column("destination_port", Integer, "Port that it was sent to", required=True),
-    _column("identification", Integer, "Identification of the datagram; NULL: IPv6 has none"),
+    Column("destination_port", "INTEGER", "Port that it was sent to", is_required=True),
+    Column("identification", "INTEGER", "Identification of the datagram; NULL: IPv6 has none"),
     _count("sequence_number", "Sequence number of its first byte; NULL: not TCP"),
 )
 
@@ -1035,8 +1019,8 @@ flow_root = _table(
     _reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
     _flag("is_source", "No message that was taken led to it"),
     _text("root_kind", "'callback_instance' or 'publication'", required=True),
-    _column(
-        "root_id", BigInteger, "Where its flow can be said to begin, of that kind", required=True
+    Column(
+        "root_id", "BIGINT", "Where its flow can be said to begin, of that kind", is_required=True
     ),
     _route(),
 )

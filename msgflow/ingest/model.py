@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.conditions import conditions_of_diagnostics, conditions_of_model, is_empty
 from msgflow.db.diagnostic import STAGED, of_model, staged
-from msgflow.db.tables import metadata
+from msgflow.db.tables import TABLES
 from msgflow.ingest import staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.outline import creating, empty_tables
@@ -102,7 +102,7 @@ class Growing:
 
 def _finished(headers: tuple[Header, ...], position: int) -> set[str]:
     """Return the tables, built or read, that nothing after the object at `position` needs."""
-    stored = {f"staging.{table.name}" for table in metadata.tables.values()}
+    stored = {f"staging.{name}" for name in TABLES}
     unfolded = {header.name: header for header in headers if header.kind != "view"}
     later = {name for name in stored if name in unfolded}  # evaluated when they are stored
     for header in headers[position + 1 :]:

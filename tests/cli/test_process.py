@@ -77,6 +77,14 @@ def test_a_query_imports_what_it_needs_and_no_more(small_database: Path) -> None
     assert not modules & set(NEVER_IN_QUERY)
 
 
+def test_an_ingest_imports_nothing_that_moves_old_databases(tmp_path: Path) -> None:
+    trace = tmp_path / "trace"
+    simulate("pipeline", trace, factor=0.01)
+    modules = imported("ingest", trace, "--db", tmp_path / "new.duckdb")
+    assert {"duckdb", "pyarrow", "numpy"} <= modules
+    assert not modules & set(NEVER_IN_QUERY)
+
+
 def test_a_reader_that_goes_away_is_no_error(small_database: Path) -> None:
     process = subprocess.Popen(
         command("sql", "FROM range(300000)", "--limit", 0, "--db", small_database),

@@ -11,7 +11,7 @@ import pytest
 
 from msgflow.db import objects
 from msgflow.db.table_view import table_views
-from msgflow.db.tables import metadata
+from msgflow.db.tables import TABLES
 
 VIEWS = table_views()
 AHEAD_NS = 1_000
@@ -30,7 +30,7 @@ def filled(
     path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
     path.write_bytes(empty_database.read_bytes())
     with duckdb.connect(str(path)) as con:
-        for table in metadata.tables.values():
+        for table in TABLES.values():
             values = [
                 {
                     "BOOLEAN": "true",
@@ -39,17 +39,17 @@ def filled(
                     "BIGINT[]": "[1]",
                     "BLOB": "'a'::BLOB",
                 }.get(kind, "'1'" if kind == "VARCHAR" else "1")
-                for kind in (column.type.compile() for column in table.columns)
+                for kind in (column.type for column in table.columns.values())
             ]
             if table.name != "definition":
-                con.execute(f"INSERT INTO {table.fullname} VALUES ({', '.join(values)})")
+                con.execute(f"INSERT INTO {table.full_name} VALUES ({', '.join(values)})")
         con.execute(f"UPDATE store.clock SET offset_ns = {AHEAD_NS}, drift_ppb = 0")
         yield con
 
 
 def test_every_table_is_seen_or_inner() -> None:
     public = set(objects.public_names())
-    assert {table.name for table in metadata.tables.values()} - public == INNER
+    assert {table.name for table in TABLES.values()} - public == INNER
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.name)
@@ -64,7 +64,7 @@ def test_columns_are_those_of_the_output(
         "WHERE schema_name || '.' || table_name = ?",
         [view.name],
     ).fetchall()
-    declared = metadata.tables[view.name.replace("main.", "store.")].info["columns"]
+    declared = TABLES[view.name.removeprefix("main.")].declared
     assert dict(comments).items() <= {column.name: column.comment for column in declared}.items()
 
 
@@ -79,10 +79,10 @@ def test_times_of_a_clock_are_corrected_and_nothing_else(
 ) -> None:
     (row,) = filled.sql(f"FROM {view.name}").fetchall()
     shown = dict(zip((column.name for column in view.columns), row, strict=True))
-    table = metadata.tables[view.name.replace("main.", "store.")]
-    (row,) = filled.sql(f"FROM {table.fullname}").fetchall()
-    stored = dict(zip(table.columns.keys(), row, strict=True))
-    is_corrected = {column.name for column in table.columns if column.info["clock_of"]}
+    table = TABLES[view.name.removeprefix("main.")]
+    (row,) = filled.sql(f"FROM {table.full_name}").fetchall()
+    stored = dict(zip(table.columns, row, strict=True))
+    is_corrected = {column.name for column in table.columns.values() if column.clock_of}
     for name, value in shown.items():
         if name in is_corrected:
             assert value == stored[name] + AHEAD_NS, name
@@ -94,12 +94,10 @@ def test_what_is_corrected() -> None:
     """All moments but the stamps of the middleware, and those of clocks themselves."""
     as_recorded = {
         (table.name, column.name)
-        for table in metadata.tables.values()
-        if table.info["view"]
-        for column in table.info["columns"]
-        if column.info["unit"] == "epoch ns"
-        and column.info["is_public"]
-        and column.info["clock_of"] is None
+        for table in TABLES.values()
+        if table.view
+        for column in table.declared
+        if column.unit == "epoch ns" and column.is_public and column.clock_of is None
     }
     assert as_recorded == {
         ("publication", "source_timestamp_ns"),

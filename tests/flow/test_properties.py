@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from random_system import random_system
 from ros_system import RosSystem
 
-from msgflow.db.tables import metadata
+from msgflow.db.tables import TABLES
 from msgflow.ingest.catalogue import load
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
@@ -42,12 +42,12 @@ def outputs(analysis: Analysis, hidden: frozenset[str] = frozenset()) -> dict[st
     result = {}
     # All of it at once, not what one table needs after the other.
     assert analysis.connection
-    for table in metadata.tables.values():
+    for table in TABLES.values():
         if "run_id" not in table.columns or table.name == "run":
             continue
-        names = [c.name for c in table.columns if c.name not in hidden]
+        names = [name for name in table.columns if name not in hidden]
         result[table.name] = analysis.rows(
-            f"SELECT {', '.join(names)} FROM {table.fullname} ORDER BY ALL"
+            f"SELECT {', '.join(names)} FROM {table.full_name} ORDER BY ALL"
         )
     result["end_to_end"] = analysis.rows(FLOWS)
     return result
@@ -116,8 +116,8 @@ def test_the_values_of_handles_do_not_matter(analysis: Analysis, seed: int) -> N
     permuted = dict(zip(found, others, strict=True))
     hidden = frozenset(
         column.name
-        for table in metadata.tables.values()
-        for column in table.columns
+        for table in TABLES.values()
+        for column in table.columns.values()
         if column.name.endswith("_handle")
     )
     analysis.build(system)

@@ -10,7 +10,7 @@ import duckdb
 import pytest
 from ingested import contents
 
-from msgflow.db.tables import metadata
+from msgflow.db.tables import TABLES
 from msgflow.errors import ExitCode, UsageError
 from msgflow.ingest import ingest
 
@@ -26,11 +26,11 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
     """Rows of a run, its ids counted from 1 as in a database of its own."""
     result = {}
     with duckdb.connect(str(database), read_only=True) as connection:
-        for table in metadata.tables.values():
+        for table in TABLES.values():
             if "run_id" not in table.columns or table.name == "run":
                 continue
             columns = []
-            for column in table.columns:
+            for column in table.columns.values():
                 if column.name == "root_id":  # of the table that its kind names
                     columns.append(
                         "root_id - CASE root_kind WHEN 'publication' THEN "
@@ -39,13 +39,13 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
                         "WHERE run_id = $run) END + 1"
                     )
                     continue
-                key = (column.info.get("references") or f"{table.name}.{column.name}").split(".")
+                key = (column.references or f"{table.name}.{column.name}").split(".")
                 base = ""
                 if column.name != "run_id" and key[1] == f"{key[0]}_id":
                     base = f" - (SELECT min({key[1]}) FROM store.{key[0]} WHERE run_id = $run) + 1"
                 columns.append(f"{column.name}{base}" if column.name != "run_id" else "1")
             result[table.name] = connection.execute(
-                f"SELECT {', '.join(columns)} FROM {table.fullname} WHERE run_id = $run "
+                f"SELECT {', '.join(columns)} FROM {table.full_name} WHERE run_id = $run "
                 "ORDER BY ALL",
                 {"run": run_id},
             ).fetchall()
