@@ -11,6 +11,7 @@ from typing import Any
 
 import duckdb
 import pytest
+import thorough
 from hypothesis import settings
 
 from msgflow.db.migrate import create
@@ -40,7 +41,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     # `make test` tries the same examples each time: who changes one thing is not told of another.
     settings.register_profile("same", derandomize=True)
-    if config.option.markexpr == _QUICK:
+    thorough.is_quick = config.option.markexpr == _QUICK
+    if thorough.is_quick:
         settings.load_profile("same")
     if config.getoption("--without-bt2"):
         # An import of it fails then as where it is missing, and no other place is searched.

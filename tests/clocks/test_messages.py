@@ -12,6 +12,7 @@ from drifting_clocks import Clock, Delay, Way, fill_clocks
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from possible_lines import Bound, PossibleLines
+from thorough import examples
 
 from msgflow.clocks import read_clock_sync, set_clocks
 
@@ -57,7 +58,7 @@ def require_truth(clocks: list[Clock], corrections: dict[int, tuple[object, ...]
 
 
 @settings(
-    max_examples=25,
+    max_examples=examples(8, 25),
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from random_system import random_system
 from ros_system import RosSystem
+from thorough import examples
 
 from msgflow.db.tables import TABLES
 from msgflow.ingest.catalogue import load
@@ -18,7 +19,7 @@ from msgflow.query.run import run_query
 
 SEEDS = st.integers(0, 10_000)
 FEW = settings(
-    max_examples=2,
+    max_examples=examples(1, 2),
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
@@ -138,7 +139,7 @@ def exact_links(analysis: Analysis) -> set[tuple[Any, ...]]:
     )
 
 
-@settings(FEW, max_examples=4)
+@settings(FEW, max_examples=examples(2, 4))
 @given(seed=SEEDS, share=st.sampled_from([0.02, 0.3, 0.7]))
 def test_removing_events_creates_no_link(analysis: Analysis, seed: int, share: float) -> None:
     system = random_system(seed)
@@ -152,7 +153,7 @@ def test_removing_events_creates_no_link(analysis: Analysis, seed: int, share: f
     assert exact_links(analysis.build(copy)) <= before
 
 
-@settings(FEW, max_examples=3)
+@settings(FEW, max_examples=examples(2, 3))
 @given(seed=SEEDS, deleted=st.sampled_from([0.0, 0.1, 0.5]))
 def test_completeness_adds_up(analysis: Analysis, seed: int, deleted: float) -> None:
     """Every root of every path is counted once, though messages and callbacks are missing."""

@@ -22,6 +22,15 @@ def thorough(*values: Any, **options: Any) -> Any:
     return pytest.param(*values, marks=pytest.mark.thorough, **options)
 
 
+# Whether thorough tests are left out; told by tests/conftest.py.
+is_quick = False
+
+
+def examples(quick: int, every: int) -> int:
+    """How many random examples a test has: more where thorough tests are run."""
+    return quick if is_quick else every
+
+
 def few(values: Iterable[Any], *chosen: Any) -> list[Any]:
     """All values of one parameter, or sets of several: all but the chosen ones thorough."""
     values = list(values)

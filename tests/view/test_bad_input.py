@@ -268,6 +268,22 @@ def said_bytes(raised: pytest.ExceptionInfo[UsageError]) -> int:
     return int(found[1].replace(",", ""))
 
 
+@pytest.fixture
+def _asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports of one database and window have the same answers: they are asked for once."""
+    known: dict[str, bytes] = {}
+    ask = report_module._Maker.answer
+
+    def answer(maker: report_module._Maker, name: str, /, **params: Any) -> bytes:
+        key = f"{maker.window} {name} {sorted(params.items())}"
+        if key not in known:
+            known[key] = ask(maker, name, **params)
+        return known[key]
+
+    monkeypatch.setattr(report_module._Maker, "answer", answer)
+
+
+@pytest.mark.usefixtures("_asked_once")
 def test_a_report_says_what_it_left_out(demo: Path, tmp_path: Path, page: Page) -> None:
     target = tmp_path / "report.html"
     with open_db(demo) as opened:

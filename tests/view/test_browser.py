@@ -121,7 +121,7 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
     [
         thorough(3, "publication", "SELECT min(publication_id) FROM publication JOIN publisher"
          " USING (publisher_id) WHERE publication.run_id = 3 AND topic_name = '/FrontLidarDriver'"),
-        (3, "take", "SELECT quantile_disc(take_id, 0.5) FROM take JOIN subscription USING"
+        thorough(3, "take", "SELECT quantile_disc(take_id, 0.5) FROM take JOIN subscription USING"
          " (subscription_id) WHERE take.run_id = 3 AND topic_name = '/VehicleInterface'"),
         thorough(3, "callback_instance", "SELECT min(callback_instance_id) FROM link_causal"
          " WHERE run_id = 3 AND kind = 'periodic_async'"),

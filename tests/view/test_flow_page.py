@@ -43,32 +43,32 @@ def test_the_file_has_exactly_the_flow(
     assert 0 < arrows <= len(wanted)
 
 
+@pytest.mark.parametrize("depth", few([0, 1], 1))
 def test_the_file_ends_where_depth_does(
-    systems: Path, read: Read, tmp_path: Path, page: Page
+    depth: int, systems: Path, read: Read, tmp_path: Path, page: Page
 ) -> None:
     number = a_publication(read(systems), 3)
     target = tmp_path / "flow.html"
-    for depth in (0, 1):
-        with open_db(systems) as opened:
-            flow = opened.flow(publication_id=number, depth=depth, internal=True)
-            opened.flow_page(flow, target)
-        page.open(target.as_uri())
-        assert page.flow() == set(flow.nodes)
-        assert f"--depth {depth}" in page.page.locator(".said").inner_text()
-    assert 1 < len(flow.nodes) < len(flow_of(read(systems), "publication", number))
+    with open_db(systems) as opened:
+        flow = opened.flow(publication_id=number, depth=depth, internal=True)
+        opened.flow_page(flow, target)
+    page.open(target.as_uri())
+    assert page.flow() == set(flow.nodes)
+    assert f"--depth {depth}" in page.page.locator(".said").inner_text()
+    assert depth < len(flow.nodes) < len(flow_of(read(systems), "publication", number))
 
 
+@pytest.mark.parametrize("direction", few(["forward", "backward"], "backward"))
 def test_the_limit_is_of_the_direction(
-    systems: Path, read: Read, tmp_path: Path, page: Page
+    direction: str, systems: Path, read: Read, tmp_path: Path, page: Page
 ) -> None:
     number = a_publication(read(systems), 3)
     target = tmp_path / "flow.html"
-    for direction in ("forward", "backward"):
-        with open_db(systems) as opened:
-            flow = opened.flow(publication_id=number, direction=direction, limit=3)
-            opened.flow_page(flow, target)
-        page.open(target.as_uri())
-        assert len(page.flow()) == 3
+    with open_db(systems) as opened:
+        flow = opened.flow(publication_id=number, direction=direction, limit=3)
+        opened.flow_page(flow, target)
+    page.open(target.as_uri())
+    assert len(page.flow()) == 3
 
 
 def test_what_the_limit_leaves_out_is_said(

@@ -95,7 +95,7 @@ def test_graph(way: str, systems: Path, serve: Serve, report: Report, page: Page
     with open_db(systems) as opened:
         rates = opened.query("publication-rate", run=3).to_arrow().to_pylist()
         latency = opened.query("transport-latency", run=3).to_arrow().to_pylist()
-    page.open(serve(systems).address if way == "served" else report(systems, run=3))
+    page.open(serve(systems).address if way == "served" else report(systems))
     page.go("#/graph?run=3")
     names = page.page.locator(".graph g[role=button]").evaluate_all(
         "all => all.map(one => one.getAttribute('aria-label'))"

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutations import flip_stream, overwrite
 from same_batches import Content, differences, read
+from thorough import examples
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import iteration, order, pieces
@@ -35,7 +36,9 @@ def read_in_pieces(trace: Path, most_bytes: int, most_events: int) -> Content:
 
 
 @settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    deadline=None,
+    max_examples=examples(15, 60),
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(
     style=STYLES,

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from kernels import without_kernel
 from mutations import flip_header, flip_stream, overwrite
 from same_batches import differences, read
+from thorough import examples
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import events, lanes, lockstep, scan, steps
@@ -45,7 +46,9 @@ def anywhere(random: Random) -> Callable[..., Any]:
 
 
 @settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    deadline=None,
+    max_examples=examples(20, 60),
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(
     style=STYLES,
