@@ -292,7 +292,10 @@ def slam(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    "listener", ["/transform_listener_impl_5566a1b0", '"/transform_listener_*"']
+    "listener",
+    few(
+        ["/transform_listener_impl_5566a1b0", '"/transform_listener_*"'], '"/transform_listener_*"'
+    ),
 )
 def test_messages_that_another_node_of_the_process_keeps(slam: Path, listener: str) -> None:
     with Database(slam) as opened:

@@ -114,6 +114,7 @@ class Analysis:
         ]
         if not missing:
             return
+        is_first = self._growing is None
         if self._growing is None:
             self._growing = model.Growing(self._connection)
             staging.narrow(self._connection, self._growing.empty)
@@ -121,7 +122,8 @@ class Analysis:
             self._growing.add(header)
             self._built.add(header.name)
         self._connection.begin()
-        delete(self._connection, [1])
+        if not is_first:
+            delete(self._connection, [1])
         store(self._connection, 1)
         self._connection.execute(
             "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
@@ -171,7 +173,11 @@ class Analysis:
                 con.execute(f"DELETE FROM {database}.{table}")
             con.commit()
         con.begin()
-        delete(con, [1])
+        for database, schema, table in self._read(
+            "SELECT database_name, schema_name, table_name FROM duckdb_tables() "
+            "WHERE schema_name = 'store' AND estimated_size > 0"
+        ):
+            con.execute(f"DELETE FROM {database}.{schema}.{table}")
         con.commit()
 
 

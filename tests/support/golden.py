@@ -34,6 +34,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,8 @@ _HEALTH = ("finding.", "check.")
 _DIAGNOSTIC = "diagnostic."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _TEMPLATE = pytest.StashKey[Path]()
+# (name, type, whether it may be NULL) of the columns of each table of the store.
+_COLUMNS: dict[str, list[tuple[str, str, bool]]] = {}
 _SECTION = "== "
 _EXPECTED = "expected"
 
@@ -192,18 +195,40 @@ def template(config: pytest.Config) -> Path:
 
 def evaluate(path: Path, empty: Path) -> str:
     """Return the output of a case as CSV."""
-    with tempfile.TemporaryDirectory(prefix="msgflow-case-") as directory:
-        database = Path(directory) / "case.duckdb"
-        shutil.copyfile(empty, database)
-        with duckdb.connect(str(database)) as connection:
-            case = fill_case(connection, path)
-            if case.derives:
-                for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-                    derive(connection, run_id)
-            result = _result(connection, path.parent.name, case)
-    stream = io.BytesIO()
-    write_result(result, Format.CSV, stream)
+    connection = _opened(empty)
+    try:
+        case = fill_case(connection, path)
+        if case.derives:
+            for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
+                derive(connection, run_id)
+        result = _result(connection, path.parent.name, case)
+        stream = io.BytesIO()
+        write_result(result, Format.CSV, stream)
+        _clear(connection)
+    except BaseException:
+        # Nobody knows what is left in it.
+        _opened.cache_clear()
+        connection.close()
+        raise
     return stream.getvalue().decode()
+
+
+@cache
+def _opened(empty: Path) -> duckdb.DuckDBPyConnection:
+    """Open a copy of a database for all cases: that takes as long as many of them."""
+    path = empty.with_name("cases.duckdb")
+    shutil.copyfile(empty, path)
+    return duckdb.connect(str(path))
+
+
+def _clear(connection: duckdb.DuckDBPyConnection) -> None:
+    """Take what a case has put into the database and beside it."""
+    for table, is_temporary in connection.execute(
+        "SELECT CASE WHEN temporary THEN 'temp.main.' ELSE 'store.' END || table_name, temporary "
+        "FROM duckdb_tables() WHERE temporary OR schema_name = 'store' AND estimated_size > 0"
+    ).fetchall():
+        connection.execute(f"DROP TABLE {table}" if is_temporary else f"DELETE FROM {table}")
+    connection.execute("DETACH DATABASE IF EXISTS staging")
 
 
 def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
@@ -283,11 +308,14 @@ def insert(
     connection: duckdb.DuckDBPyConnection, table: str, names: list[str | None], rows: Rows
 ) -> None:
     """Insert rows of text into store.<table>; see the head of this file for what is left out."""
-    columns = connection.execute(
-        "SELECT column_name, data_type, is_nullable FROM duckdb_columns() "
-        "WHERE schema_name = 'store' AND table_name = ?",
-        [table],
-    ).fetchall()
+    if not _COLUMNS:
+        # Asked once: to list columns takes longer than to insert a few rows.
+        for owner, *column in connection.execute(
+            "SELECT table_name, column_name, data_type, is_nullable FROM duckdb_columns() "
+            "WHERE schema_name = 'store' ORDER BY table_name, column_index"
+        ).fetchall():
+            _COLUMNS.setdefault(owner, []).append(tuple(column))
+    columns = _COLUMNS.get(table, [])
     unknown = set(names) - {name for name, _, _ in columns}
     if unknown:
         raise ValueError(f"store.{table} has no column {', '.join(map(str, unknown))}")

@@ -41,9 +41,12 @@ def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:
     """Return all rows of all tables of a database."""
     with duckdb.connect(str(path), read_only=True) as connection:
         tables = connection.execute(
-            "SELECT table_name FROM duckdb_tables() WHERE schema_name = 'store' ORDER BY 1"
+            "SELECT table_name, estimated_size > 0 FROM duckdb_tables() "
+            "WHERE schema_name = 'store' ORDER BY 1"
         ).fetchall()
         return {
             table: connection.execute(f"FROM store.{table} ORDER BY ALL").fetchall()
-            for (table,) in tables
+            if may_have_rows
+            else []
+            for table, may_have_rows in tables
         }

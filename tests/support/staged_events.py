@@ -171,14 +171,17 @@ class StagedEvents:
         for name, row in self.ordered():
             rows[name].append(row)
         batches = []
+        counts: list[tuple[int, str, int]] = []
         for name, events in rows.items():
             schema = pa.schema([*COMMON_SCHEMA, *load().tracepoints[name].arrow_schema()])
             batches.append((name, pa.RecordBatch.from_pylist(events, schema=schema)))
-            for trace, count in Counter(event["trace_index"] for event in events).items():
-                con.execute(
-                    "INSERT INTO staging.event_count VALUES (?, ?, true, ?)", [trace, name, count]
-                )
-                con.execute("INSERT INTO staging.declared VALUES (?, ?)", [trace, name])
+            of_traces = Counter(event["trace_index"] for event in events)
+            counts += [(trace, name, count) for trace, count in of_traces.items()]
+        if counts:
+            texts = [f"({trace}, '{name}', true, {count})" for trace, name, count in counts]
+            con.execute(f"INSERT INTO staging.event_count VALUES {', '.join(texts)}")
+            texts = [f"({trace}, '{name}')" for trace, name, _ in counts]
+            con.execute(f"INSERT INTO staging.declared VALUES {', '.join(texts)}")
         packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
         self._read(con, batches, packets)
         corrections = reconciled.find(con)

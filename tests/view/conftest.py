@@ -6,6 +6,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -27,7 +28,7 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
-    """Return the database that `make` makes in a directory, once for all workers of a test run."""
+    """Return the path for which `make` makes a file, once for all workers of a test run."""
     base = factory.getbasetemp()
     directory = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / f"view_{name}"
     path = directory / f"{name}.duckdb"
@@ -97,19 +98,16 @@ def read() -> Iterator[Callable[[Path], duckdb.DuckDBPyConnection]]:
 @pytest.fixture(scope="session")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
     """Writes a report of a database, once for the same options; returns its address."""
-    directory = tmp_path_factory.mktemp("reports")
-    known: dict[str, str] = {}
 
     def written(database: Path, **options: Any) -> str:
-        key = f"{database} {options}"
-        if key not in known:
-            path = directory / f"{len(known)}.html"
+        def make(path: Path) -> None:
             # Critical paths take the most time; of the slowest flow is enough.
             with pytest.MonkeyPatch.context() as patch, open_db(database) as opened:
                 patch.setattr(view_report, "MOST_CRITICAL", 1)
-                opened.report(path, **options)
-            known[key] = path.as_uri()
-        return known[key]
+                opened.report(path.with_suffix(".html"), **options)
+
+        key = sha256(f"{database} {options}".encode()).hexdigest()[:16]
+        return made_once(tmp_path_factory, f"report_{key}", make).with_suffix(".html").as_uri()
 
     return written
 
