@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from thorough import thorough
 from typer.testing import Result
 
 from msgflow.database import Database
@@ -58,7 +59,7 @@ def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
     assert refused.stderr.startswith("error: --case has no such value — middle\n\nhint: choose ")
 
 
-@pytest.mark.parametrize("options", [(), ("--quiet",)])
+@pytest.mark.parametrize("options", [thorough(()), ("--quiet",)])
 def test_what_went_wrong_is_said_even_when_quiet(
     msgflow: Msgflow, trace: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
 ) -> None:

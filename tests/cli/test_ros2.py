@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from thorough import few
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 COMMAND = """
@@ -86,7 +87,7 @@ def test_words_reach_msgflow_as_they_are(ros2: Path, small_database: Path) -> No
     assert (done.returncode, done.stdout.splitlines()[1][:8]) == (0, '2,"noon"')
 
 
-@pytest.mark.parametrize("option", ["-h", "--help"])
+@pytest.mark.parametrize("option", few(["-h", "--help"], "-h"))
 def test_help_is_that_of_msgflow(ros2: Path, option: str) -> None:
     assert "Usage: ros2 msgflow [OPTIONS] COMMAND" in run(ros2, option).stdout
     assert (

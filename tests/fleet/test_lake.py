@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -60,10 +61,27 @@ def lake(tmp_path: Path) -> Lake:
     return Lake.open_or_create(tmp_path / "lake")
 
 
-def test_a_run_is_there_when_its_row_is(
-    lake: Lake, databases: tuple[Path, Path], tmp_path: Path
-) -> None:
-    part = write(lake, databases[0], tmp_path)
+@pytest.fixture(scope="module")
+def written(
+    databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Part, Part]:
+    """A lake that both were written into, with their views: nobody sees them yet."""
+    folder = tmp_path_factory.mktemp("written")
+    lake = Lake.open_or_create(folder / "lake")
+    content = Content(database=False)
+    first, other = (write(lake, database, folder, content=content) for database in databases)
+    return folder / "lake", first, other
+
+
+@pytest.fixture
+def holding(written: tuple[Path, Part, Part], tmp_path: Path) -> tuple[Lake, Part, Part]:
+    """A copy of it, to change it."""
+    shutil.copytree(written[0], tmp_path / "holding")
+    return Lake.open(tmp_path / "holding"), *written[1:]
+
+
+def test_a_run_is_there_when_its_row_is(holding: tuple[Lake, Part, Part]) -> None:
+    lake, part, _ = holding
     assert lake.runs().num_rows == 0
     labels = {"robot": 'the "first"', "site": "a\nb, 'c'"}
     lake.commit([row(part, labels=labels)])
@@ -76,9 +94,9 @@ def test_a_run_is_there_when_its_row_is(
 
 
 def test_answers_are_those_of_the_database(
-    lake: Lake, databases: tuple[Path, Path], tmp_path: Path
+    holding: tuple[Lake, Part, Part], databases: tuple[Path, Path]
 ) -> None:
-    part = write(lake, databases[0], tmp_path, content=Content(database=False))
+    lake, part, _ = holding
     lake.commit([row(part)])
     with Database(databases[0]) as database:
         for name in ("e2e-latency", "callback-duration", "delivery"):
@@ -112,10 +130,9 @@ def test_answers_are_those_of_the_database(
     assert len(first) == len(flows)
 
 
-def test_runs_add_up(lake: Lake, databases: tuple[Path, Path], tmp_path: Path) -> None:
+def test_runs_add_up(holding: tuple[Lake, Part, Part]) -> None:
     """A quantile of several runs, from counts in buckets, is off by less than 1 %."""
-    content = Content(database=False)
-    parts = [write(lake, database, tmp_path, content=content) for database in databases]
+    lake, *parts = holding
     lake.commit(row(part) for part in parts)
     exact = read(
         lake,
@@ -135,10 +152,10 @@ def test_runs_add_up(lake: Lake, databases: tuple[Path, Path], tmp_path: Path) -
 
 
 def test_writing_again_writes_the_same(
-    lake: Lake, databases: tuple[Path, Path], tmp_path: Path
+    holding: tuple[Lake, Part, Part], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
     content = Content(database=False)
-    first = write(lake, databases[0], tmp_path, content=content)
+    lake, first, _ = holding
     before = {entry.path: lake.store.read(entry.path) for entry in lake.store.entries()}
     again = write(lake, databases[0], tmp_path, content=content)
     assert again.values == first.values
@@ -150,10 +167,9 @@ def test_writing_again_writes_the_same(
 
 
 def test_the_last_row_of_a_run_counts(
-    lake: Lake, databases: tuple[Path, Path], tmp_path: Path
+    holding: tuple[Lake, Part, Part], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    first = write(lake, databases[0], tmp_path)
-    other = write(lake, databases[1], tmp_path)
+    lake, first, other = holding
     lake.commit([row(first), row(other)])
     count = len(rows_of(lake, "flow"))
     # Twice, as by two workers that did the same.
@@ -174,8 +190,8 @@ def test_the_last_row_of_a_run_counts(
         lake.remove([first.values["run"]])
 
 
-def test_files_say_what_they_are(lake: Lake, databases: tuple[Path, Path], tmp_path: Path) -> None:
-    part = write(lake, databases[0], tmp_path, content=Content(database=False))
+def test_files_say_what_they_are(holding: tuple[Lake, Part, Part]) -> None:
+    lake, part, _ = holding
     lake.commit([row(part)])
     (flow,) = lake.files("flow", lake.runs())
     (run,) = lake.run_files()

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from ingested import contents
+from thorough import few
 
 from msgflow.db.workspace import workspace
 from msgflow.ingest import ingest, load
@@ -50,7 +51,7 @@ FAILURES = {
 }
 
 
-@pytest.mark.parametrize("where", FAILURES)
+@pytest.mark.parametrize("where", few(FAILURES, "reading", "storing"))
 def test_a_failure_leaves_the_database_as_it_was(
     database: Path, other_trace: Path, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:

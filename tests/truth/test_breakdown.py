@@ -76,7 +76,8 @@ def check_flows(ingested: Ingested) -> int:
     return count
 
 
-@pytest.mark.parametrize("name", few(RECORDINGS, "services"))
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", RECORDINGS)
 def test_parts_of_recorded_flows_add_up(recordings: Callable[[str], Ingested], name: str) -> None:
     assert check_flows(recordings(name)) > 0
 
@@ -86,7 +87,7 @@ def test_parts_of_simulated_flows_add_up(simulations: Callable[[str], Ingested],
     check_flows(simulations(name))
 
 
-@pytest.mark.parametrize("name", few(RECORDINGS, "sync_1_1", "services"))
+@pytest.mark.parametrize("name", few(RECORDINGS, "services"))
 def test_the_breakdown_adds_up_by_path(recordings: Callable[[str], Ingested], name: str) -> None:
     """Sums of the query over the parts of a path are those of the query e2e-latency."""
     con = recordings(name).connection
