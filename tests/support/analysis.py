@@ -17,6 +17,7 @@ from msgflow.db.connection import attach
 from msgflow.db.derive import derive, derive_table, derived_tables
 from msgflow.db.opening import open_memory
 from msgflow.db.store import delete, store
+from msgflow.db.tables import TABLES
 from msgflow.ingest import model, staging
 from msgflow.ingest.reported import restore
 
@@ -173,11 +174,16 @@ class Analysis:
                 con.execute(f"DELETE FROM {database}.{table}")
             con.commit()
         con.begin()
-        for database, schema, table in self._read(
-            "SELECT database_name, schema_name, table_name FROM duckdb_tables() "
-            "WHERE schema_name = 'store' AND estimated_size > 0"
-        ):
-            con.execute(f"DELETE FROM {database}.{schema}.{table}")
+        filled = {
+            name
+            for (name,) in self._read(
+                "SELECT 'store.' || table_name FROM duckdb_tables() "
+                "WHERE schema_name = 'store' AND estimated_size > 0"
+            )
+        }
+        for table in TABLES.values():
+            if "run_id" in table.columns and table.full_name in filled:
+                con.execute(f"DELETE FROM {table.full_name}")
         con.commit()
 
 

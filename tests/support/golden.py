@@ -225,7 +225,8 @@ def _clear(connection: duckdb.DuckDBPyConnection) -> None:
     """Take what a case has put into the database and beside it."""
     for table, is_temporary in connection.execute(
         "SELECT CASE WHEN temporary THEN 'temp.main.' ELSE 'store.' END || table_name, temporary "
-        "FROM duckdb_tables() WHERE temporary OR schema_name = 'store' AND estimated_size > 0"
+        "FROM duckdb_tables() WHERE temporary OR schema_name = 'store' AND estimated_size > 0 "
+        "AND table_name NOT IN ('alembic_version', 'definition')"
     ).fetchall():
         connection.execute(f"DROP TABLE {table}" if is_temporary else f"DELETE FROM {table}")
     connection.execute("DETACH DATABASE IF EXISTS staging")
