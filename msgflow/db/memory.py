@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-DEFAULT_LIMIT = "560MB"
-_LOADING_LIMIT = "352MB"
+DEFAULT_LIMIT = "400MB"
+_LOADING_BYTES = 128_000_000
 _SHARE_OF_MACHINE = 0.7
 
 
@@ -39,10 +39,10 @@ class Memory:
     @contextlib.contextmanager
     def loading(self) -> Iterator[None]:
         """Take less while rows are only written: the reader needs memory, too."""
-        if self._is_fixed:
+        if self._bytes() <= _LOADING_BYTES:
             yield
             return
-        self._con.execute("SET memory_limit = ?", [_LOADING_LIMIT])
+        self._con.execute("SET memory_limit = ?", [f"{_LOADING_BYTES}B"])
         yield
         self._con.execute("SET memory_limit = ?", [self._limit])
 
@@ -81,8 +81,7 @@ class Memory:
         """Allow so many times as much; tell whether the user and the machine let that happen."""
         if self._is_fixed:
             return False
-        now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
-        wanted = round(times * _bytes(now))
+        wanted = round(times * self._bytes())
         if wanted > _SHARE_OF_MACHINE * _machine_bytes():
             return False
         self._set(f"{wanted}B")
@@ -95,6 +94,12 @@ class Memory:
             self._con.execute("SET memory_limit = ?", [self._first])
             self._limit = self._first
 
+    def _bytes(self) -> int:
+        now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
+        number, unit = now.split()
+        power = ("bytes", "KiB", "MiB", "GiB", "TiB").index(unit)
+        return round(float(number) * float(1024**power))
+
     def _set(self, limit: str) -> None:
         try:
             self._con.execute("SET memory_limit = ?", [limit])
@@ -103,12 +108,6 @@ class Memory:
                 f"not an amount of memory — {limit}", "--memory-limit 2GB"
             ) from error
         self._limit = limit
-
-
-def _bytes(text: str) -> int:
-    number, unit = text.split()
-    power = ("bytes", "KiB", "MiB", "GiB", "TiB").index(unit)
-    return round(float(number) * float(1024**power))
 
 
 def _machine_bytes() -> int:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from msgflow.trace import Progress, TraceInfo
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
-_KEPT_BLOCKS = "256MB"
+_KEPT_BLOCKS = "96MB"
 
 
 @dataclass(frozen=True)

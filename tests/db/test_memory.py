@@ -32,6 +32,20 @@ def test_a_limit_that_the_user_gave_is_kept() -> None:
         assert limit_of(con) == "38.1 MiB"
 
 
+def test_less_while_traces_are_read() -> None:
+    """The reader needs memory, too, and rows that are written are not needed again."""
+    with duckdb.connect() as con:
+        usual = limit_of(con)
+        memory = Memory(con, None)
+        before = limit_of(con)
+        with memory.loading():
+            assert limit_of(con) == "122.0 MiB"
+        assert limit_of(con) == before != usual
+        given = Memory(con, "100MB")
+        with given.loading():
+            assert limit_of(con) == "95.3 MiB"
+
+
 def test_not_an_amount() -> None:
     with duckdb.connect() as con, pytest.raises(DatabaseError, match="not an amount of memory"):
         Memory(con, "much")
