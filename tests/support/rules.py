@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from functools import cache
 
 import duckdb
 
@@ -13,26 +12,13 @@ from msgflow.db import objects
 
 @contextmanager
 def derived(stage: str, names: Collection[str]) -> Iterator[duckdb.DuckDBPyConnection]:
-    """A connection with what `stage` makes, and these views and macros of `derive` above it.
-
-    It is inside a transaction, which is taken back: to make all anew takes as long as a test.
-    """
-    con = _made(stage, frozenset(names))
-    con.begin()
-    try:
+    """A connection with what `stage` makes, and these views and macros of `derive` above it."""
+    with duckdb.connect() as con:
+        con.execute(stage)
+        for header in objects.views():
+            if header.name.removeprefix("derive.") in names:
+                con.execute(objects.create_statement(header))
         yield con
-    finally:
-        con.rollback()
-
-
-@cache
-def _made(stage: str, names: frozenset[str]) -> duckdb.DuckDBPyConnection:
-    con = duckdb.connect()
-    con.execute(stage)
-    for header in objects.views():
-        if header.name.removeprefix("derive.") in names:
-            con.execute(objects.create_statement(header))
-    return con
 
 
 @contextmanager
