@@ -51,7 +51,8 @@ test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n auto --dist worksteal $(SELECTED)
+	@# Many tests start msgflow: it is compiled once.
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n auto --dist worksteal $(SELECTED)
 
 bench: $(VENV)/.installed babeltrace
 	$(BIN)/python benchmarks/run.py
