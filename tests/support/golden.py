@@ -34,7 +34,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -195,41 +194,18 @@ def template(config: pytest.Config) -> Path:
 
 def evaluate(path: Path, empty: Path) -> str:
     """Return the output of a case as CSV."""
-    connection = _opened(empty)
-    try:
-        case = fill_case(connection, path)
-        if case.derives:
-            for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-                derive(connection, run_id)
-        result = _result(connection, path.parent.name, case)
-        stream = io.BytesIO()
-        write_result(result, Format.CSV, stream)
-        _clear(connection)
-    except BaseException:
-        # Nobody knows what is left in it.
-        _opened.cache_clear()
-        connection.close()
-        raise
+    with tempfile.TemporaryDirectory(prefix="msgflow-case-") as directory:
+        database = Path(directory) / "case.duckdb"
+        shutil.copyfile(empty, database)
+        with duckdb.connect(str(database)) as connection:
+            case = fill_case(connection, path)
+            if case.derives:
+                for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
+                    derive(connection, run_id)
+            result = _result(connection, path.parent.name, case)
+    stream = io.BytesIO()
+    write_result(result, Format.CSV, stream)
     return stream.getvalue().decode()
-
-
-@cache
-def _opened(empty: Path) -> duckdb.DuckDBPyConnection:
-    """Open a copy of a database for all cases: that takes as long as many of them."""
-    path = empty.with_name("cases.duckdb")
-    shutil.copyfile(empty, path)
-    return duckdb.connect(str(path))
-
-
-def _clear(connection: duckdb.DuckDBPyConnection) -> None:
-    """Take what a case has put into the database and beside it."""
-    for table, is_temporary in connection.execute(
-        "SELECT CASE WHEN temporary THEN 'temp.main.' ELSE 'store.' END || table_name, temporary "
-        "FROM duckdb_tables() WHERE temporary OR schema_name = 'store' AND estimated_size > 0 "
-        "AND table_name NOT IN ('alembic_version', 'definition')"
-    ).fetchall():
-        connection.execute(f"DROP TABLE {table}" if is_temporary else f"DELETE FROM {table}")
-    connection.execute("DETACH DATABASE IF EXISTS staging")
 
 
 def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
