@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import duckdb
 
 from msgflow.errors import DatabaseError
-from msgflow.sql.failure import is_of_the_file
+from msgflow.sql.failure import is_of_the_file, twice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -67,7 +67,7 @@ class Memory:
         """
         while True:
             try:
-                return work()
+                return twice(work)
             except duckdb.OutOfMemoryException as error:
                 if is_of_the_file(error):  # nor can more be spilled
                     raise
