@@ -18,7 +18,7 @@ from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs, run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.choice import choose_runs
-from msgflow.sql.failure import database_errors, in_words, twice
+from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ class Database:
     def _ask(self, work: Callable[[], _T]) -> _T:
         """Return what `work` returns; Ctrl-C interrupts it."""
         with database_errors(self.path):
-            return interruptible(self.connection, lambda: twice(work))
+            return interruptible(self.connection, work)
 
     def ingest(
         self,

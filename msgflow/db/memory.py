@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import duckdb
 
 from msgflow.errors import DatabaseError
-from msgflow.sql.failure import is_of_the_file, twice
+from msgflow.sql.failure import is_of_the_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -22,6 +22,8 @@ _T = TypeVar("_T")
 
 DEFAULT_LIMIT = "400MB"
 _LOADING_BYTES = 128_000_000
+# Of a limit that the user gave, if that is more.
+_LOADING_SHARE = 4
 _SHARE_OF_MACHINE = 0.7
 
 
@@ -38,13 +40,23 @@ class Memory:
 
     @contextlib.contextmanager
     def loading(self) -> Iterator[None]:
-        """Take less while rows are only written: the reader needs memory, too."""
-        if self._bytes() <= _LOADING_BYTES:
+        """Take less while rows are only written: the reader needs memory, too.
+
+        Raises:
+            DatabaseError: that is too little.
+        """
+        share = self._bytes() // _LOADING_SHARE if self._is_fixed else 0
+        enough = max(_LOADING_BYTES, share)
+        if enough < self._bytes():
+            self._con.execute("SET memory_limit = ?", [f"{enough}B"])
+        try:
             yield
-            return
-        self._con.execute("SET memory_limit = ?", [f"{_LOADING_BYTES}B"])
-        yield
-        self._con.execute("SET memory_limit = ?", [self._limit])
+        except duckdb.OutOfMemoryException as error:
+            if is_of_the_file(error):
+                raise
+            raise self._too_little() from error
+        finally:
+            self._con.execute("SET memory_limit = ?", [self._limit])
 
     @contextlib.contextmanager
     def one_thread(self) -> Iterator[None]:
@@ -67,15 +79,12 @@ class Memory:
         """
         while True:
             try:
-                return twice(work)
+                return work()
             except duckdb.OutOfMemoryException as error:
                 if is_of_the_file(error):  # nor can more be spilled
                     raise
                 if not self.grow(2):
-                    raise DatabaseError(
-                        f"the traces need more memory than {self._limit}",
-                        "give more with --memory-limit, or read a shorter part of the recording",
-                    ) from error
+                    raise self._too_little() from error
 
     def grow(self, times: float) -> bool:
         """Allow so many times as much; tell whether the user and the machine let that happen."""
@@ -94,10 +103,16 @@ class Memory:
             self._con.execute("SET memory_limit = ?", [self._first])
             self._limit = self._first
 
+    def _too_little(self) -> DatabaseError:
+        return DatabaseError(
+            f"the traces need more memory than {self._limit}",
+            "give more with --memory-limit, or read a shorter part of the recording",
+        )
+
     def _bytes(self) -> int:
         now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
         number, unit = now.split()
-        power = ("bytes", "KiB", "MiB", "GiB", "TiB").index(unit)
+        power = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB").index(unit)
         return round(float(number) * float(1024**power))
 
     def _set(self, limit: str) -> None:

@@ -6,17 +6,15 @@ import errno
 import re
 import shutil
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import duckdb
 
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
-
-_T = TypeVar("_T")
 
 _FULL = re.compile(r"no space left|disk quota|max_temp_directory_size|not enough space", re.I)
 _REFUSED = re.compile(r"permission denied|read-only file system|operation not permitted", re.I)
@@ -25,9 +23,9 @@ _DAMAGE = re.compile(
     r"corrupt|checksum|deserializ|invalid unicode|could not read|failed to load metadata",
     re.I,
 )
-# DuckDB 2.0 fails where dictionaries of strings pass through several joins, at times: the same
+# DuckDB 2.0 fails at times where dictionaries of strings pass through several joins; the same
 # statement seldom meets it twice (duckdb/duckdb#24807 is the like of it).
-_PASSING = re.compile(r"dict-surviving")
+_MISTAKE = re.compile(r"dict-surviving")
 _OF_FILES = (
     duckdb.IOException,
     duckdb.FatalException,
@@ -68,20 +66,6 @@ def in_words(error: BaseException, path: Path) -> DatabaseError | None:
     return None
 
 
-def twice(work: Callable[[], _T]) -> _T:
-    """Return what `work` returns, at the second try where DuckDB made a passing mistake.
-
-    Args:
-        work: something that leaves nothing behind when it fails.
-    """
-    try:
-        return work()
-    except duckdb.InternalException as error:
-        if not _is_passing(error):
-            raise
-        return work()
-
-
 @contextmanager
 def database_errors(path: Path) -> Iterator[None]:
     """Raise what the file at `path`, or its place, is to blame for as a DatabaseError."""
@@ -109,19 +93,13 @@ def _kind(error: BaseException) -> str | None:
         text
     ):
         return "refused"
-    if _is_passing(error):
-        return "mistaken"
     if isinstance(error, _DAMAGED_KINDS):
-        return "damaged"
+        return "mistaken" if _MISTAKE.search(text) else "damaged"
     if (type(error) is duckdb.Error or isinstance(error, duckdb.IOException)) and _DAMAGE.search(
         text
     ):
         return "damaged"
     return None
-
-
-def _is_passing(error: BaseException) -> bool:
-    return isinstance(error, duckdb.InternalException) and bool(_PASSING.search(str(error)))
 
 
 def _first_line(error: BaseException) -> str:

@@ -32,7 +32,6 @@ from msgflow.db.connection import connect
 from msgflow.db.memory import Memory
 from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 from msgflow.query.run import first_line
-from msgflow.sql.failure import twice
 from msgflow.view import assets
 from msgflow.view.pages import Pages
 
@@ -172,7 +171,7 @@ class Ahead:
 
 def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
     try:
-        return twice(question)
+        return question()
     except (duckdb.OutOfMemoryException, QueryError) as error:
         if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
             raise

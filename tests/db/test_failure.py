@@ -14,7 +14,6 @@ import pytest
 
 import msgflow
 from msgflow.db import migrate
-from msgflow.db.memory import Memory
 from msgflow.db.opening import open_file
 from msgflow.errors import DatabaseError, ExitCode
 from msgflow.ingest import ingest
@@ -68,6 +67,10 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
         (duckdb.Error("Corrupt database file: computed checksum 1"), "is damaged: Corrupt"),
         (duckdb.InternalException("INTERNAL Error: index out of range\nstack"), "damaged: index"),
         (duckdb.InternalException("INTERNAL Error: dict-surviving cache: x"), "made a mistake"),
+        (
+            duckdb.FatalException("FATAL Error: invalidated. Original error: dict-surviving x"),
+            "made a mistake: invalidated",
+        ),
         (duckdb.FatalException("FATAL Error: invalidated"), "is damaged: invalidated"),
         (duckdb.SerializationException("Failed to deserialize"), "is damaged"),
     ],
@@ -92,31 +95,6 @@ def test_each_has_its_words(error: Exception, text: str) -> None:
 )
 def test_statements_at_fault_are_left_alone(error: Exception) -> None:
     assert in_words(error, PATH) is None
-
-
-def failing(times: int, text: str) -> Callable[[], list[int]]:
-    """Return what fails so many times, then returns how often it was called."""
-    calls: list[int] = []
-
-    def work() -> list[int]:
-        calls.append(len(calls) + 1)
-        if len(calls) <= times:
-            raise duckdb.InternalException(f"INTERNAL Error: {text}")
-        return calls
-
-    return work
-
-
-def test_a_passing_mistake_of_duckdb_is_tried_once_more(small_database: Path) -> None:
-    passing = "dict-surviving cache: global dictionary column 4 changed identity"
-    with duckdb.connect() as con:
-        assert Memory(con, None).run(failing(1, passing)) == [1, 2]
-    with msgflow.open_db(small_database) as opened:
-        assert opened._ask(failing(1, passing)) == [1, 2]
-        with pytest.raises(DatabaseError, match="made a mistake: dict-surviving"):
-            opened._ask(failing(2, passing))
-        with pytest.raises(DatabaseError, match="damaged: index"):
-            opened._ask(failing(1, "index out of range"))
 
 
 def damage(path: Path) -> None:

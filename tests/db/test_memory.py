@@ -41,9 +41,23 @@ def test_less_while_traces_are_read() -> None:
         with memory.loading():
             assert limit_of(con) == "122.0 MiB"
         assert limit_of(con) == before != usual
-        given = Memory(con, "100MB")
-        with given.loading():
-            assert limit_of(con) == "95.3 MiB"
+        for given, loading in (("100MB", "95.3 MiB"), ("400MB", "122.0 MiB"), ("4GiB", "1.0 GiB")):
+            memory = Memory(con, given)
+            whole = limit_of(con)
+            with memory.loading():
+                assert limit_of(con) == loading
+            assert limit_of(con) == whole
+        with Memory(con, "none").loading():
+            assert limit_of(con).endswith("PiB")
+
+
+def test_too_little_to_read() -> None:
+    with duckdb.connect() as con:
+        usual = Memory(con, None)
+        before = limit_of(con)
+        with pytest.raises(DatabaseError, match="need more memory than 400MB"), usual.loading():
+            con.execute(HUNGRY)
+        assert limit_of(con) == before
 
 
 def test_not_an_amount() -> None:

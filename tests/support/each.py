@@ -27,7 +27,7 @@ def each(things: Iterable[Any], *, name: Callable[[Any], str] = str) -> Callable
             for thing in things:
                 try:
                     check(thing, **fixtures)
-                except Exception as error:
+                except (Exception, pytest.fail.Exception) as error:
                     wrong.append(f"{name(thing)}: {type(error).__name__}: {error}")
             if wrong:
                 pytest.fail("\n".join(wrong), pytrace=False)
