@@ -56,7 +56,9 @@ class Memory:
                 raise
             raise self._too_little() from error
         finally:
-            self._con.execute("SET memory_limit = ?", [self._limit])
+            # A database that failed for good takes no setting either.
+            with contextlib.suppress(duckdb.FatalException):
+                self._con.execute("SET memory_limit = ?", [self._limit])
 
     @contextlib.contextmanager
     def one_thread(self) -> Iterator[None]:
