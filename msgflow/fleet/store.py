@@ -35,8 +35,11 @@ _CONNECT_SECONDS = 10
 _REQUEST_SECONDS = 60
 # What the environment may name an endpoint by, first the more special one.
 _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
-# What the client of AWS says where nobody answers: it has waited enough for that.
-_UNREACHABLE = "NETWORK_CONNECTION"
+# What the client of AWS says where another try is in vain: nobody answers, for which it has waited
+# enough, or it is forbidden, or not there.
+_HOPELESS = re.compile(
+    r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
+)
 # Seconds between tries.
 _PAUSES = (0.1, 0.3, 1.0, 3.0)
 _OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
@@ -111,7 +114,7 @@ class Store:
 
         selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
         with _reaching(self.url):
-            found = self.filesystem.get_file_info(selector)
+            found = self._patiently(lambda: self.filesystem.get_file_info(selector))
         files = [info for info in found if info.type == FileType.File]
         return sorted(
             (
@@ -129,10 +132,9 @@ class Store:
         """
         from pyarrow.fs import FileSelector, FileType
 
+        selector = FileSelector(self.full(path), allow_not_found=True)
         with _reaching(self.url):
-            found = self.filesystem.get_file_info(
-                FileSelector(self.full(path), allow_not_found=True)
-            )
+            found = self._patiently(lambda: self.filesystem.get_file_info(selector))
         return sorted(info.base_name for info in found if info.type == FileType.Directory)
 
     def entry(self, path: str = "") -> Entry | None:
@@ -144,7 +146,7 @@ class Store:
         from pyarrow.fs import FileType
 
         with _reaching(self.url):
-            info = self.filesystem.get_file_info(self.full(path))
+            info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
         if info.type != FileType.File:
             return None
         return Entry(path, info.size, info.mtime_ns or 0)
@@ -185,7 +187,8 @@ class Store:
     def _patiently(self, work: Callable[[], _T]) -> _T:
         """Return what `work` returns, which a bucket may refuse now and then.
 
-        The client of AWS tries again by itself, but not where it was about to read.
+        The client of AWS tries again by itself, but not where it was about to read, and not always
+        where it looks.
         """
         for pause in () if self.is_local else _PAUSES:
             try:
@@ -195,7 +198,7 @@ class Store:
             except OSError as error:
                 if error.errno is not None and error.errno in _OF_THIS_MACHINE:
                     raise
-                if _UNREACHABLE in str(error):
+                if _HOPELESS.search(str(error)):
                     raise
                 time.sleep(pause * random.uniform(0.5, 1.5))
         return work()
