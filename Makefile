@@ -51,8 +51,7 @@ test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	@# Many tests start msgflow: it is compiled once.
-	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -n auto --dist worksteal $(SELECTED)
+	$(BIN)/pytest -n auto --dist worksteal $(SELECTED)
 
 bench: $(VENV)/.installed babeltrace
 	$(BIN)/python benchmarks/run.py

@@ -45,9 +45,9 @@ class Memory:
         Raises:
             DatabaseError: that is too little.
         """
-        share = self._bytes() // _LOADING_SHARE if self._is_fixed else 0
-        enough = max(_LOADING_BYTES, share)
-        if enough < self._bytes():
+        usual = self._bytes()
+        enough = max(_LOADING_BYTES, usual // _LOADING_SHARE if self._is_fixed else 0)
+        if enough < usual:
             self._con.execute("SET memory_limit = ?", [f"{enough}B"])
         try:
             yield

@@ -54,6 +54,12 @@ def test_who_looks_is_patient(look: Callable[[Store], Any], monkeypatch: Any) ->
         "AWS Error NETWORK_CONNECTION during HeadObject operation: curlCode: 7",
         "AWS Error ACCESS_DENIED during ListObjectsV2 operation: no",
         "AWS Error NO_SUCH_BUCKET during ListObjectsV2 operation: no",
+        "AWS Error RESOURCE_NOT_FOUND during ListObjectsV2 operation: no",
+        "AWS Error INVALID_ACCESS_KEY_ID during ListObjectsV2 operation: no",
+        "AWS Error SIGNATURE_DOES_NOT_MATCH during ListObjectsV2 operation: no",
+        "AWS Error UNKNOWN (HTTP status 400) during HeadObject operation: No response body.",
+        "AWS Error UNKNOWN (HTTP status 401) during HeadObject operation: No response body.",
+        "AWS Error UNKNOWN (HTTP status 404) during HeadObject operation: No response body.",
         "AWS Error UNKNOWN (HTTP status 403) during HeadObject operation: No response body.",
     ],
 )

@@ -35,7 +35,7 @@ SELECT
     s.state,
     s.start_ns,
     s.end_ns,
-    -- Not a join: DuckDB would keep the states in memory for it, which are five times as many.
+    -- Not a join: DuckDB would keep the states in memory for it, which are four times as many.
     (
         SELECT callback_instance_id FROM first_run WHERE executor_event_id = s.start_event_id
     ) AS callback_instance_id,

@@ -2,8 +2,7 @@
 -- keeps /a until its own timer publishes /c; the sink receives both. A client calls a service once
 -- in every period. Delays are residues of a prime, so that no two of one kind are equal: the
 -- median, the higher quantiles and the maximum of everything differ.
--- Cases share a connection.
-CREATE OR REPLACE TEMP MACRO delay(n, step) AS ((n * step + 17) % 307)::BIGINT;
+CREATE TEMP MACRO delay(n, step) AS ((n * step + 17) % 307)::BIGINT;
 
 INSERT INTO store.node (node_id, run_id, process_id, full_name, is_inferred)
 SELECT node_id, 1, 1, name, false

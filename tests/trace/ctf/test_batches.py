@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Iterable
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -64,34 +65,33 @@ def test_in_pieces_as_at_once(
         assert whole.damages == found.damages
 
 
+def beside_others(directory: Path, times: Iterable[int], begin: int, others: Iterable[int]) -> Path:
+    """Write a packet with events of these times, and another stream with packets of one event."""
+    content = TraceContent(
+        {"test:n": {"n": "u32"}},
+        {
+            0: [Packet([Event(time, "test:n", (time,)) for time in times], begin=begin, end=70)],
+            1: [
+                Packet([Event(time, "test:n", (time,))], begin=time, sequence=number)
+                for number, time in enumerate(others)
+            ],
+        },
+    )
+    return write_trace(directory / "trace", content)
+
+
 def test_time_that_runs_backward_in_a_packet_that_waits(tmp_path: Path) -> None:
     """What of it is done is not what comes first in it."""
-    kinds = {"test:n": {"n": "u32"}}
-    back = [Event(time, "test:n", (time,)) for time in (10, 50, 20, 60, 30, 70)]
-    others = [
-        Packet([Event(time, "test:n", (time,))], begin=time, sequence=number)
-        for number, time in enumerate((15, 25, 45, 65))
-    ]
-    content = TraceContent(kinds, {0: [Packet(back, begin=10, end=70)], 1: others})
-    trace = write_trace(tmp_path / "trace", content)
+    trace = beside_others(tmp_path, (10, 50, 20, 60, 30, 70), 10, (15, 25, 45, 65))
     whole = read(trace)
-    assert [row[-1] for row in whole.rows["test:n"]] == sorted(
-        row[-1] for row in whole.rows["test:n"]
-    )
-    assert len(whole.rows["test:n"]) == 10
+    numbers = [row[-1] for row in whole.rows["test:n"]]
+    assert numbers == [10, 15, 20, 25, 30, 45, 50, 60, 65, 70]
     assert not differences(whole, read_in_pieces(trace, 1, 2))
 
 
 def test_events_earlier_than_their_packet(tmp_path: Path) -> None:
     """They come where the packet begins: before that, nobody knows of them."""
-    kinds = {"test:n": {"n": "u32"}}
-    early = [Event(time, "test:n", (time,)) for time in (5, 12, 40, 41)]
-    others = [
-        Packet([Event(time, "test:n", (time,))], begin=time, sequence=number)
-        for number, time in enumerate((10, 15, 25, 45))
-    ]
-    content = TraceContent(kinds, {0: [Packet(early, begin=20, end=50)], 1: others})
-    trace = write_trace(tmp_path / "trace", content)
+    trace = beside_others(tmp_path, (5, 12, 40, 41), 20, (10, 15, 25, 45))
     whole = read(trace)
     assert [row[-1] for row in whole.rows["test:n"]] == [10, 15, 5, 12, 25, 40, 41, 45]
     for most_bytes, most_events in ((1, 1 << 18), (1, 2), (40, 2)):
