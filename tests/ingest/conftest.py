@@ -46,10 +46,24 @@ def database(_ingested: Path, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture(scope="session")
+def _both(_ingested: Path, other_trace: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("both") / "msgflow.duckdb"
+    shutil.copyfile(_ingested, path)
+    ingest([other_trace], path)
+    return path
+
+
+@pytest.fixture
+def both(_both: Path, tmp_path: Path) -> Path:
+    """A database with `trace` as run 1, and `other_trace` as run 2."""
+    return Path(shutil.copy(_both, tmp_path / "both.duckdb"))
+
+
 @pytest.fixture
 def new_database(tmp_path: Path) -> Path:
     """A place for a database, alone in its directory."""
-    path = tmp_path / "db" / "msgflow.duckdb"
+    path = tmp_path / "new" / "msgflow.duckdb"
     path.parent.mkdir()
     return path
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from ingested import contents
+
 from msgflow.db.connection import connect
 from msgflow.db.finding import find
 from msgflow.ingest import ingest
@@ -15,15 +17,18 @@ def empty_traces(database: Path) -> list[str]:
         return [f.subject for f in find(connection, [1]) if f.name == "empty_trace"]
 
 
-def test_metadata_alone(trace: Path, tmp_path: Path, new_database: Path) -> None:
+def test_metadata_alone_and_a_copy(
+    trace: Path, tmp_path: Path, new_database: Path, database: Path
+) -> None:
+    """Packets given twice are read once."""
     alone = tmp_path / "alone"
     alone.mkdir()
     shutil.copy(next(trace.rglob("metadata")), alone)
-    report = ingest([trace, alone], new_database)
-    assert [d.severity for d in report.diagnostics if d.name == "empty_trace"] == ["warning"]
+    report = ingest([trace, shutil.copytree(trace, tmp_path / "copy"), alone], new_database)
+    found = {d.name: d for d in report.diagnostics}
+    assert (found["empty_trace"].severity, found["empty_trace"].count) == ("warning", 1)
     assert empty_traces(new_database) == [str(alone)]
-
-
-def test_a_copy(trace: Path, tmp_path: Path, new_database: Path) -> None:
-    ingest([trace, shutil.copytree(trace, tmp_path / "copy")], new_database)
-    assert empty_traces(new_database) == []
+    assert found["duplicate_packet"].count > 0
+    once, twice = contents(database), contents(new_database)
+    for table in ("publication", "take", "callback_instance", "link_transport", "link_causal"):
+        assert len(twice[table]) == len(once[table]) > 0

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from ingested import contents
 from thorough import few
 
 from msgflow.errors import ExitCode
-from msgflow.ingest import ingest
 
 # The command line, which says on stdout when a stage begins and then waits for the signal.
 _COMMAND = """
@@ -125,17 +123,3 @@ def test_an_interrupt_that_comes_too_late_is_none(
     assert "as run pair (2)" in errors
     assert [name for _, name, *_ in contents(database)["run"]] == ["robot", "pair"]
     assert os.listdir(database.parent) == [database.name]
-
-
-def test_an_ingest_runs_in_any_thread(new_database: Path, trace: Path) -> None:
-    """Where no signals arrive, and no handler can be installed."""
-    worker = threading.Thread(target=ingest, args=([trace], new_database))
-    worker.start()
-    worker.join()
-    assert os.listdir(new_database.parent) == [new_database.name]
-
-
-def test_the_handler_of_the_program_is_back_afterwards(new_database: Path, trace: Path) -> None:
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    ingest([trace], new_database)
-    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before

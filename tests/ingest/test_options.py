@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -80,10 +81,18 @@ def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
     ]
 
 
-def test_staging_can_be_kept(trace: Path, new_database: Path, tmp_path: Path) -> None:
-    """Events as read and the objects of the model, as Parquet; without them nothing is left."""
+def test_staging_can_be_kept_and_progress_is_told(
+    trace: Path, new_database: Path, tmp_path: Path
+) -> None:
+    """Events as read and the objects of the model, as Parquet; nothing else is left.
+
+    The program has its own handlers of signals again.
+    """
     kept = tmp_path / "kept" / "staging"
-    report = ingest([trace], new_database, keep_staging=kept)
+    seen: list[IngestProgress] = []
+    handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    report = ingest([trace], new_database, keep_staging=kept, progress=seen.append)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == handlers
     files = {path.name for path in kept.iterdir()}
     assert {"raw.ros2_rcl_publish.parquet", "raw.packet.parquet"} <= files
     assert {"staging.publication.parquet", "staging.take_chain.parquet"} <= files
@@ -100,14 +109,38 @@ def test_staging_can_be_kept(trace: Path, new_database: Path, tmp_path: Path) ->
     assert events == report.event_count
     assert [path.name for path in new_database.parent.iterdir()] == [new_database.name]
 
+    stages = list(dict.fromkeys(state.stage for state in seen))
+    assert stages == list(report.stage_seconds)
+    assert stages[:2] == ["opening the traces", "reading the traces"]
+    fractions = [state.fraction for state in seen if state.fraction is not None]
+    assert fractions == sorted(fractions)
+    assert all(0 <= fraction <= 1 for fraction in fractions)
+    assert max(state.events for state in seen) <= report.event_count
+    assert report.seconds == pytest.approx(sum(report.stage_seconds.values()))
+    assert [d for d in report.diagnostics if d.name == "check_failed"] == []
+    assert rows(new_database, "SELECT run_id, name, event_count FROM store.run") == [
+        (report.run_id, report.run_name, report.event_count)
+    ]
+
 
 def test_hosts_can_be_named(other_trace: Path, new_database: Path) -> None:
-    """All traces below a path; the others keep the name that they recorded."""
-    ingest([other_trace], new_database, hosts={"robot": str(other_trace / "alpha")})
+    """All traces below a path; the others keep the name that they recorded.
+
+    A session is found from any directory above; the same one named twice is read once.
+    """
+    report = ingest(
+        [other_trace.parent, other_trace / "alpha"],
+        new_database,
+        hosts={"robot": str(other_trace / "alpha")},
+    )
     assert rows(
         new_database,
         "SELECT hostname, count(*) FROM host JOIN process USING (host_id) GROUP BY 1 ORDER BY 1",
     ) == [("beta", 1), ("robot", 2)]
+    assert rows(new_database, "SELECT sum(event_count)::BIGINT FROM trace") == [
+        (report.event_count,)
+    ]
+    assert report.run_name == other_trace.parent.name
 
 
 @pytest.mark.parametrize("is_reversed", few([False, True], True))
@@ -129,30 +162,3 @@ def test_a_host_may_have_several_paths(other_trace: Path, new_database: Path) ->
         hosts={"robot": [other_trace / "alpha", str(other_trace / "beta")]},
     )
     assert rows(new_database, "SELECT DISTINCT hostname FROM host") == [("robot",)]
-
-
-def test_progress_and_report(trace: Path, new_database: Path) -> None:
-    seen: list[IngestProgress] = []
-    report = ingest([trace], new_database, progress=seen.append)
-    stages = list(dict.fromkeys(state.stage for state in seen))
-    assert stages == list(report.stage_seconds)
-    assert stages[:2] == ["opening the traces", "reading the traces"]
-    fractions = [state.fraction for state in seen if state.fraction is not None]
-    assert fractions == sorted(fractions)
-    assert all(0 <= fraction <= 1 for fraction in fractions)
-    assert max(state.events for state in seen) <= report.event_count
-    assert report.seconds == pytest.approx(sum(report.stage_seconds.values()))
-    assert [d for d in report.diagnostics if d.name == "check_failed"] == []
-    assert rows(new_database, "SELECT run_id, name, event_count FROM store.run") == [
-        (report.run_id, report.run_name, report.event_count)
-    ]
-
-
-def test_a_session_is_found_from_any_directory_above(other_trace: Path, new_database: Path) -> None:
-    """Two hosts, each its own trace; the same one named twice is read once."""
-    report = ingest([other_trace.parent, other_trace / "alpha"], new_database)
-    assert rows(new_database, "SELECT hostname FROM host ORDER BY 1") == [("alpha",), ("beta",)]
-    assert rows(new_database, "SELECT sum(event_count)::BIGINT FROM trace") == [
-        (report.event_count,)
-    ]
-    assert report.run_name == other_trace.parent.name
