@@ -59,9 +59,9 @@ def make_case(folder: Path, text: str) -> Path:
 def test_links_are_derived_where_the_case_says_so(
     pytestconfig: pytest.Config, tmp_path: Path
 ) -> None:
-    empty = golden.template(pytestconfig)
-    with_links = golden.evaluate(make_case(tmp_path / "with", f"== derive\n{CASE}"), empty)
-    without = golden.evaluate(make_case(tmp_path / "without", CASE), empty)
+    bench = golden.bench(pytestconfig)
+    with_links = bench.evaluate(make_case(tmp_path / "with", f"== derive\n{CASE}"))
+    without = bench.evaluate(make_case(tmp_path / "without", CASE))
     start = ["publication", "1"]
     assert golden.parse_csv(without)[1:] == [start]
     assert golden.parse_csv(with_links)[1:] == [start, ["take", "1"]]
@@ -70,7 +70,7 @@ def test_links_are_derived_where_the_case_says_so(
 def test_a_column_that_does_not_exist_is_named(pytestconfig: pytest.Config, tmp_path: Path) -> None:
     case = make_case(tmp_path, f"== node\nnode_id,colour\n1,red\n{CASE}")
     with pytest.raises(ValueError, match=r"store\.node has no column colour"):
-        golden.evaluate(case, golden.template(pytestconfig))
+        golden.bench(pytestconfig).evaluate(case)
 
 
 def test_a_case_has_what_its_system_has_unless_it_says_otherwise(

@@ -30,10 +30,10 @@ from __future__ import annotations
 
 import io
 import json
-import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ _PROGRAM = "program."
 _HEALTH = ("finding.", "check.")
 _DIAGNOSTIC = "diagnostic."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
-_TEMPLATE = pytest.StashKey[Path]()
+_BENCH = pytest.StashKey["Bench"]()
 # (name, type, whether it may be NULL) of the columns of each table of the store.
 _COLUMNS: dict[str, list[tuple[str, str, bool]]] = {}
 _SECTION = "== "
@@ -154,6 +154,14 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     return GoldenFile.from_parent(parent, path=file_path)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let cases of the same rows follow each other, which then are inserted once."""
+    places = [place for place, item in enumerate(items) if isinstance(item, GoldenCase)]
+    cases = sorted((items[place] for place in places), key=lambda item: rows_of(item.path))
+    for place, item in zip(places, cases, strict=True):
+        items[place] = item
+
+
 class GoldenFile(pytest.File):
     def collect(self) -> Iterator[pytest.Item]:
         yield GoldenCase.from_parent(self, name=f"{self.path.parent.name}/{self.path.stem}")
@@ -161,7 +169,7 @@ class GoldenFile(pytest.File):
 
 class GoldenCase(pytest.Item):
     def runtest(self) -> None:
-        actual = evaluate(self.path, template(self.config))
+        actual = bench(self.config).evaluate(self.path)
         expected = read_case(self.path).expected
         if self.config.getoption("--update-golden"):
             self.path.write_text(updated(self.path.read_text(), actual))
@@ -181,31 +189,72 @@ def updated(text: str, expected: str) -> str:
     return f"{head}{title}{expected}"
 
 
-def template(config: pytest.Config) -> Path:
-    """Return an empty database, made once per session."""
-    if _TEMPLATE not in config.stash:
-        directory = Path(tempfile.mkdtemp(prefix="msgflow-golden-"))
-        config.add_cleanup(lambda: shutil.rmtree(directory))
-        path = directory / "empty.duckdb"
+def bench(config: pytest.Config) -> Bench:
+    """Return the database of golden cases, made once per session."""
+    if _BENCH not in config.stash:
+        config.stash[_BENCH] = Bench()
+        config.add_cleanup(config.stash[_BENCH].close)
+    return config.stash[_BENCH]
+
+
+class Bench:
+    """A database for one case after the other: to make one takes longer than most cases.
+
+    The rows of a case are never committed, so that they are gone for the next; but one that has the
+    same rows finds them.
+    """
+
+    def __init__(self) -> None:
+        self._directory = tempfile.TemporaryDirectory(prefix="msgflow-golden-")
+        path = Path(self._directory.name) / "cases.duckdb"
         create(path)
-        config.stash[_TEMPLATE] = path
-    return config.stash[_TEMPLATE]
+        self._connection = duckdb.connect(str(path))
+        self._rows: str | None = None
+
+    def evaluate(self, path: Path) -> str:
+        """Return the output of a case as CSV."""
+        case = read_case(path)
+        try:
+            if self._rows is None or rows_of(path) != self._rows:
+                self._fill(path, case)
+            result = _result(self._connection, path.parent.name, case)
+        except BaseException:
+            self._empty()
+            raise
+        if case.scratch or case.staging:
+            self._empty()
+        stream = io.BytesIO()
+        write_result(result, Format.CSV, stream)
+        return stream.getvalue().decode()
+
+    def close(self) -> None:
+        self._empty()
+        self._connection.close()
+        self._directory.cleanup()
+
+    def _fill(self, path: Path, case: Case) -> None:
+        self._empty()
+        _stage(self._connection, case)
+        self._connection.begin()
+        self._rows = rows_of(path)
+        fill_case(self._connection, path)
+        if case.derives:
+            for (run_id,) in self._connection.execute("SELECT run_id FROM store.run").fetchall():
+                derive(self._connection, run_id)
+
+    def _empty(self) -> None:
+        if self._rows is not None:
+            self._connection.rollback()
+        self._connection.execute("DETACH DATABASE IF EXISTS staging")
+        self._rows = None
 
 
-def evaluate(path: Path, empty: Path) -> str:
-    """Return the output of a case as CSV."""
-    with tempfile.TemporaryDirectory(prefix="msgflow-case-") as directory:
-        database = Path(directory) / "case.duckdb"
-        shutil.copyfile(empty, database)
-        with duckdb.connect(str(database)) as connection:
-            case = fill_case(connection, path)
-            if case.derives:
-                for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
-                    derive(connection, run_id)
-            result = _result(connection, path.parent.name, case)
-    stream = io.BytesIO()
-    write_result(result, Format.CSV, stream)
-    return stream.getvalue().decode()
+@cache
+def rows_of(path: Path) -> str:
+    """Return what tells the rows that a case is filled with from those of other cases."""
+    case = read_case(path)
+    script = case.system if case.system and (SYSTEMS / f"{case.system}.sql").exists() else None
+    return repr((script, case.derives, sorted(case.tables.items()), sorted(case.staging.items())))
 
 
 def fill_case(connection: duckdb.DuckDBPyConnection, path: Path) -> Case:
@@ -348,7 +397,6 @@ def _program_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     _make_scratch(connection, case)
-    _stage(connection, case)
     return program().run(connection, name, _FRAME | given).to_arrow_table()
 
 
@@ -372,7 +420,6 @@ def _diagnostic_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     (header,) = (header for header in diagnostics() if header.name == name)
-    _stage(connection, case)
     values = {param.name: (_FRAME | given)[param.name] for param in header.params}
     return connection.sql(
         f"SELECT * FROM ({statement([header])}) ORDER BY ALL", params=values
