@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ import thorough
 from hypothesis import settings
 
 from msgflow.db.migrate import create
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
 from msgflow.trace import bt2_library
 
 pytest_plugins = ["golden"]
@@ -107,6 +109,21 @@ def small_database(_small_database: Path, tmp_path: Path) -> Path:
     path = tmp_path / "msgflow.duckdb"
     shutil.copyfile(_small_database, path)
     return path
+
+
+@pytest.fixture(scope="session")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Ingests a simulated system, once for all tests; `trace` is beside it. Read it only."""
+    from ingested import made_once
+
+    def database(system: str, factor: float) -> Path:
+        def make(path: Path) -> None:
+            simulate(system, path.parent / "trace", factor=factor)
+            ingest([path.parent / "trace"], path)
+
+        return made_once(tmp_path_factory, f"{system}_{factor}", make)
+
+    return database
 
 
 @pytest.fixture(scope="session")

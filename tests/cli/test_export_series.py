@@ -11,18 +11,13 @@ import pytest
 from typer.testing import Result
 
 from msgflow.database import open_db
-from msgflow.ingest import ingest
-from msgflow.sim import simulate
 
 Msgflow = Callable[..., Result]
 
 
-@pytest.fixture(scope="module")
-def fan_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("fan_out")
-    simulate("fan_out", directory / "trace", factor=0.05)
-    ingest([directory / "trace"], directory / "run.duckdb")
-    return directory / "run.duckdb"
+@pytest.fixture
+def fan_out(simulated: Callable[..., Path]) -> Path:
+    return simulated("fan_out", 0.1)
 
 
 def test_files_have_seconds_from_the_start_of_the_run(

@@ -9,7 +9,6 @@ from typer.testing import Result
 
 from msgflow import Database
 from msgflow.query.flow import MOST_VERTICES
-from msgflow.sim import simulate
 
 Msgflow = Callable[..., Result]
 
@@ -79,10 +78,12 @@ def test_mistakes_have_code_2(
     assert "\n\nhint: " in result.stderr
 
 
-def test_the_slowest_flows_are_those_of_the_query(msgflow: Msgflow, tmp_path: Path) -> None:
-    simulate("demo", tmp_path / "trace", factor=0.1)
-    assert msgflow("ingest", tmp_path / "trace").exit_code == 0
-    with Database(Path("msgflow.duckdb")) as database:
+def test_the_slowest_flows_are_those_of_the_query(
+    msgflow: Msgflow, simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    demo = simulated("demo", 0.1)
+    monkeypatch.setenv("MSGFLOW_DB", str(demo))
+    with Database(demo) as database:
         rows = database.query("flows", to="/control/cmd", slowest=2).to_arrow()
         takes = rows["take_id"].to_pylist()
         trees = [str(database.flow(take_id=take, direction="backward")) for take in takes]

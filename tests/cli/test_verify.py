@@ -8,37 +8,27 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
+import duckdb
 import pytest
 from thorough import few
 from typer.testing import Result
 
-from msgflow.ingest import ingest
-from msgflow.sim import simulate
-
 Msgflow = Callable[..., Result]
 
 
-@pytest.fixture(scope="module")
-def ingested(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with three seconds of a robot: read it only."""
-    directory = tmp_path_factory.mktemp("demo")
-    simulate("demo", directory / "trace", factor=0.3)
-    ingest([directory / "trace"], directory / "msgflow.duckdb", name="good")
-    return directory / "msgflow.duckdb"
-
-
 @pytest.fixture
-def demo(msgflow: Msgflow, ingested: Path) -> Msgflow:
-    shutil.copy(ingested, "msgflow.duckdb")
+def demo(msgflow: Msgflow, simulated: Callable[..., Path]) -> Msgflow:
+    """Asks a database with three seconds of a robot."""
+    shutil.copy(simulated("demo", 0.3), "msgflow.duckdb")
     return msgflow
 
 
 def test_from_a_suggestion_to_verdicts(demo: Msgflow, tmp_path: Path) -> None:
     file = tmp_path / "targets.yaml"
-    assert demo("targets", "suggest", "--run", "good", "-o", file).exit_code == 0
-    result = demo("verify", file, "good")
+    assert demo("targets", "suggest", "--run", "trace", "-o", file).exit_code == 0
+    result = demo("verify", file, "trace")
     assert result.exit_code == 0
-    assert result.stderr.splitlines()[0] == "run: good (1)"
+    assert result.stderr.splitlines()[0] == "run: trace (1)"
     assert result.stderr.splitlines()[-1].endswith(" passed, 0 failed, 0 not measured")
     assert "passed" in result.stdout
     shown = json.loads(demo("verify", file, "--format", "json").stdout)
@@ -93,8 +83,10 @@ def test_with_a_file_it_says_what_failed(demo: Msgflow, tmp_path: Path, name: st
 
 
 def test_several_runs_are_refused(demo: Msgflow, tmp_path: Path) -> None:
-    simulate("pipeline", tmp_path / "other", factor=0.01)
-    assert demo("ingest", tmp_path / "other").exit_code == 0
+    with duckdb.connect("msgflow.duckdb") as connection:
+        connection.execute(
+            "INSERT INTO store.run SELECT * REPLACE (2 AS run_id, 'other' AS name) FROM store.run"
+        )
     file = tmp_path / "targets.yaml"
     file.write_text('targets:\n  - process: "*"\n    utilisation: < 100 %\n')
     result = demo("verify", file, "all")

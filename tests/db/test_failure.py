@@ -17,22 +17,19 @@ from msgflow.db import migrate
 from msgflow.db.opening import open_file
 from msgflow.errors import DatabaseError, ExitCode
 from msgflow.ingest import ingest
-from msgflow.sim import simulate
 from msgflow.sql.failure import in_words
 
 PATH = Path("some.duckdb")
 
 
-@pytest.fixture(scope="module")
-def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return simulate("pipeline", tmp_path_factory.mktemp("trace") / "t", factor=0.01).directory
+@pytest.fixture
+def ingested(simulated: Callable[..., Path]) -> Path:
+    return simulated("pipeline", 0.01)
 
 
-@pytest.fixture(scope="module")
-def ingested(trace: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("ingested") / "ingested.duckdb"
-    ingest([trace], path)
-    return path
+@pytest.fixture
+def trace(ingested: Path) -> Path:
+    return ingested.parent / "trace"
 
 
 @pytest.fixture

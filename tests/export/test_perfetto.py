@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -16,8 +18,6 @@ from thorough import few
 from msgflow import Database, UsageError
 from msgflow.clocks import apply_clocks, read_clock_sync
 from msgflow.database import open_db
-from msgflow.ingest import ingest
-from msgflow.sim import simulate
 
 IDENTITIES = (
     "callback_instance_id", "publication_id", "take_id", "request_id", "response_id", "executor_id",
@@ -114,14 +114,14 @@ def decode(path: Path) -> Decoded:
 
 @pytest.fixture(scope="module", params=few(["demo", "services", "nested", "partial_sync"], "demo"))
 def exported(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest,
+    simulated: Callable[..., Path],
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[duckdb.DuckDBPyConnection, Decoded]:
     """A simulated system, its database and its Perfetto trace."""
     pytest.importorskip("perfetto.trace_builder.proto_builder")
     directory = tmp_path_factory.mktemp(request.param)
-    simulate(request.param, directory / "trace", factor=0.1)
-    path = directory / "run.duckdb"
-    ingest([directory / "trace"], path)
+    path = Path(shutil.copy(simulated(request.param, 0.1), directory / "run.duckdb"))
     if request.param == "demo":
         apply_clocks(path, read_clock_sync("messages"), run=None)
     with open_db(path) as database:
@@ -260,11 +260,9 @@ def test_counters_have_rates_and_queues(exported: Exported) -> None:
             assert [value for time, value in values if time == at][-1] == there
 
 
-def test_a_window_has_what_begins_in_it(tmp_path: Path) -> None:
+def test_a_window_has_what_begins_in_it(simulated: Callable[..., Path], tmp_path: Path) -> None:
     pytest.importorskip("perfetto.trace_builder.proto_builder")
-    simulate("pipeline", tmp_path / "trace", factor=0.1)
-    ingest([tmp_path / "trace"], tmp_path / "run.duckdb")
-    with open_db(tmp_path / "run.duckdb") as database:
+    with open_db(simulated("pipeline", 0.1)) as database:
         ((start, middle),) = database.connection.execute(
             "SELECT start_ns, (start_ns + end_ns) // 2 FROM run"
         ).fetchall()
@@ -276,11 +274,9 @@ def test_a_window_has_what_begins_in_it(tmp_path: Path) -> None:
     assert 0 < len(decoded.arrows) < len(whole.arrows)
 
 
-def test_gaps_are_slices_of_their_host(tmp_path: Path) -> None:
+def test_gaps_are_slices_of_their_host(simulated: Callable[..., Path], tmp_path: Path) -> None:
     pytest.importorskip("perfetto.trace_builder.proto_builder")
-    simulate("pipeline", tmp_path / "trace", factor=0.1)
-    path = tmp_path / "run.duckdb"
-    ingest([tmp_path / "trace"], path)
+    path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
     with duckdb.connect(str(path)) as connection:
         ((trace, host, name, begin),) = connection.execute(
             "SELECT trace_id, host_id, hostname, r.start_ns FROM trace JOIN host USING (host_id)"

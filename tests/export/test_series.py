@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import duckdb
@@ -10,16 +11,11 @@ import pytest
 
 from msgflow import Database, UsageError
 from msgflow.database import open_db
-from msgflow.ingest import ingest
-from msgflow.sim import simulate
 
 
-@pytest.fixture(scope="module")
-def fan_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("fan_out")
-    simulate("fan_out", directory / "trace", factor=0.1)
-    ingest([directory / "trace"], directory / "run.duckdb")
-    return directory / "run.duckdb"
+@pytest.fixture
+def fan_out(simulated: Callable[..., Path]) -> Path:
+    return simulated("fan_out", 0.1)
 
 
 EXPECTED = {

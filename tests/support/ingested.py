@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import duckdb
+import pytest
 
 from msgflow.ingest import ingest
 
@@ -50,3 +54,22 @@ def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:
             else []
             for table, may_have_rows in tables
         }
+
+
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
+    """Return the path for which `make` makes a file, once for all workers of a test run."""
+    base = factory.getbasetemp()
+    directory = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / f"once_{name}"
+    path = directory / f"{name}.duckdb"
+    done = directory / "done"
+    try:
+        directory.mkdir()
+    except FileExistsError:
+        while not done.exists():
+            time.sleep(0.1)
+    else:
+        try:
+            make(path)
+        finally:
+            done.touch()
+    return path

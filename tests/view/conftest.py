@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from hashlib import sha256
 from pathlib import Path
@@ -13,6 +12,7 @@ from urllib.parse import urlsplit
 
 import duckdb
 import pytest
+from ingested import made_once
 from served import Page, Served
 
 from msgflow.clocks import apply_clocks, read_clock_sync
@@ -27,32 +27,12 @@ _ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
-def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
-    """Return the path for which `make` makes a file, once for all workers of a test run."""
-    base = factory.getbasetemp()
-    directory = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / f"view_{name}"
-    path = directory / f"{name}.duckdb"
-    done = directory / "done"
-    try:
-        directory.mkdir()
-    except FileExistsError:
-        while not done.exists():
-            time.sleep(0.1)
-    else:
-        try:
-            make(path)
-        finally:
-            done.touch()
-    return path
-
-
 @pytest.fixture(scope="session")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def demo(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A robot on two hosts, three seconds of it, with clocks brought together."""
 
     def make(path: Path) -> None:
-        simulate("demo", path.parent / "trace", factor=0.3)
-        ingest([path.parent / "trace"], path)
+        shutil.copyfile(simulated("demo", 0.3), path)
         apply_clocks(path, read_clock_sync("messages"), run=None)
 
     return made_once(tmp_path_factory, "demo", make)

@@ -100,15 +100,6 @@ def test_names_in_the_address_are_only_ever_text(
     page.page.wait_for_url("**#/overview*")
 
 
-@pytest.mark.parametrize("way", few(["served", "file"], "served"))
-def test_long_names(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
-    path = renamed(demo, tmp_path / "long.duckdb", ("/" + 10_000 * "x",))
-    with shown_as(way, path, page) as address:
-        visit(page, address)
-        wide = page.page.evaluate("document.documentElement.scrollWidth")
-        assert wide <= 1280
-
-
 def test_a_database_without_a_run(empty_database: Path, tmp_path: Path, page: Page) -> None:
     path = tmp_path / "none.duckdb"
     shutil.copyfile(empty_database, path)
@@ -159,9 +150,10 @@ def test_a_run_without_links(way: str, demo: Path, tmp_path: Path, page: Page) -
 
 
 @pytest.mark.parametrize("way", few(["served", "file"], "served"))
-def test_a_long_gap_is_shaded(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
-    path = tmp_path / "gap.duckdb"
-    shutil.copyfile(demo, path)
+def test_long_names_a_long_gap_and_five_hundred_nodes(
+    way: str, demo: Path, tmp_path: Path, page: Page
+) -> None:
+    path = renamed(demo, tmp_path / "much.duckdb", ("/" + 10_000 * "x",))
     later = 1_200_000_000_000
     with duckdb.connect(str(path)) as connection:
         ((start, end),) = connection.execute("SELECT start_ns, end_ns FROM store.run").fetchall()
@@ -177,18 +169,6 @@ def test_a_long_gap_is_shaded(way: str, demo: Path, tmp_path: Path, page: Page) 
             "INSERT INTO store.gap SELECT 1, min(trace_id), NULL, 'pause',"
             f" {middle}, {middle + later}, NULL FROM store.trace"
         )
-    with shown_as(way, path, page) as address:
-        visit(page, address)
-        page.go("#/timeline?from=0")
-        gaps = page.page.evaluate("msgflow.page.renderer.gaps")
-        assert [gap["length"] for gap in gaps] == [later]
-
-
-@pytest.mark.parametrize("way", few(["served", "file"], "served"))
-def test_five_hundred_nodes(way: str, demo: Path, tmp_path: Path, page: Page) -> None:
-    path = tmp_path / "many.duckdb"
-    shutil.copyfile(demo, path)
-    with duckdb.connect(str(path)) as connection:
         connection.execute(
             "INSERT INTO store.node BY NAME SELECT 10000 + i AS node_id, 1 AS run_id,"
             " 1 AS process_id, 'n' || i AS name, '/' AS namespace, '/n' || i AS full_name,"
@@ -209,6 +189,10 @@ def test_five_hundred_nodes(way: str, demo: Path, tmp_path: Path, page: Page) ->
         )
     with shown_as(way, path, page) as address:
         visit(page, address)
+        assert page.page.evaluate("document.documentElement.scrollWidth") <= 1280
+        page.go("#/timeline?from=0")
+        gaps = page.page.evaluate("msgflow.page.renderer.gaps")
+        assert [gap["length"] for gap in gaps] == [later]
         page.go("#/graph")
         assert "those with the most messages" in page.page.locator(".status").inner_text()
         page.page.get_by_placeholder("node or topic").fill("/n499")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pyarrow as pa
@@ -24,8 +24,6 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
 from msgflow.fleet.page import lake_page, write_lake_page
 from msgflow.fleet.part import Content, write_part
-from msgflow.ingest import ingest
-from msgflow.sim import simulate
 from msgflow.view.server import listening, single_application
 
 _DAY = 86_400 * 10**9
@@ -33,12 +31,10 @@ _SLOW = 9
 
 
 @pytest.fixture(scope="module")
-def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
+def lake(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Lake:
     """Runs of ten days, one of them three times as slow, with labels and names that are hostile."""
     folder = tmp_path_factory.mktemp("lake")
-    trace = simulate("pipeline", folder / "trace", factor=0.02)
-    database = folder / "one.duckdb"
-    ingest([trace.directory], database)
+    database = simulated("pipeline", 0.01)
     lake = Lake.open_or_create(folder / "lake")
     with Database(database) as opened:
         part = write_part(

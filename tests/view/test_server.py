@@ -134,7 +134,8 @@ def test_a_replaced_database_is_said(demo: Path, tmp_path: Path, systems: Path) 
         server.close()
 
 
-def test_an_ingest_meanwhile_is_refused(demo: Path, tmp_path: Path) -> None:
+def test_an_ingest_meanwhile_is_refused(simulated: Callable[..., Path], tmp_path: Path) -> None:
+    demo = simulated("pipeline", 0.1)
     path = tmp_path / "copy.duckdb"
     shutil.copyfile(demo, path)
     with running_program(path) as (process, _):
