@@ -25,7 +25,9 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return simulate("pipeline", tmp_path_factory.mktemp("trace") / "robot", factor=0.1).directory
 
 
-def test_two_commands_lead_to_the_answer(msgflow: Msgflow, trace: Path) -> None:
+def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
+    msgflow: Msgflow, trace: Path
+) -> None:
     ingested = msgflow("ingest", trace)
     assert ingested.exit_code == 0, ingested.stderr
     assert ingested.stdout == ""
@@ -34,10 +36,21 @@ def test_two_commands_lead_to_the_answer(msgflow: Msgflow, trace: Path) -> None:
     assert answer.exit_code == 0, answer.stderr
     assert "/topic_a" in answer.stdout
     assert "run: robot (1)" in answer.stderr
+    again = msgflow("ingest", trace)
+    assert again.exit_code == 2
+    assert "--replace" in again.stderr
+    # It says nothing where nothing is to be said.
+    replaced = msgflow("ingest", trace, "--replace", "--quiet", "--name", "first")
+    assert (replaced.exit_code, replaced.stdout, replaced.stderr) == (0, "", "")
+    runs = json.loads(msgflow("query", "info-runs", "--run", "all", "--format", "json").stdout)
+    assert [run["name"] for run in runs] == ["first"]
+    assert "first" in msgflow("info").stdout
 
 
-def test_options_of_a_query_reach_it(msgflow: Msgflow, trace: Path) -> None:
-    msgflow("ingest", trace, "--quiet")
+def test_options_of_a_query_reach_it(
+    msgflow: Msgflow, simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MSGFLOW_DB", str(simulated("pipeline", 0.1)))
     arguments = ("query", "e2e-latency", "--format", "json")
     assert json.loads(msgflow(*arguments, "--from", "/topic_a").stdout)
     unknown = msgflow(*arguments, "--from", "/topic_z")
@@ -72,19 +85,3 @@ def test_what_went_wrong_is_said_even_when_quiet(
     result = msgflow("ingest", trace, *options)
     assert result.exit_code == 0
     assert result.stderr.count("note: the disk is full\n") == 1
-
-
-def test_quiet_says_nothing_and_a_run_has_the_name_given(msgflow: Msgflow, trace: Path) -> None:
-    result = msgflow("ingest", trace, "--quiet", "--name", "first")
-    assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
-    assert "first" in msgflow("info").stdout
-
-
-def test_the_same_trace_again_is_refused_but_can_be_replaced(msgflow: Msgflow, trace: Path) -> None:
-    assert msgflow("ingest", trace).exit_code == 0
-    again = msgflow("ingest", trace)
-    assert again.exit_code == 2
-    assert "--replace" in again.stderr
-    assert msgflow("ingest", trace, "--replace").exit_code == 0
-    runs = json.loads(msgflow("query", "info-runs", "--run", "all", "--format", "json").stdout)
-    assert len(runs) == 1
