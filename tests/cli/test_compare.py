@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,12 +16,13 @@ Msgflow = Callable[..., Result]
 CASES = Path(__file__).parents[1] / "schema" / "cases" / "main.comparison"
 
 
-@pytest.fixture
-def database(fresh_database: Path) -> Path:
+@pytest.fixture(scope="module")
+def database(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two runs: before (1) with latencies of 300 and 500 ns, after (2) with 300 and 400 ns."""
-    with duckdb.connect(str(fresh_database)) as connection:
+    path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("compare") / "msgflow.duckdb"))
+    with duckdb.connect(str(path)) as connection:
         fill_case(connection, CASES / "paths.case")
-    return fresh_database
+    return path
 
 
 def test_a_table_and_the_runs(msgflow: Msgflow, database: Path) -> None:

@@ -192,16 +192,18 @@ def test_the_cache_is_used_and_not_needed(
     (cached,) = (tmp_path / "cache" / "msgflow").glob("definitions-*")
     assert json.loads(cached.read_bytes().split(b"\n", 1)[1]) == definition.expected()
 
-    made = definition._made
+    made, again = definition.expected(), []
     monkeypatch.setattr(definition, "_made", lambda: pytest.fail("made again"))
     definition.expected.cache_clear()
     msgflow.open_db(small_database).runs()
 
-    monkeypatch.setattr(definition, "_made", made)
-    for damage in ("", "[]", '{"a": 1}', "\0"):
+    monkeypatch.setattr(definition, "_made", lambda: again.append(made) or made)
+    damages = ("", "[]", '{"a": 1}', "\0")
+    for damage in damages:
         cached.write_text(damage)
         definition.expected.cache_clear()
         msgflow.open_db(small_database).runs()
+    assert len(again) == len(damages)
     shutil.rmtree(tmp_path / "cache")
     (tmp_path / "cache").write_text("a file")
     definition.expected.cache_clear()

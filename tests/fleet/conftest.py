@@ -21,13 +21,14 @@ COPY = "c" * 20
 
 @pytest.fixture(scope="session")
 def databases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Two databases with one run each, of two recordings."""
+    """Two databases with one run each, of the recordings r0 and r1 in a folder beside them."""
     directory = tmp_path_factory.mktemp("databases")
     paths = []
     for name, scenario in (("first", "pipeline"), ("second", "two_hosts")):
-        trace = simulate(scenario, directory / name, factor=_LENGTH, seed=len(paths))
+        recording = directory / "recordings" / f"r{len(paths)}"
+        simulate(scenario, recording, factor=_LENGTH, seed=len(paths))
         paths.append(directory / f"{name}.duckdb")
-        ingest([trace.directory], paths[-1])
+        ingest([recording], paths[-1], name=name)
     return paths[0], paths[1]
 
 
