@@ -1,5 +1,6 @@
 """`msgflow` and `python -m msgflow`."""
 
+import os
 import signal
 
 
@@ -8,6 +9,8 @@ def main() -> None:
     # Of Ctrl-C in the imports Python would print a traceback.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # numpy's algebra, of which nothing is used, starts a thread per core and keeps it awake.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from msgflow.cli.stop import STOP
 
     STOP.install()

@@ -32,13 +32,13 @@
 -- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, meanwhile, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 -- note: clocks
--- needs: main.executor_wait, main.executor_interference, main.callback_label
-WITH waited AS (
+-- needs: main.executor_wait_explained, main.callback_label
+WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,
-        is_loss_affected
-    FROM main.executor_wait
-    WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
+        is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+    FROM main.executor_wait_explained($runs)
+    WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
 measured AS (
     SELECT
@@ -59,21 +59,17 @@ measured AS (
     FROM waited
     GROUP BY run_id, callback_id
 ),
-together AS (
-    -- Of bursts there are far more pairs than rows of the answer: summed up before they are joined.
+ran AS (
     SELECT
-        callback_instance_id,
-        meanwhile_callback_id AS meanwhile_id,
-        sum(overlap_ns) AS overlap_ns
-    FROM main.executor_interference
-    WHERE list_contains($runs, run_id) AND overlap_ns > 0
-    GROUP BY callback_instance_id, meanwhile_callback_id
+        callback_id,
+        unnest(meanwhile_callback_ids) AS meanwhile_id,
+        unnest(meanwhile_ns) AS overlap_ns
+    FROM waited
 ),
 pair AS (
-    SELECT w.callback_id, t.meanwhile_id, sum(t.overlap_ns) AS overlap_ns
-    FROM together AS t
-    JOIN waited AS w ON t.callback_instance_id = w.callback_instance_id
-    GROUP BY w.callback_id, t.meanwhile_id
+    SELECT callback_id, meanwhile_id, sum(overlap_ns) AS overlap_ns
+    FROM ran
+    GROUP BY callback_id, meanwhile_id
 ),
 ranked AS (
     SELECT

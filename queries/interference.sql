@@ -21,7 +21,7 @@
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, callback, meanwhile_callback, waits,
 --     overlap_max_ns, overlap_min_ns, instances
--- needs: main.executor_wait, main.executor_interference, main.callback_label
+-- needs: main.callback_instance, main.executor_interference, main.callback_label
 WITH together AS (
     -- The messages of a burst wait for each other: pairs are far more than rows of the answer, and
     -- nothing may keep them all. So they are summed up before anything is joined to them.
@@ -40,8 +40,8 @@ pair AS (
         w.run_id, w.callback_id, t.meanwhile_callback_id, t.instances, t.overlap_min_ns,
         t.overlap_max_ns
     FROM together AS t
-    JOIN main.executor_wait AS w ON t.callback_instance_id = w.callback_instance_id
-    WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
+    JOIN main.callback_instance AS w ON t.callback_instance_id = w.callback_instance_id
+    WHERE list_contains($runs, w.run_id) AND w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
 measured AS (
     SELECT

@@ -76,7 +76,7 @@ LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_ins
 CREATE OR REPLACE TEMP TABLE breakdown_wait AS
 SELECT callback_instance_id, busy_min_ns, busy_max_ns
 FROM main.executor_wait
-WHERE callback_instance_id IN (
+WHERE list_contains($runs, run_id) AND callback_instance_id IN (
     SELECT callback_instance_id
     FROM breakdown_callback
     WHERE part IN ('publish_to_take', 'request_to_take')

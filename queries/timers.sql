@@ -41,7 +41,7 @@
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, jitter_p99_ns, meanwhile,
 --     lateness_median_ns, busy_share, rate_hz, bunched
 -- needs: main.callback, main.timer, main.callback_instance, main.callback_label,
---     main.executor_thread, main.thread_break, main.executor_wait, main.executor_interference
+--     main.executor_thread, main.thread_break, main.executor_wait_explained
 WITH asked AS (
     SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns
     FROM main.callback AS c
@@ -78,10 +78,12 @@ instance AS (
     WHERE c.start_ns >= $start_ns AND c.start_ns < $end_ns
 ),
 -- Behind a gap the call before may be missing, and with it when this one was due.
-late AS (
-    SELECT i.callback_id, i.callback_instance_id, w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns
+late AS MATERIALIZED (
+    SELECT
+        i.callback_id, w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns,
+        w.meanwhile_callback_ids, w.meanwhile_ns
     FROM instance AS i
-    JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
+    JOIN main.executor_wait_explained($runs) AS w ON i.callback_instance_id = w.callback_instance_id
     WHERE w.since = 'timer' AND NOT i.is_loss_affected
 ),
 usual AS (
@@ -123,12 +125,17 @@ delayed AS (
     JOIN asked AS a ON l.callback_id = a.callback_id
     GROUP BY l.callback_id
 ),
+ran AS (
+    SELECT
+        callback_id,
+        unnest(meanwhile_callback_ids) AS meanwhile_id,
+        unnest(meanwhile_ns) AS overlap_ns
+    FROM late
+),
 pair AS (
-    SELECT l.callback_id, r.callback_id AS meanwhile_id, sum(i.overlap_ns) AS overlap_ns
-    FROM main.executor_interference AS i
-    JOIN late AS l ON i.callback_instance_id = l.callback_instance_id
-    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
-    GROUP BY l.callback_id, r.callback_id
+    SELECT callback_id, meanwhile_id, sum(overlap_ns) AS overlap_ns
+    FROM ran
+    GROUP BY callback_id, meanwhile_id
 ),
 ranked AS (
     SELECT

@@ -30,24 +30,24 @@
 -- brief: start_ns, node, callback, wait_ns, busy_max_ns, meanwhile, busy_min_ns, since,
 --     rest_max_ns, rest_min_ns, callback_instance_id
 -- note: clocks
--- needs: main.executor_wait, main.executor_interference, main.callback_label
-WITH waited AS (
+-- needs: main.executor_wait_explained, main.callback_label
+WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
-        busy_max_ns, is_loss_affected
-    FROM main.executor_wait
-    WHERE list_contains($runs, run_id)
-        AND start_ns >= $start_ns
+        busy_max_ns, is_loss_affected, meanwhile_callback_ids, meanwhile_ns
+    FROM main.executor_wait_explained($runs)
+    WHERE start_ns >= $start_ns
         AND start_ns < $end_ns
         AND coalesce(callback_id = $callback_id, true)
         AND coalesce(busy_max_ns, busy_min_ns) >= $min_busy_ns
 ),
 pair AS (
-    -- Of bursts there are far more pairs than rows of the answer: summed up before they are joined.
-    SELECT callback_instance_id, meanwhile_callback_id, sum(overlap_ns) AS overlap_ns
-    FROM main.executor_interference
-    WHERE list_contains($runs, run_id) AND overlap_ns > 0
-    GROUP BY callback_instance_id, meanwhile_callback_id
+    SELECT
+        callback_instance_id,
+        callback_id,
+        unnest(meanwhile_callback_ids) AS meanwhile_callback_id,
+        unnest(meanwhile_ns) AS overlap_ns
+    FROM waited
 ),
 meanwhile AS (
     SELECT
@@ -58,8 +58,7 @@ meanwhile AS (
             ', ' ORDER BY p.overlap_ns DESC, p.meanwhile_callback_id
         ) AS names
     FROM pair AS p
-    JOIN waited AS w ON p.callback_instance_id = w.callback_instance_id
-    JOIN main.callback_label AS l ON w.callback_id = l.callback_id
+    JOIN main.callback_label AS l ON p.callback_id = l.callback_id
     JOIN main.callback_label AS o ON p.meanwhile_callback_id = o.callback_id
     GROUP BY p.callback_instance_id
 )

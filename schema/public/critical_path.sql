@@ -48,10 +48,10 @@
 --     false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- needs: main.end_to_end_part, derive.flow_piece, main.executor_wait, derive.callback_ready,
+-- needs: main.end_to_end_part, derive.flow_piece, derive.callback_ready,
 --     derive.executor_meanwhile, main.callback_instance, main.publication, main.take,
 --     derive.executor_busy, derive.executor_size, derive.callback_exclusion, derive.process_clock,
---     derive.corrected_ns, store.link_transport, store.link_causal
+--     derive.corrected_ns, store.thread, store.link_transport, store.link_causal
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,
@@ -78,18 +78,27 @@ waiting AS MATERIALIZED (
         AND callback_instance_id IS NOT NULL
         AND to_ns > from_ns
 ),
+ready AS MATERIALIZED (
+    SELECT
+        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
+        earliest_ns, latest_ns, start_ns
+    FROM derive.callback_ready
+    WHERE list_contains(runs, run_id)
+        AND callback_instance_id IN (SELECT callback_instance_id FROM waiting)
+),
 wait AS MATERIALIZED (
     SELECT
-        callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
-        coalesce(earliest_ns, latest_ns) AS earliest_ns, latest_ns, start_ns,
-        earliest_ns IS NOT NULL AS is_bounded
-    FROM main.executor_wait
-    WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
-),
-ready AS (
-    SELECT run_id, executor_id, callback_instance_id, earliest_ns, latest_ns, start_ns
-    FROM derive.callback_ready
-    WHERE callback_instance_id IN (SELECT callback_instance_id FROM wait)
+        r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
+        derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
+        derive.corrected_ns(
+            coalesce(r.earliest_ns, r.latest_ns), c.offset_ns, c.drift_ppb, c.reference_ns
+        ) AS earliest_ns,
+        derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
+        derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+        r.earliest_ns IS NOT NULL AS is_bounded
+    FROM ready AS r
+    JOIN store.thread AS t ON r.thread_id = t.thread_id
+    JOIN derive.process_clock AS c ON t.process_id = c.process_id
 ),
 meanwhile AS MATERIALIZED (
     SELECT

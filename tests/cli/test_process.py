@@ -45,6 +45,23 @@ def imported(*arguments: object) -> set[str]:
     return {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()}
 
 
+def test_numpy_starts_no_threads() -> None:
+    """Nothing of its algebra is used, for which it has one per core."""
+    program = (
+        "import os, sys\n"
+        "sys.argv = ['msgflow', '--version']\n"
+        "from msgflow.__main__ import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "import numpy\n"
+        "print(len(os.listdir('/proc/self/task')))\n"
+    )
+    environment = {key: value for key, value in os.environ.items() if "THREADS" not in key}
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
+    )
+    assert done.stdout.split()[-1] == "1"
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

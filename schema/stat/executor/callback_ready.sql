@@ -9,12 +9,15 @@
 -- grain: one row per callback instance that is not nested in another
 -- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
 --     store.executor_thread, store.executor_state, store.thread_break
-WITH release AS (
+WITH sized AS (
+    SELECT executor_id, thread_count FROM derive.executor_size
+),
+release AS (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
         r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, s.thread_count
     FROM derive.callback_release AS r
-    JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
+    JOIN sized AS s ON r.executor_id = s.executor_id
 ),
 -- A thread among several picks what it will run when it begins to look, not when it runs it:
 -- another thread may have gone to wait in the meantime.
@@ -28,7 +31,7 @@ picked AS (
     ASOF JOIN (
         SELECT e.thread_id, e.start_ns
         FROM store.executor_state AS e
-        JOIN derive.executor_size AS z ON e.executor_id = z.executor_id
+        JOIN sized AS z ON e.executor_id = z.executor_id
         WHERE e.state = 'process' AND z.thread_count > 1
     ) AS s ON r.thread_id = s.thread_id AND r.start_ns >= s.start_ns
 ),
@@ -37,7 +40,7 @@ polled AS (
         p.callback_instance_id, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
         w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
     FROM picked AS p
-    ASOF JOIN derive.executor_poll AS w
+    ASOF JOIN derive.executor_poll('sized') AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
 ),
 broken AS (

@@ -1,15 +1,20 @@
 -- name: derive.executor_poll
+-- kind: macro
 -- description: The moments at which executors learned what is ready: the ends of their waits
 --     (polling points). What is not found there waits for the next one. With the sum of all time
 --     spent waiting before. A wait for less than a millisecond may have found something ready at
 --     once; in a longer one nothing was ready when it began. What a callback that spins waits for
 --     is no business of its executor.
 -- grain: one row per wait of an executor that was seen to end
+-- param: executors VARCHAR  Name of rows with an executor_id each: those to look at
 -- needs: store.executor_state, store.callback_instance, derive.executor_run
+CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
 WITH wait AS (
     SELECT run_id, executor_id, thread_id, start_ns, end_ns
     FROM store.executor_state
-    WHERE state = 'wait' AND end_ns IS NOT NULL AND executor_id IS NOT NULL
+    WHERE state = 'wait'
+        AND end_ns IS NOT NULL
+        AND executor_id IN (SELECT executor_id FROM query_table(executors))
 ),
 -- Threads with a callback that may spin: it does not end before the next event of the executor, nor
 -- did the last wait of the thread begin before it.

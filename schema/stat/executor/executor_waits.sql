@@ -1,0 +1,179 @@
+-- name: derive.executor_waits
+-- kind: macro
+-- description: How long callback instances waited in their executor, and what for: see
+--     main.executor_wait.
+-- grain: one row per waiting callback instance
+-- param: waits VARCHAR  Name of rows as of derive.callback_ready
+-- needs: derive.executor_busy, derive.executor_poll,
+--     derive.executor_blocked, derive.callback_exclusion, store.thread,
+--     derive.process_clock, derive.corrected_ns
+CREATE OR REPLACE MACRO derive.executor_waits(waits) AS TABLE
+WITH stretch AS MATERIALIZED (
+    SELECT executor_id, start_ns, end_ns, before_ns, callback_instance_id, previous_end_ns
+    FROM derive.executor_busy
+),
+-- The one thread of an executor starts a callback when nothing else runs: up to there it was busy
+-- for as long as it was in all before, and not at all from the end of the last one.
+ready AS MATERIALIZED (
+    SELECT
+        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
+        r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.thread_count, r.wait_start_ns,
+        r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns, r.is_loss_affected,
+        b.before_ns AS start_busy_ns,
+        CASE WHEN r.earliest_ns >= coalesce(b.previous_end_ns, r.earliest_ns) THEN b.before_ns END
+            AS earliest_busy_ns,
+        CASE WHEN r.latest_ns >= coalesce(b.previous_end_ns, r.latest_ns) THEN b.before_ns END
+            AS latest_busy_ns
+    FROM query_table(waits) AS r
+    -- What others may exclude needs all its moments.
+    LEFT JOIN (SELECT DISTINCT callback_id FROM derive.callback_exclusion) AS e
+        ON r.callback_id = e.callback_id
+    LEFT JOIN stretch AS b
+        ON r.callback_instance_id = b.callback_instance_id AND e.callback_id IS NULL
+),
+-- How much of each kind of time there was up to other moments: the difference of two such sums is
+-- what there was between them.
+moment AS MATERIALIZED (
+    SELECT callback_instance_id, callback_id, executor_id, 'earliest' AS which, earliest_ns AS at_ns
+    FROM ready
+    WHERE earliest_ns IS NOT NULL AND earliest_busy_ns IS NULL
+    UNION ALL
+    SELECT callback_instance_id, callback_id, executor_id, 'latest', latest_ns
+    FROM ready
+    WHERE latest_busy_ns IS NULL
+    UNION ALL
+    SELECT callback_instance_id, callback_id, executor_id, 'start', start_ns
+    FROM ready
+    WHERE start_busy_ns IS NULL
+),
+busy AS MATERIALIZED (
+    SELECT
+        m.callback_instance_id,
+        m.callback_id,
+        m.which,
+        m.at_ns,
+        coalesce(b.before_ns + least(m.at_ns, b.end_ns) - b.start_ns, 0) AS until_ns
+    FROM moment AS m
+    ASOF LEFT JOIN (
+        SELECT executor_id, start_ns, end_ns, before_ns
+        FROM stretch
+        WHERE executor_id IN (SELECT executor_id FROM moment)
+    ) AS b ON m.executor_id = b.executor_id AND m.at_ns >= b.start_ns
+),
+blocked AS (
+    SELECT
+        m.callback_instance_id,
+        m.which,
+        CASE
+            WHEN b.end_ns IS NULL THEN 0
+            WHEN m.at_ns >= b.end_ns THEN b.before_ns + b.blocked_ns
+            ELSE b.before_ns + m.at_ns - b.start_ns - (m.until_ns - b.start_busy_ns)
+        END AS until_ns
+    FROM (
+        SELECT y.callback_instance_id, y.which, y.at_ns, y.until_ns, e.kind, e.exclusion_id
+        FROM busy AS y
+        JOIN derive.callback_exclusion AS e ON y.callback_id = e.callback_id
+    ) AS m
+    ASOF LEFT JOIN derive.executor_blocked AS b
+        ON m.kind = b.kind AND m.exclusion_id = b.exclusion_id AND m.at_ns >= b.start_ns
+),
+-- With one thread the last wait is over when a callback starts. Since the wait before there is
+-- nothing to add up.
+drowsy AS MATERIALIZED (
+    SELECT callback_instance_id, executor_id, 'earliest' AS which, earliest_ns AS at_ns
+    FROM ready
+    WHERE earliest_ns IS NOT NULL
+        AND (
+            thread_count > 1
+            OR earliest_ns < wait_start_ns AND earliest_ns < previous_wait_end_ns
+        )
+    UNION ALL
+    SELECT callback_instance_id, executor_id, 'start', start_ns FROM ready WHERE thread_count > 1
+),
+-- Whether an executor waits at all is looked up where none of its callbacks shows it.
+silent AS (
+    SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
+),
+looked_up AS (
+    SELECT executor_id FROM drowsy
+    UNION
+    SELECT executor_id FROM silent
+),
+poll AS MATERIALIZED (
+    SELECT executor_id, start_ns, end_ns, before_ns FROM derive.executor_poll('looked_up')
+),
+idle AS (
+    SELECT
+        m.callback_instance_id,
+        m.which,
+        coalesce(w.before_ns + least(m.at_ns, w.end_ns) - w.start_ns, 0) AS until_ns
+    FROM drowsy AS m
+    ASOF LEFT JOIN poll AS w ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
+),
+until AS (
+    SELECT callback_instance_id, 'busy_' || which AS what, until_ns FROM busy
+    UNION ALL
+    SELECT callback_instance_id, 'blocked_' || which, until_ns FROM blocked
+    UNION ALL
+    SELECT callback_instance_id, 'idle_' || which, until_ns FROM idle
+),
+passed AS (
+    SELECT
+        callback_instance_id,
+        max(CASE WHEN what = 'busy_earliest' THEN until_ns END) AS busy_earliest_ns,
+        max(CASE WHEN what = 'busy_latest' THEN until_ns END) AS busy_latest_ns,
+        max(CASE WHEN what = 'busy_start' THEN until_ns END) AS busy_start_ns,
+        max(CASE WHEN what = 'blocked_earliest' THEN until_ns END) AS blocked_earliest_ns,
+        max(CASE WHEN what = 'blocked_latest' THEN until_ns END) AS blocked_latest_ns,
+        max(CASE WHEN what = 'blocked_start' THEN until_ns END) AS blocked_start_ns,
+        max(CASE WHEN what = 'idle_earliest' THEN until_ns END) AS idle_earliest_ns,
+        max(CASE WHEN what = 'idle_start' THEN until_ns END) AS idle_start_ns
+    FROM until
+    GROUP BY callback_instance_id
+),
+waiting AS (
+    SELECT executor_id FROM ready WHERE wait_start_ns IS NOT NULL
+    UNION
+    SELECT executor_id FROM poll
+),
+told AS (
+    SELECT
+        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
+        r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.is_loss_affected,
+        coalesce(r.start_busy_ns, p.busy_start_ns) AS busy_start_ns,
+        coalesce(r.earliest_busy_ns, p.busy_earliest_ns) AS busy_earliest_ns,
+        coalesce(r.latest_busy_ns, p.busy_latest_ns) AS busy_latest_ns,
+        coalesce(p.blocked_start_ns - p.blocked_latest_ns, 0) AS blocked_min_ns,
+        coalesce(p.blocked_start_ns - p.blocked_earliest_ns, 0) AS blocked_max_ns,
+        CASE
+            WHEN w.executor_id IS NULL OR r.earliest_ns IS NULL THEN NULL
+            WHEN r.thread_count > 1 THEN p.idle_start_ns - p.idle_earliest_ns
+            WHEN r.wait_start_ns IS NULL OR r.earliest_ns >= r.wait_end_ns THEN 0
+            WHEN r.earliest_ns >= r.wait_start_ns THEN r.wait_end_ns - r.earliest_ns
+            ELSE r.wait_end_ns - r.wait_start_ns
+                + coalesce(r.wait_before_ns - p.idle_earliest_ns, 0)
+        END AS idle_ns
+    FROM ready AS r
+    LEFT JOIN passed AS p ON r.callback_instance_id = p.callback_instance_id
+    LEFT JOIN waiting AS w ON r.executor_id = w.executor_id
+)
+SELECT
+    r.run_id,
+    r.callback_instance_id,
+    r.executor_id,
+    r.thread_id,
+    r.callback_id,
+    r.since,
+    derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
+    derive.corrected_ns(r.earliest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS earliest_ns,
+    derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
+    derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+    r.start_ns - r.origin_ns AS wait_ns,
+    r.busy_start_ns - r.busy_latest_ns + r.blocked_min_ns AS busy_min_ns,
+    r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns AS busy_max_ns,
+    CASE WHEN r.earliest_ns IS NOT NULL THEN r.blocked_max_ns END AS blocked_max_ns,
+    r.idle_ns,
+    r.is_loss_affected
+FROM told AS r
+JOIN store.thread AS t ON r.thread_id = t.thread_id
+JOIN derive.process_clock AS c ON t.process_id = c.process_id
