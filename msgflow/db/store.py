@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Copy what staging has under the name of a store table, inside the open transaction.
 
-    Ids in staging are above 0; in the store those of a run come after what is there.
+    Ids in staging are above 0; in the store those of a run come after what is there. Tables without
+    a row are left alone: each statement takes longer than its few rows.
     """
     staged = {
         name
         for (name,) in con.execute(
             "SELECT table_name FROM duckdb_tables() "
-            "WHERE database_name = 'staging' AND schema_name = 'main' "
+            "WHERE database_name = 'staging' AND schema_name = 'main' AND estimated_size > 0 "
             "UNION ALL SELECT view_name FROM duckdb_views() "
             "WHERE database_name = 'staging' AND schema_name = 'main'"
         ).fetchall()
@@ -43,10 +44,20 @@ def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
 
 
 def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
+    filled = {
+        name
+        for (name,) in con.execute(
+            "SELECT table_name FROM duckdb_tables() "
+            "WHERE schema_name = 'store' AND estimated_size > 0"
+        ).fetchall()
+    }
     bases = {}
     for table in TABLES.values():
         key = f"{table.name}_id"
         if key in table.columns:
+            bases[key] = 0
+            if table.name not in filled:
+                continue
             row = con.execute(f"SELECT coalesce(max({key}), 0) FROM {table.full_name}").fetchone()
             bases[key] = 0 if row is None else int(row[0])
     return bases

@@ -86,9 +86,9 @@ class Growing:
         if header.kind != "view":
             self._con.execute(creating(header))
             return
-        if header.name == STAGED and not self._is_empty(STAGED):
-            header = staged([each for each in of_model() if not self._is_empty(each.name)])
-        if self._is_empty(header.name):
+        if header.name == STAGED and not self.is_empty(STAGED):
+            header = staged([each for each in of_model() if not self.is_empty(each.name)])
+        if self.is_empty(header.name):
             self._con.execute(f"CREATE TABLE {header.name} AS {empty_tables()[header.name]}")
             self.empty.add(header.name)
             return
@@ -96,7 +96,8 @@ class Growing:
         if not count:
             self.empty.add(header.name)
 
-    def _is_empty(self, name: str) -> bool:
+    def is_empty(self, name: str) -> bool:
+        """Tell whether an object has no row for certain, by what is built."""
         return is_empty(name, self._conditions, self.empty.__contains__)
 
 

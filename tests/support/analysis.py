@@ -16,7 +16,7 @@ from msgflow.db import objects
 from msgflow.db.connection import attach
 from msgflow.db.derive import derive, derive_table, derived_tables
 from msgflow.db.opening import open_memory
-from msgflow.db.store import delete, store
+from msgflow.db.store import store
 from msgflow.db.tables import TABLES
 from msgflow.ingest import model, staging
 from msgflow.ingest.reported import restore
@@ -46,6 +46,8 @@ class Analysis:
         staging.attach(self._connection, Path(":memory:"))
         self._tables = self._tables_of("raw"), self._tables_of("staging")
         self._views = self._views_of_staging()
+        # Tables of the model that stand there without a row, as those before needed them.
+        self._kept: set[str] = set()
         self._built: set[str] | None = None
         self._growing: model.Growing | None = None
         self._derived: frozenset[str] = frozenset()
@@ -118,13 +120,19 @@ class Analysis:
         is_first = self._growing is None
         if self._growing is None:
             self._growing = model.Growing(self._connection)
+            self._growing.empty -= self._kept  # not known of this system yet
             staging.narrow(self._connection, self._growing.empty)
         for header in missing:
-            self._growing.add(header)
+            if header.name in self._kept and self._growing.is_empty(header.name):
+                self._growing.empty.add(header.name)
+            else:
+                if header.name in self._kept:
+                    self._connection.execute(f"DROP TABLE {header.name}")
+                self._growing.add(header)
             self._built.add(header.name)
         self._connection.begin()
         if not is_first:
-            delete(self._connection, [1])
+            self._empty_store()
         store(self._connection, 1)
         self._connection.execute(
             "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
@@ -164,7 +172,10 @@ class Analysis:
     def _clear(self) -> None:
         con = self._connection
         raw, given = self._tables
-        for table in self._tables_of("staging") - given:
+        if self._growing is not None:
+            built = {each.name for each in objects.load("model") if each.kind == "view"}
+            self._kept = (self._kept - self._built) | (built & self._growing.empty)
+        for table in self._tables_of("staging", "estimated_size > 0") - given:
             con.execute(f"DROP TABLE staging.{table}")
         for view in self._views_of_staging() - self._views:
             con.execute(f"DROP VIEW staging.{view}")
@@ -174,6 +185,10 @@ class Analysis:
                 con.execute(f"DELETE FROM {database}.{table}")
             con.commit()
         con.begin()
+        self._empty_store()
+        con.commit()
+
+    def _empty_store(self) -> None:
         filled = {
             name
             for (name,) in self._read(
@@ -183,8 +198,7 @@ class Analysis:
         }
         for table in TABLES.values():
             if "run_id" in table.columns and table.full_name in filled:
-                con.execute(f"DELETE FROM {table.full_name}")
-        con.commit()
+                self._connection.execute(f"DELETE FROM {table.full_name}")
 
 
 Analyse = Callable[[StagedEvents], Analysis]
