@@ -3,29 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from functools import cache
 
 import duckdb
 
 from msgflow.db import objects
 
+Rules = AbstractContextManager[duckdb.DuckDBPyConnection]
 
-@contextmanager
-def derived(stage: str, names: Collection[str]) -> Iterator[duckdb.DuckDBPyConnection]:
+
+def derived(stage: str, names: Collection[str]) -> Rules:
     """A connection with what `stage` makes, and these views and macros of `derive` above it."""
-    with duckdb.connect() as con:
-        con.execute(stage)
-        for header in objects.views():
-            if header.name.removeprefix("derive.") in names:
-                con.execute(objects.create_statement(header))
-        yield con
+    return _as_made(
+        stage,
+        *(
+            objects.create_statement(header)
+            for header in objects.views()
+            if header.name.removeprefix("derive.") in names
+        ),
+    )
 
 
-@contextmanager
-def modelled(stage: str, name: str, view: str) -> Iterator[duckdb.DuckDBPyConnection]:
+def modelled(stage: str, name: str, view: str) -> Rules:
     """A connection with what `stage` makes, and a relation of the model above it as `view`."""
     (rule,) = (each for each in objects.load("model") if each.name == f"staging.{name}")
-    with duckdb.connect() as con:
-        con.execute(stage)
-        con.execute(f"CREATE VIEW {view} AS {rule.body}")
+    return _as_made(stage, f"CREATE VIEW {view} AS {rule.body}")
+
+
+@contextmanager
+def _as_made(*statements: str) -> Iterator[duckdb.DuckDBPyConnection]:
+    """What these statements make, made once: what a test changes is taken back."""
+    con = _made(statements)
+    con.begin()
+    try:
         yield con
+    finally:
+        con.rollback()
+
+
+@cache
+def _made(statements: tuple[str, ...]) -> duckdb.DuckDBPyConnection:
+    con = duckdb.connect()
+    for statement in statements:
+        con.execute(statement)
+    return con
