@@ -139,7 +139,7 @@ def exact_links(analysis: Analysis) -> set[tuple[Any, ...]]:
     )
 
 
-@settings(FEW, max_examples=examples(2, 4))
+@settings(FEW, max_examples=examples(1, 4))
 @given(seed=SEEDS, share=st.sampled_from([0.02, 0.3, 0.7]))
 def test_removing_events_creates_no_link(analysis: Analysis, seed: int, share: float) -> None:
     system = random_system(seed)
@@ -153,7 +153,7 @@ def test_removing_events_creates_no_link(analysis: Analysis, seed: int, share: f
     assert exact_links(analysis.build(copy)) <= before
 
 
-@settings(FEW, max_examples=examples(2, 3))
+@settings(FEW, max_examples=examples(1, 3))
 @given(seed=SEEDS, deleted=st.sampled_from([0.0, 0.1, 0.5]))
 def test_completeness_adds_up(analysis: Analysis, seed: int, deleted: float) -> None:
     """Every root of every path is counted once, though messages and callbacks are missing."""

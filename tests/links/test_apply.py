@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from each import each
 from ingested import contents, ingest_one
 from thorough import few
 
@@ -30,6 +31,15 @@ DECLARED = (
     "JOIN publisher AS p USING (publisher_id) GROUP BY a.annotation_id, a.kind, a.source "
     "ORDER BY a.annotation_id"
 )
+
+
+Contents = dict[str, list[tuple[Any, ...]]]
+
+
+@pytest.fixture
+def untouched(database: Path) -> Contents:
+    """What is in the database before the test."""
+    return contents(database)
 
 
 def write(path: Path, text: str) -> Path:
@@ -100,45 +110,44 @@ def test_a_name_that_occurs_twice_with_its_process(database: Path) -> None:
         ) == [("right",)]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "message", "hint"),
-    [
-        ("/fusion", "/fusio", 4, "no such node — /fusio", "did you mean /fusion"),
-        ("/fusion", "'/zz*'", 4, "no such node — /zz*", "/fusion, /ns/twin, /relay"),
-        ("/fusion", "/ns/twin", 4, "2 nodes have this name — /ns/twin", "process right 400"),
-        ("/b]", "/bb]", 5, "/fusion does not subscribe to such a topic — /bb", "/a, /b"),
-        ("/d]", "'/z*']", 6, "/fusion does not publish on such a topic — /z*", "/c, /d"),
-        (
-            "/fusion\n    inputs: [/a, /b]\n    outputs: [/c, /d]",
-            "'/n*'\n    inputs: /x\n    outputs: /y",
-            4,
-            "2 nodes have this name — /ns/twin",
-            "process right 400",
-        ),
-        (
-            "/fusion\n    inputs: [/a, /b]",
-            "'/[fr]*'\n    inputs:\n      - /a\n      - '/z[a-c]'",
-            7,
-            "no node that matches /[fr]* subscribes to such a topic — /z[a-c]",
-            "the topics are /a, /b, /c",
-        ),
-        ("periodic_async", "periodic", 3, "no such kind of link — periodic", "partial_sync"),
-        ("/fusion", "/fusion\n    host: beta", 5, "no such node on this host — beta", "alpha"),
-        ("/fusion", "/fusion\n    process: 7", 5, "in this process — 7", "fusion 100"),
-    ],
+WRONG = (
+    ("/fusion", "/fusio", 4, "no such node — /fusio", "did you mean /fusion"),
+    ("/fusion", "'/zz*'", 4, "no such node — /zz*", "/fusion, /ns/twin, /relay"),
+    ("/fusion", "/ns/twin", 4, "2 nodes have this name — /ns/twin", "process right 400"),
+    ("/b]", "/bb]", 5, "/fusion does not subscribe to such a topic — /bb", "/a, /b"),
+    ("/d]", "'/z*']", 6, "/fusion does not publish on such a topic — /z*", "/c, /d"),
+    (
+        "/fusion\n    inputs: [/a, /b]\n    outputs: [/c, /d]",
+        "'/n*'\n    inputs: /x\n    outputs: /y",
+        4,
+        "2 nodes have this name — /ns/twin",
+        "process right 400",
+    ),
+    (
+        "/fusion\n    inputs: [/a, /b]",
+        "'/[fr]*'\n    inputs:\n      - /a\n      - '/z[a-c]'",
+        7,
+        "no node that matches /[fr]* subscribes to such a topic — /z[a-c]",
+        "the topics are /a, /b, /c",
+    ),
+    ("periodic_async", "periodic", 3, "no such kind of link — periodic", "partial_sync"),
+    ("/fusion", "/fusion\n    host: beta", 5, "no such node on this host — beta", "alpha"),
+    ("/fusion", "/fusion\n    process: 7", 5, "in this process — 7", "fusion 100"),
 )
+
+
+@each(WRONG)
 def test_what_does_not_exist_changes_nothing(
-    database: Path, old: str, new: str, line: int, message: str, hint: str | None
+    wrong: tuple[str, str, int, str, str], database: Path, untouched: Contents
 ) -> None:
-    before = contents(database)
+    old, new, line, message, hint = wrong
     with Database(database) as opened, pytest.raises(UsageError) as caught:
         opened.apply_links(write(database, BOTH.replace(old, new, 1)))
     assert message in caught.value.message
-    if hint is not None:
-        assert f"links.yaml, line {line}: " in caught.value.message
-        assert caught.value.hint is not None
-        assert hint in caught.value.hint
-    assert contents(database) == before
+    assert f"links.yaml, line {line}: " in caught.value.message
+    assert caught.value.hint is not None
+    assert hint in caught.value.hint
+    assert contents(database) == untouched
 
 
 def test_contradictory_entries_are_named(database: Path) -> None:
@@ -156,41 +165,40 @@ def test_contradictory_entries_are_named(database: Path) -> None:
     assert rows(database, found) == []
 
 
-def test_a_partial_sync_of_one_input_changes_nothing(database: Path) -> None:
-    before = contents(database)
+def test_a_partial_sync_of_one_input_changes_nothing(database: Path, untouched: Contents) -> None:
     text = BOTH.replace("periodic_async", "partial_sync").replace("[/a, /b]", "[/b]")
     with Database(database) as opened, pytest.raises(UsageError) as caught:
         opened.apply_links(write(database, text))
     assert "links.yaml, line 3: a partial_sync of one input waits" in caught.value.message
     assert "/b of /fusion" in caught.value.message
-    assert contents(database) == before
+    assert contents(database) == untouched
 
 
 ENTRY = "  - {{kind: periodic_async, node: {}, inputs: [{}], outputs: [{}]}}\n"
 
 
-@pytest.mark.parametrize(
-    ("entries", "line", "message"),
-    [
-        ([("/relay", "/c", "/c")], 2, "a topic is input and output of the same link — /c"),
-        (
-            [("/fusion", "/a", "/c"), ("/relay", "/c", "/a")],
-            3,
-            "the links form a cycle — /a → /c → /a",
-        ),
-        ([("'/[fr]*'", "'*'", "/z")], 2, "no node that matches /[fr]* publishes on such a topic"),
-        ([("'/[fr]*'", "/b", "/a")], 2, "no node that matches /[fr]* has all"),
-    ],
+BACK: tuple[tuple[list[tuple[str, str, str]], int, str], ...] = (
+    ([("/relay", "/c", "/c")], 2, "a topic is input and output of the same link — /c"),
+    (
+        [("/fusion", "/a", "/c"), ("/relay", "/c", "/a")],
+        3,
+        "the links form a cycle — /a → /c → /a",
+    ),
+    ([("'/[fr]*'", "'*'", "/z")], 2, "no node that matches /[fr]* publishes on such a topic"),
+    ([("'/[fr]*'", "/b", "/a")], 2, "no node that matches /[fr]* has all"),
 )
+
+
+@each(BACK)
 def test_links_that_lead_back_change_nothing(
-    database: Path, entries: list[tuple[str, str, str]], line: int, message: str
+    back: tuple[list[tuple[str, str, str]], int, str], database: Path, untouched: Contents
 ) -> None:
-    before = contents(database)
+    entries, line, message = back
     text = "links:\n" + "".join(ENTRY.format(*entry) for entry in entries)
     with Database(database) as opened, pytest.raises(UsageError) as caught:
         opened.apply_links(write(database, text))
     assert f"links.yaml, line {line}: {message}" in caught.value.message
-    assert contents(database) == before
+    assert contents(database) == untouched
 
 
 def test_what_the_trace_declares_itself_is_not_declared_again(
@@ -304,17 +312,12 @@ def test_messages_that_another_node_of_the_process_keeps(slam: Path, listener: s
     assert rows(slam, KEPT) == [("/transform_listener_impl_5566a1b0", "/mapGraph")]
 
 
-@pytest.mark.parametrize(
-    ("listener", "message"),
-    [
-        ("/transform_listener_impl_55d01c40", "no such node in the process of /rtabmap"),
-        ("/rtabmap", "no such node in the process of /rtabmap"),
-    ],
-)
-def test_it_is_of_the_same_process(slam: Path, listener: str, message: str) -> None:
+@each(["/transform_listener_impl_55d01c40", "/rtabmap"])
+def test_it_is_of_the_same_process(listener: str, slam: Path) -> None:
     before = contents(slam)
     with Database(slam) as opened, pytest.raises(UsageError) as caught:
         opened.apply_links(write(slam, LISTENER.format(listener)))
-    assert f"line 6: {message} — {listener}" in caught.value.message
+    wanted = f"line 6: no such node in the process of /rtabmap — {listener}"
+    assert wanted in caught.value.message
     assert "/transform_listener_impl_5566a1b0" in (caught.value.hint or "")
     assert contents(slam) == before

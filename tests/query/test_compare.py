@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -80,31 +81,44 @@ def _fill(
         connection.execute("DELETE FROM store.callback_instance WHERE callback_instance_id = 0")
 
 
+@pytest.fixture(scope="module")
+def alike(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two runs that do not differ, of all callbacks; read it only."""
+    path = tmp_path_factory.mktemp("alike") / "msgflow.duckdb"
+    shutil.copyfile(empty_database, path)
+    _fill(path, shift_ns=0)
+    return path
+
+
+@pytest.fixture(scope="module")
+def compared(alike: Path) -> list[dict[str, Any]]:
+    """The comparison of these."""
+    with msgflow.open_db(alike) as database:
+        return _rows(database, "after", resamples=400)
+
+
 def _rows(database: msgflow.Database, run_b: str, **options: Any) -> list[dict[str, Any]]:
     comparison = database.compare("before", run_b, what="callbacks", **options)
     return comparison.result.to_arrow().to_pylist()
 
 
-def test_what_is_equal_is_rarely_called_different(fresh_database: Path) -> None:
-    _fill(fresh_database, shift_ns=0)
-    with msgflow.open_db(fresh_database) as database:
-        rows = _rows(database, "after", resamples=400)
-    assert len(rows) == 5 * CALLBACKS
+def test_what_is_equal_is_rarely_called_different(compared: list[dict[str, Any]]) -> None:
+    assert len(compared) == 5 * CALLBACKS
     for statistic in ("median", "mean"):
-        verdicts = [row["verdict"] for row in rows if row["statistic"] == statistic]
+        verdicts = [row["verdict"] for row in compared if row["statistic"] == statistic]
         wrong = sum(verdict != "no difference shown" for verdict in verdicts)
         # 5 % of 40 are expected; more than 8 have a probability of less than 0.1 %.
         assert wrong <= 8, verdicts
         assert all(verdict != "too few values" for verdict in verdicts)
-    assert {row["verdict"] for row in rows if row["statistic"] == "p99"} == {"too few values"}
-    assert {row["verdict"] for row in rows if row["statistic"] == "max"} == {"not estimated"}
+    assert {row["verdict"] for row in compared if row["statistic"] == "p99"} == {"too few values"}
+    assert {row["verdict"] for row in compared if row["statistic"] == "max"} == {"not estimated"}
 
 
 def test_a_difference_is_found_and_lies_in_its_interval(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=100_000)
     with msgflow.open_db(fresh_database) as database:
         rows = _rows(database, "after", resamples=400)
-        reverse = database.compare("after", "before", what="callbacks", resamples=400)
+        reverse = database.compare("after", "before", what="callbacks", resamples=0)
     for statistic in ("median", "mean"):
         own = [row for row in rows if row["statistic"] == statistic]
         assert all(row["verdict"] == "B is longer" for row in own)
@@ -118,21 +132,21 @@ def test_a_difference_is_found_and_lies_in_its_interval(fresh_database: Path) ->
         assert other["cliffs_delta"] == -row["cliffs_delta"]
 
 
-# More than 1000 values are not drawn at once.
-@pytest.mark.parametrize(("callbacks", "values"), [(CALLBACKS, VALUES), (4, 2_000)])
-def test_an_interval_of_a_mean_is_as_wide_as_theory_says(
-    fresh_database: Path, callbacks: int, values: int
-) -> None:
-    _fill(fresh_database, shift_ns=0, callbacks=callbacks, values=values)
-    with msgflow.open_db(fresh_database) as database:
-        widths = [
-            row["high_ns"] - row["low_ns"]
-            for row in _rows(database, "after", resamples=400)
-            if row["statistic"] == "mean"
-        ]
+def _check_width(rows: list[dict[str, Any]], values: int) -> None:
+    widths = [row["high_ns"] - row["low_ns"] for row in rows if row["statistic"] == "mean"]
     expected = 2 * 1.96 * 100_000 * (2 / values) ** 0.5
     # Wider, if anything: how much blocks vary is estimated from few of them.
     assert 0.98 * expected <= sum(widths) / len(widths) <= 1.18 * expected
+
+
+def test_an_interval_of_a_mean_is_as_wide_as_theory_says(compared: list[dict[str, Any]]) -> None:
+    _check_width(compared, VALUES)
+
+
+def test_also_of_more_than_1000_values_which_are_not_drawn_at_once(fresh_database: Path) -> None:
+    _fill(fresh_database, shift_ns=0, callbacks=2, values=2_000)
+    with msgflow.open_db(fresh_database) as database:
+        _check_width(_rows(database, "after", resamples=400), 2_000)
 
 
 def test_each_statistic_is_of_the_values_and_in_its_interval(fresh_database: Path) -> None:
@@ -165,26 +179,43 @@ def test_each_statistic_is_of_the_values_and_in_its_interval(fresh_database: Pat
     assert rows["max"]["low_ns"] is None
 
 
-@pytest.mark.parametrize(
-    ("statistic", "enough"), [("median", 20), ("mean", 20), ("p95", 100), ("p99", 500)]
-)
-def test_five_values_beyond_a_quantile_are_enough(
-    fresh_database: Path, statistic: str, enough: int
-) -> None:
-    _fill(fresh_database, shift_ns=0, callbacks=1, values=enough)
+def test_five_values_beyond_a_quantile_are_enough(fresh_database: Path) -> None:
+    """Each callback has as many values as one statistic needs; then one less in run B."""
+    enough = {"/n · Timer(1 ms)": 20, "/n · Timer(2 ms)": 100, "/n · Timer(3 ms)": 500}
+    needed = {"median": 20, "mean": 20, "p95": 100, "p99": 500}
 
-    def verdict() -> str:
+    def verdicts() -> set[tuple[str, str]]:
+        """(subject, statistic) of what has values enough."""
         with msgflow.open_db(fresh_database) as database:
-            rows = {row["statistic"]: row for row in _rows(database, "after", resamples=400)}
-        return str(rows[statistic]["verdict"])
+            return {
+                (row["subject"], row["statistic"])
+                for row in _rows(database, "after", resamples=400)
+                if row["statistic"] in needed and row["verdict"] != "too few values"
+            }
 
-    assert verdict() != "too few values"
-    with duckdb.connect(str(fresh_database)) as connection:
-        connection.execute(
-            "DELETE FROM store.callback_instance WHERE run_id = 2 AND start_ns = $last",
-            {"last": enough * 10_000_000},
+    def without(values: int) -> str:
+        return (
+            f"DELETE FROM store.callback_instance WHERE start_ns // 10_000_000 >= {values} "
+            "+ CASE callback_id % 1000 WHEN 0 THEN 20 WHEN 1 THEN 100 ELSE 500 END"
         )
-    assert verdict() == "too few values"
+
+    _fill(fresh_database, shift_ns=0, callbacks=len(enough), values=max(enough.values()))
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute(without(1))
+    assert verdicts() == {
+        (subject, statistic)
+        for subject, count in enough.items()
+        for statistic, least in needed.items()
+        if count >= least
+    }
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute(f"{without(0)} AND run_id = 2")
+    assert verdicts() == {
+        (subject, statistic)
+        for subject, count in enough.items()
+        for statistic, least in needed.items()
+        if count > least
+    }
 
 
 def test_values_that_are_held_count_once(fresh_database: Path) -> None:
@@ -362,7 +393,7 @@ def test_nothing_holds_of_paths_that_were_left_out(fresh_database: Path) -> None
 def test_what_exceeds_a_condition_fails(fresh_database: Path) -> None:
     _fill(fresh_database, shift_ns=50_000, callbacks=4)
     with msgflow.open_db(fresh_database) as database:
-        comparison = database.compare("before", "after", what="callbacks")
+        comparison = database.compare("before", "after", what="callbacks", resamples=400)
         # All medians rise by about 5 %, hence none by 50 %, and all by more than 0.1 µs.
         assert comparison.failures(["median>50%"]) == []
         assert comparison.failures([]) == []
@@ -421,9 +452,8 @@ def test_conditions_are_read() -> None:
     ]
 
 
-def test_runs_without_anything_in_common_are_refused(fresh_database: Path) -> None:
-    _fill(fresh_database, shift_ns=0)
-    with msgflow.open_db(fresh_database) as database:
+def test_runs_without_anything_in_common_are_refused(alike: Path) -> None:
+    with msgflow.open_db(alike) as database:
         with pytest.raises(UsageError, match="no paths with values in common — before"):
             database.compare("before", "after")
         with pytest.raises(UsageError, match="there is no such run — never"):

@@ -15,6 +15,7 @@ from msgflow.query.selection import KINDS, PATH, columns_of, make_selection, val
 from msgflow.sim import simulate
 
 PLANNER = "/planning/planner"
+_ANSWERS: dict[str, list[dict[str, Any]]] = {}
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +28,11 @@ def database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
 
 
 def rows(database: Database, name: str, **given: Any) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = database.query(name, **given).to_arrow().to_pylist()
-    return found
+    """What a query gives, which is asked once: nothing changes the database."""
+    asked = f"{database.path} {name} {sorted(given.items())}"
+    if asked not in _ANSWERS:
+        _ANSWERS[asked] = database.query(name, **given).to_arrow().to_pylist()
+    return _ANSWERS[asked]
 
 
 def test_names_choose_rows(database: Database) -> None:
