@@ -37,8 +37,7 @@ def derive(
         synchronise: called once messages are linked, to bring clocks together; they stay as they
             are when None.
     """
-    _forget_topics(con, run_id)
-    _learn_topics(con, run_id)
+    learn_topics(con, run_id)
     for name in derived_tables():
         if not _reads_clocks(name):
             derive_table(con, name, run_id)
@@ -111,16 +110,14 @@ def _source(name: str) -> str:
     return f"derive.{name} WHERE run_id = ?"
 
 
-def _forget_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+def learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Tell topics from messages anew, inside the open transaction."""
     for kind in _TOPIC_OWNERS:
         con.execute(
             f"UPDATE store.{kind} SET topic_name = NULL, is_internal = false, "
             "is_topic_learned = false WHERE run_id = ? AND is_topic_learned",
             [run_id],
         )
-
-
-def _learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     for kind in _TOPIC_OWNERS:
         con.execute(
             f"UPDATE store.{kind} SET topic_name = learned.topic_name, "

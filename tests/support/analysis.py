@@ -14,7 +14,7 @@ from staged_events import StagedEvents
 
 from msgflow.db import objects
 from msgflow.db.connection import attach
-from msgflow.db.derive import derive, derive_table, derived_tables
+from msgflow.db.derive import derive, derive_table, derived_tables, learn_topics
 from msgflow.db.opening import open_memory
 from msgflow.db.store import store
 from msgflow.db.tables import TABLES
@@ -91,9 +91,13 @@ class Analysis:
             return
         self._model(needed)
         tables = needed & _DERIVED
-        # A link may tell topics, of which others follow, and some diagnostics are noted of links.
-        if self._has_topics_to_learn() or (tables and "store.diagnostic" in needed):
-            tables = _DERIVED
+        if tables and "store.diagnostic" in needed:
+            tables = _DERIVED  # some are noted of links
+        if self._has_topics_to_learn():
+            self._model(_closure(["derive.topic_learned"]))
+            self._connection.begin()
+            learn_topics(self._connection, 1)
+            self._connection.commit()
         if tables <= self._derived:
             return
         self._model(_closure(tables))
