@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import json
 import os
 import pty
 import signal
@@ -12,11 +13,16 @@ import subprocess
 import sys
 import termios
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from thorough import few, thorough
+from typer.testing import CliRunner
 
+from msgflow.cli.app import app
+from msgflow.db.definition import expected
+from msgflow.ingest import ingest
 from msgflow.sim import Recording, simulate
 
 HEAVY = ("duckdb", "pyarrow", "sqlalchemy", "alembic", "pandas", "polars", "bt2")
@@ -28,16 +34,18 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "msgflow", *map(str, arguments)]
 
 
-def imported(*arguments: object) -> set[str]:
+def imported(*commands: Sequence[object]) -> set[str]:
+    """Return the modules that are there after these command lines, in one process."""
     program = (
-        "import sys\n"
+        "import json, sys\n"
         "from msgflow.cli.app import app\n"
-        "try:\n    app(sys.argv[1:])\n"
-        "except SystemExit as end:\n    assert not end.code, end.code\n"
+        "for words in json.loads(sys.argv[1]):\n"
+        "    try:\n        app(words)\n"
+        "    except SystemExit as end:\n        assert not end.code, end.code\n"
         "print(' '.join(sys.modules), file=sys.stderr)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program, *map(str, arguments)],
+        [sys.executable, "-c", program, json.dumps(commands, default=str)],
         capture_output=True,
         text=True,
         check=True,
@@ -62,34 +70,33 @@ def test_numpy_starts_no_threads() -> None:
     assert done.stdout.split()[-1] == "1"
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("--help",),
-        ("--version",),
-        thorough(("ingest", "--help")),
-        ("query", "--list"),
-        thorough(("query", "--help")),
-        ("query", "info-topics", "--help"),
-        thorough(("query", "info-topics", "--show")),
-        thorough(("sql", "--help")),
-        thorough(("flow", "--help")),
-        thorough(("info", "--help")),
-        thorough(("events", "--help")),
-        ("export", "parquet", "--help"),
-        thorough(("export", "csv", "--help")),
-        thorough(("db", "upgrade", "--help")),
-        thorough(("simulate", "--help")),
-    ],
+HELP = (
+    ("--help",),
+    ("--version",),
+    ("ingest", "--help"),
+    ("query", "--list"),
+    ("query", "--help"),
+    ("query", "info-topics", "--help"),
+    ("query", "info-topics", "--show"),
+    ("sql", "--help"),
+    ("flow", "--help"),
+    ("info", "--help"),
+    ("events", "--help"),
+    ("export", "parquet", "--help"),
+    ("export", "csv", "--help"),
+    ("db", "upgrade", "--help"),
+    ("simulate", "--help"),
 )
-def test_help_does_not_import_the_database_stack(arguments: tuple[str, ...]) -> None:
-    assert not imported(*arguments) & set(HEAVY)
+
+
+def test_help_does_not_import_the_database_stack() -> None:
+    assert not imported(*HELP) & set(HEAVY)
 
 
 def test_a_query_imports_what_it_needs_and_no_more(small_database: Path) -> None:
     # The first command of a version renders what a database has to be like, and keeps it.
-    imported("query", "info-topics", "--db", small_database)
-    modules = imported("query", "info-topics", "--db", small_database)
+    expected()
+    modules = imported(("query", "info-topics", "--db", small_database))
     assert {"duckdb", "pyarrow"} <= modules
     assert not modules & set(NEVER_IN_QUERY)
 
@@ -97,7 +104,7 @@ def test_a_query_imports_what_it_needs_and_no_more(small_database: Path) -> None
 def test_an_ingest_imports_nothing_that_moves_old_databases(tmp_path: Path) -> None:
     trace = tmp_path / "trace"
     simulate("pipeline", trace, factor=0.01)
-    modules = imported("ingest", trace, "--db", tmp_path / "new.duckdb")
+    modules = imported(("ingest", trace, "--db", tmp_path / "new.duckdb"))
     assert {"duckdb", "pyarrow", "numpy"} <= modules
     assert not modules & set(NEVER_IN_QUERY)
 
@@ -203,12 +210,17 @@ def on_terminal(arguments: list[str], width: int = 40, *, with_stderr: bool = Fa
     return b"".join(parts).replace(b"\r\n", b"\n")
 
 
+def piped(*arguments: object) -> bytes:
+    """Return what a command line writes to stdout where that is no terminal."""
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == 0
+    return done.stdout_bytes
+
+
 @pytest.mark.parametrize("form", few(["json", "csv", "markdown", "table --wide"], "csv"))
 def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: str) -> None:
-    arguments = command("query", "info-runs", "--db", small_database, "--format", *form.split())
-    piped = subprocess.run(arguments, capture_output=True, check=True).stdout
-    assert piped
-    assert on_terminal(arguments) == piped
+    arguments = ("query", "info-runs", "--db", small_database, "--format", *form.split())
+    assert on_terminal(command(*arguments)) == piped(*arguments) != b""
 
 
 @pytest.mark.parametrize(
@@ -232,10 +244,7 @@ def test_a_table_fits_the_terminal(
     lines = on_terminal(command(*arguments, "--db", small_database), width).decode().splitlines()
     assert max(map(len, lines), default=0) <= width
     wide = on_terminal(command(*arguments, "--wide", "--db", small_database), width)
-    piped = subprocess.run(
-        command(*arguments, "--db", small_database), capture_output=True, check=True
-    ).stdout
-    assert wide == piped
+    assert wide == piped(*arguments, "--db", small_database)
 
 
 @pytest.mark.parametrize("width", few([60, 80, 100], 60))
@@ -289,7 +298,7 @@ def two_hosts_far_apart(tmp_path_factory: pytest.TempPathFactory) -> Path:
     traces = directory / ("a_long_name_of_a_session_" * 5)
     simulate("two_hosts", traces, factor=0.1, recording=Recording(cut_streams=2))
     database = directory / "far.duckdb"
-    subprocess.run(command("ingest", traces, "--db", database, "--quiet"), check=True)
+    ingest([traces], database)
     return database
 
 
@@ -311,11 +320,7 @@ def test_a_terminal_obeys_no_name(small_database: Path, form: str) -> None:
     assert not {character for character in shown.decode() if not character.isprintable()} - {"\n"}
     assert "é" in shown.decode()
     assert "\\x9b" in shown.decode()
-    exact = subprocess.run(
-        command("sql", text, "--db", small_database, "--format", "csv"),
-        capture_output=True,
-        check=True,
-    ).stdout
+    exact = piped("sql", text, "--db", small_database, "--format", "csv")
     assert "\x1b[31m\x9b2J\x07é".encode() in exact
 
 
