@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,12 +15,12 @@ from typer.testing import Result
 Msgflow = Callable[..., Result]
 
 
-@pytest.fixture
-def database(fresh_database: Path) -> Path:
-    """A run with something of every kind, to which tests add what is wrong."""
+@pytest.fixture(scope="module")
+def _good(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     from golden import BASE
 
-    with duckdb.connect(str(fresh_database)) as connection:
+    path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("good") / "msgflow.duckdb"))
+    with duckdb.connect(str(path)) as connection:
         for table, row in BASE.items():
             insert(connection, table, list(row), [list(row.values())])
         insert(connection, "node", ["node_id", "full_name"], [["1", "/node"]])
@@ -27,7 +28,13 @@ def database(fresh_database: Path) -> Path:
         insert(connection, "take", ["take_id", "method"], [["1", "rmw"]])
         insert(connection, "callback_instance", ["callback_instance_id", "end_ns"], [["1", "9"]])
         insert(connection, "executor_state", ["state"], [["wait"]])
-    return fresh_database
+    return path
+
+
+@pytest.fixture
+def database(_good: Path, tmp_path: Path) -> Path:
+    """A run with something of every kind, to which tests add what is wrong."""
+    return Path(shutil.copy(_good, tmp_path / "msgflow.duckdb"))
 
 
 def add(path: Path, table: str, *rows: dict[str, str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -23,26 +24,52 @@ EVIL = (
 SAFE = {"/plain", "/two words", "/ünï"}
 
 
+# Asks for one line after the other, in one process.
+ASKING = """
+import json, os, sys
+from msgflow.__main__ import main
+given, sys.argv = json.loads(sys.argv[1]), ["msgflow"]
+for variables in given:
+    os.environ.update(variables)
+    try:
+        main()
+    except SystemExit:
+        print("", end="\\0", flush=True)
+"""
+
+
 def ask(
     words: list[str], directory: Path, *, shell: str = "fish", database: Path | None = None
 ) -> list[str]:
     """Return what a shell is told for the last of these words."""
+    (answer,) = ask_each([words], directory, shell=shell, database=database)
+    return answer
+
+
+def ask_each(
+    lines: list[list[str]], directory: Path, *, shell: str = "fish", database: Path | None = None
+) -> list[list[str]]:
+    """Return what a shell is told for the last word of each line."""
     environment = {name: value for name, value in os.environ.items() if name != "MSGFLOW_DB"}
-    line = " ".join(("msgflow", *words))
     environment |= {
         "_MSGFLOW_COMPLETE": f"complete_{shell}",
-        "_TYPER_COMPLETE_ARGS": line,
         "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-        "COMP_WORDS": line,
-        "COMP_CWORD": str(len(words)),
     }
+    variables = [
+        {"_TYPER_COMPLETE_ARGS": line, "COMP_WORDS": line, "COMP_CWORD": str(len(words))}
+        for words in lines
+        for line in [" ".join(("msgflow", *words))]
+    ]
     if database is not None:
         environment["MSGFLOW_DB"] = str(database)
+    program = [sys.executable, "-c", ASKING, json.dumps(variables)]
     done = subprocess.run(
-        PROGRAM, cwd=directory, env=environment, capture_output=True, text=True, check=False
+        program, cwd=directory, env=environment, capture_output=True, text=True, check=False
     )
     assert done.stderr == ""
-    return [line.partition("\t")[0] for line in done.stdout.splitlines() if line]
+    *answers, rest = done.stdout.split("\0")
+    assert not rest
+    return [[line.partition("\t")[0] for line in answer.splitlines() if line] for answer in answers]
 
 
 @pytest.fixture
@@ -76,26 +103,29 @@ def test_commands_and_queries(tmp_path: Path, shell: str) -> None:
 
 
 def test_names_of_the_database(small_database: Path, tmp_path: Path) -> None:
-    def names(*words: str) -> list[str]:
-        return ask(list(words), tmp_path, database=small_database)
-
-    assert names("query", "publication-rate", "--topic", "/ch") == ["/chatter"]
-    assert names("query", "e2e-latency", "--node", "/ta") == ["/talker"]
     with duckdb.connect(str(small_database), read_only=True) as connection:
         labels = {
             name for (name,) in connection.execute("SELECT label FROM callback_label").fetchall()
         }
         hosts = {name for (name,) in connection.execute("SELECT hostname FROM host").fetchall()}
-    assert set(names("query", "callback-duration", "--callback", "")) == labels
-    assert set(names("query", "executor-wait", "--host", "")) == hosts
-    assert names("query", "e2e-latency", "--from", "/ta") == ["/talker"]
-    assert names("query", "e2e-latency", "--via", "/chat") == ["/chatter"]
-    assert names("query", "e2e-latency", "--run", "m") == ["morning"]
-    assert names("query", "e2e-latency", "--run", "a") == ["all"]
-    assert names("compare", "morning", "no") == ["noon"]
-    assert names("runs", "rename", "no") == ["noon"]
-    assert names("flow", "--topic", "/ch") == ["/chatter"]
-    assert names("export", "parquet", "out", "callback_l") == ["callback_label"]
+    expected = {
+        "query publication-rate --topic /ch": {"/chatter"},
+        "query e2e-latency --node /ta": {"/talker"},
+        "query callback-duration --callback ": labels,
+        "query executor-wait --host ": hosts,
+        "query e2e-latency --from /ta": {"/talker"},
+        "query e2e-latency --via /chat": {"/chatter"},
+        "query e2e-latency --run m": {"morning"},
+        "query e2e-latency --run a": {"all"},
+        "compare morning no": {"noon"},
+        "runs rename no": {"noon"},
+        "flow --topic /ch": {"/chatter"},
+        "export parquet out callback_l": {"callback_label"},
+    }
+    lines = [line.split(" ") for line in expected]
+    answers = ask_each(lines, tmp_path, database=small_database)
+    assert [*map(set, answers)] == [*expected.values()]
+    assert all(len(answer) == len(set(answer)) for answer in answers)
 
 
 def test_the_option_is_before_the_variable(small_database: Path, tmp_path: Path) -> None:
@@ -166,8 +196,9 @@ def test_hostile_names_are_left_out(named: Path, evil: Path, tmp_path: Path, she
         "fish": ["/plain", "/two words", "/ünï"],
     }
     assert lines == expected[shell]
-    for words in (["query", "e2e-latency", "--node", ""], ["flow", "--topic", ""]):
-        for line in ask(words, tmp_path, shell="fish", database=evil):
+    asked = [["query", "e2e-latency", "--node", ""], ["flow", "--topic", ""]]
+    for answer in ask_each(asked, tmp_path, database=evil):
+        for line in answer:
             assert not set(line) & set("'\"$`\\;|!*?\x1b\n\t")
 
 

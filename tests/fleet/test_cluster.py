@@ -1,4 +1,4 @@
-"""Three nodes of a Ray cluster and a store that refuses requests, while much goes wrong.
+"""Two nodes of a Ray cluster and a store that refuses requests, while much goes wrong.
 
 Nothing is lost, nothing is there twice, and nobody ever sees half a run.
 """
@@ -48,7 +48,9 @@ def bucket() -> Iterator[ObjectStore]:
 
 
 @pytest.fixture(scope="module")
-def recordings(bucket: ObjectStore, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recordings(
+    bucket: ObjectStore, empty_database: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     """Short recordings of robots, here and in the bucket, one of them broken."""
     folder = tmp_path_factory.mktemp("recordings")
     for number in range(GOOD):
@@ -64,8 +66,8 @@ def recordings(bucket: ObjectStore, tmp_path_factory: pytest.TempPathFactory) ->
 
 @pytest.fixture(scope="module")
 def cluster(bucket: ObjectStore) -> Iterator[Any]:
-    """Three nodes with room for one recording each."""
-    with ray_cluster(3) as made:
+    """Two nodes with room for one recording each."""
+    with ray_cluster(2) as made:
         yield made
 
 

@@ -22,7 +22,13 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
 from msgflow.fleet.store import Store
 
-NODE = {"num_cpus": 1, "memory": 3_000_000_000, "object_store_memory": 80_000_000}
+NODE = {
+    "num_cpus": 1,
+    "memory": 3_000_000_000,
+    "object_store_memory": 80_000_000,
+    "include_log_monitor": False,
+    "no_monitor": True,
+}
 
 
 @contextmanager

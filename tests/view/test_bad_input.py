@@ -24,9 +24,9 @@ PAGES = ("overview", "paths", "timeline", "graph", "executors", "compare")
 
 
 @pytest.fixture(autouse=True)
-def _one_critical_path(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_critical_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """They take the most time of a report, and nothing here depends on how many it has."""
-    monkeypatch.setattr(report_module, "MOST_CRITICAL", 1)
+    monkeypatch.setattr(report_module, "MOST_CRITICAL", 0)
 
 
 def visit(page: Page, address: str, run: int | None = None) -> None:
