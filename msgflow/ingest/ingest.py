@@ -174,6 +174,9 @@ def ingest(
                 con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(database)}B"])
                 con.execute("SET preserve_insertion_order = false")
+                # A checkpoint would fill up row groups of threads that ended early, and write most
+                # of what was just written once more.
+                con.execute("SET max_vacuum_tasks = 0")
                 if not target.is_new:
                     attach(con, target.path)
                     if name is not None and not replace:
@@ -294,6 +297,8 @@ def _store(
         replaced |= {number for (number,) in named}
     store(con, run_id)
     delete(con, sorted(replaced))
+    if replaced:
+        con.execute("RESET max_vacuum_tasks")  # their room is used again
     run_name = name or _free_name(con, fallback)
     con.execute(
         "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -104,6 +105,28 @@ def test_a_replacement_keeps_other_runs(both: Path, trace: Path) -> None:
     assert of_run(both, 2) == other
     assert of_run(both, 3) == before
     assert not any(of_run(both, 1).values())
+
+
+@pytest.mark.parametrize("replace", [True, False])
+def test_a_file_is_tidied_up_where_rows_were_deleted(
+    database: Path,
+    trace: Path,
+    other_trace: Path,
+    replace: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else a checkpoint would write most of what was just written once more."""
+    module = sys.modules[ingest.__module__]
+    finished = vars(module)["_finished"]
+    tasks: list[int] = []
+
+    def noted(connection: duckdb.DuckDBPyConnection, *others: Any) -> Any:
+        tasks.extend(*connection.execute("SELECT current_setting('max_vacuum_tasks')").fetchall())
+        return finished(connection, *others)
+
+    monkeypatch.setattr(module, "_finished", noted)
+    ingest([trace if replace else other_trace], database, replace=replace)
+    assert [number > 0 for number in tasks] == [replace]
 
 
 def test_one_ingest_may_replace_several_runs(both: Path, trace: Path, other_trace: Path) -> None:
