@@ -61,14 +61,16 @@ class Memory:
                 self._con.execute("SET memory_limit = ?", [self._limit])
 
     @contextlib.contextmanager
-    def one_thread(self) -> Iterator[None]:
-        """Let one thread do all work of the database."""
+    def threads(self, share: float) -> Iterator[None]:
+        """Let this share of its threads, at least one, do all work of the database."""
         ((usual,),) = self._con.execute("SELECT current_setting('threads')").fetchall()
-        self._con.execute("SET threads = 1")
+        self._con.execute(f"SET threads = {max(1, int(usual * share))}")
         try:
             yield
         finally:
-            self._con.execute(f"SET threads = {usual}")
+            # A database that failed for good takes no setting either.
+            with contextlib.suppress(duckdb.FatalException):
+                self._con.execute(f"SET threads = {usual}")
 
     def run(self, work: Callable[[], _T]) -> _T:
         """Return what `work` returns; it is run again with twice the memory where that was short.

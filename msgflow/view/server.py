@@ -107,7 +107,8 @@ class Turns:
             answer = _if_memory_suffices(question)
         if answer is not None:
             return answer
-        with self._turn(alone=True), self._memory.one_thread():
+        # Each thread takes memory of its own.
+        with self._turn(alone=True), self._memory.threads(0):
             try:
                 give_back_freed_memory()
                 steps = chain(_GROWTH, repeat(_GROWTH[-1]))

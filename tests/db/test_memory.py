@@ -51,6 +51,19 @@ def test_less_while_traces_are_read() -> None:
             assert limit_of(con).endswith("PiB")
 
 
+def test_fewer_threads() -> None:
+    def threads() -> int:
+        return int(con.execute("SELECT current_setting('threads')").fetchall()[0][0])
+
+    with duckdb.connect() as con:
+        memory = Memory(con, None)
+        con.execute("SET threads = 5")
+        for share, count in ((0.5, 2), (0, 1), (1, 5)):
+            with memory.threads(share):
+                assert threads() == count
+            assert threads() == 5
+
+
 def test_too_little_to_read() -> None:
     with duckdb.connect() as con:
         usual = Memory(con, None)
