@@ -172,11 +172,20 @@ def test_a_closed_stderr_does_not_matter(small_database: Path, tmp_path: Path) -
     assert without("2", "ingest", tmp_path, "--db", small_database).returncode == 3
 
 
+def has_open(process: int, path: Path) -> bool:
+    with contextlib.suppress(FileNotFoundError):
+        return any(file.samefile(path) for file in Path(f"/proc/{process}/fd").iterdir())
+    return False
+
+
 def test_an_interrupt_ends_a_query_with_code_130(small_database: Path) -> None:
     process = subprocess.Popen(
         command("sql", SLOW, "--db", small_database), stderr=subprocess.PIPE, text=True
     )
-    time.sleep(2)
+    # It runs the query right after it has opened the database.
+    while process.poll() is None and not has_open(process.pid, small_database):
+        time.sleep(0.02)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     try:
         _, errors = process.communicate(timeout=20)

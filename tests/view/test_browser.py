@@ -50,7 +50,7 @@ def pick_on_canvas(page: Page, kind: int) -> tuple[str, int]:
     return name, number
 
 
-@pytest.mark.parametrize("way", ["served", "file"])
+@pytest.mark.parametrize("way", few(["served", "file"], "file"))
 def test_picking_lights_up_exactly_the_flow(
     way: str, systems: Path, read: Read, serve: Serve, report: Report, page: Page
 ) -> None:
