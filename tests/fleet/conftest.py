@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pyarrow as pa
@@ -11,7 +12,7 @@ from msgflow import Database
 from msgflow.fleet.answers import answers
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
-from msgflow.fleet.part import Content, write_part
+from msgflow.fleet.part import Content, Part, write_part
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
@@ -33,37 +34,47 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="session")
-def night(databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Lake:
+def written(
+    databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Part, Part]:
+    """A lake that both were written into, with all there is of them: nobody sees them yet."""
+    folder = tmp_path_factory.mktemp("written")
+    lake = Lake.open_or_create(folder / "lake")
+    parts = []
+    for database in databases:
+        with Database(database) as opened:
+            parts.append(
+                write_part(
+                    opened.connection,
+                    database,
+                    lake.store,
+                    folder,
+                    source=f"/recordings/{database.stem}",
+                    options={},
+                    content=Content(),
+                )
+            )
+    return folder / "lake", parts[0], parts[1]
+
+
+@pytest.fixture(scope="session")
+def night(written: tuple[Path, Part, Part], tmp_path_factory: pytest.TempPathFactory) -> Lake:
     """A lake of three runs, which nobody changes: both databases, and the first once more.
 
     The copy has a key of its own, and takes twice as long for its flows; it has no views.
     """
-    folder = tmp_path_factory.mktemp("night")
-    lake = Lake.open_or_create(folder / "lake")
-    rows = []
-    for database, labels in zip(
-        databases,
-        ({"robot": "r1", "software_version": "1.0"}, {"robot": "r2", "soft-ware": "a'b"}),
-        strict=True,
-    ):
-        with Database(database) as opened:
-            part = write_part(
-                opened.connection,
-                database,
-                lake.store,
-                folder,
-                source=f"/recordings/{database.stem}",
-                options={},
-                content=Content(),
-            )
-        rows.append(
-            {
-                **part.values,
-                "generation": 1,
-                "labels": labels,
-                "source": f"/recordings/{database.stem}",
-            }
-        )
+    place, *parts = written
+    lake = Lake.open(shutil.copytree(place, tmp_path_factory.mktemp("night") / "lake"))
+    labels = ({"robot": "r1", "software_version": "1.0"}, {"robot": "r2", "soft-ware": "a'b"})
+    rows = [
+        {
+            **part.values,
+            "generation": 1,
+            "labels": given,
+            "source": f"/recordings/{part.values['name']}",
+        }
+        for part, given in zip(parts, labels, strict=True)
+    ]
     first = rows[0]
     copy = {
         **first,

@@ -61,18 +61,6 @@ def lake(tmp_path: Path) -> Lake:
     return Lake.open_or_create(tmp_path / "lake")
 
 
-@pytest.fixture(scope="module")
-def written(
-    databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
-) -> tuple[Path, Part, Part]:
-    """A lake that both were written into, with their views: nobody sees them yet."""
-    folder = tmp_path_factory.mktemp("written")
-    lake = Lake.open_or_create(folder / "lake")
-    content = Content(database=False)
-    first, other = (write(lake, database, folder, content=content) for database in databases)
-    return folder / "lake", first, other
-
-
 @pytest.fixture
 def holding(written: tuple[Path, Part, Part], tmp_path: Path) -> tuple[Lake, Part, Part]:
     """A copy of it, to change it."""
@@ -154,16 +142,16 @@ def test_runs_add_up(holding: tuple[Lake, Part, Part]) -> None:
 def test_writing_again_writes_the_same(
     holding: tuple[Lake, Part, Part], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    content = Content(database=False)
     lake, first, _ = holding
+    source = "/recordings/first"
     before = {entry.path: lake.store.read(entry.path) for entry in lake.store.entries()}
-    again = write(lake, databases[0], tmp_path, content=content)
+    again = write(lake, databases[0], tmp_path, source=source, content=Content())
     assert again.values == first.values
     assert {entry.path: lake.store.read(entry.path) for entry in lake.store.entries()} == before
     # What depends on anything else lies elsewhere.
-    assert first.values["part"] == part_name(first.values["run"], "here", {})
+    assert first.values["part"] == part_name(first.values["run"], source, {})
     assert first.values["part"] != part_name(first.values["run"], "there", {})
-    assert first.values["part"] != part_name(first.values["run"], "here", {"strict": True})
+    assert first.values["part"] != part_name(first.values["run"], source, {"strict": True})
 
 
 def test_the_last_row_of_a_run_counts(
