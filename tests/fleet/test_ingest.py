@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import duckdb
@@ -175,7 +176,15 @@ def test_started_again_it_does_what_is_left(filled: Filled, tmp_path: Path) -> N
     assert ("robot", "z") in [pair for row in labelled for pair in row["labels"]]
 
 
-def test_what_was_mended_is_tried_again(filled: Filled, tmp_path: Path) -> None:
+def test_what_was_mended_is_tried_again(
+    filled: Filled, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def here(given: dict[str, Any]) -> dict[str, Any]:
+        with TemporaryDirectory() as directory:
+            return child.do(Task(**given), Path(directory)).as_dict()
+
+    # That each has a process of its own is shown by the other tests.
+    monkeypatch.setattr("msgflow.fleet.workers.run_task", here)
     lake, recordings = tmp_path / "lake", tmp_path / "recordings"
     shutil.copytree(filled.lake, lake)
     shutil.copytree(filled.recordings / "broken", recordings / "broken")
