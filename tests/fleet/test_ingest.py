@@ -55,7 +55,8 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["fleet", *map(str, arguments)])
 
 
-@pytest.fixture(scope="module")
+# Of the session, as it puts more beside the recordings: a worker may come back to this module.
+@pytest.fixture(scope="session")
 def filled(databases: tuple[Path, Path]) -> Filled:
     folder = databases[0].parent
     recordings = folder / "recordings"
