@@ -51,11 +51,15 @@ class Analysis:
         self._built: set[str] | None = None
         self._growing: model.Growing | None = None
         self._derived: frozenset[str] = frozenset()
+        # What is stored is never committed, unless somebody takes the database: to take it back
+        # costs one statement, to delete it one for each table.
+        self._is_stored = self._is_kept = False
 
     @property
     def connection(self) -> duckdb.DuckDBPyConnection:
         """The database with the whole model of the events, and its links."""
         self._provide(_everything())
+        self._keep()
         return self._connection
 
     def build(self, events: StagedEvents) -> Analysis:
@@ -83,6 +87,7 @@ class Analysis:
 
     def close(self) -> None:
         self._provide(_everything())
+        self._keep()
         self._connection.close()
 
     def _provide(self, needed: frozenset[str]) -> None:
@@ -95,20 +100,16 @@ class Analysis:
             tables = _DERIVED  # some are noted of links
         if self._has_topics_to_learn():
             self._model(_closure(["derive.topic_learned"]))
-            self._connection.begin()
             learn_topics(self._connection, 1)
-            self._connection.commit()
         if tables <= self._derived:
             return
         self._model(_closure(tables))
-        self._connection.begin()
         if tables == _DERIVED:
             derive(self._connection, 1)
         else:
             for name in derived_tables():
                 if f"store.{name}" in tables:
                     derive_table(self._connection, name, 1)
-        self._connection.commit()
         self._derived |= tables
 
     def _model(self, needed: frozenset[str]) -> None:
@@ -121,7 +122,7 @@ class Analysis:
         ]
         if not missing:
             return
-        is_first = self._growing is None
+        self._empty_store()
         if self._growing is None:
             self._growing = model.Growing(self._connection)
             self._growing.empty -= self._kept  # not known of this system yet
@@ -135,14 +136,12 @@ class Analysis:
                 self._growing.add(header)
             self._built.add(header.name)
         self._connection.begin()
-        if not is_first:
-            self._empty_store()
+        self._is_stored = True
         store(self._connection, 1)
         self._connection.execute(
             "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
             "VALUES (1, 'case', TIMESTAMP '1970-01-01', '', '')"
         )
-        self._connection.commit()
         self._derived = frozenset()
 
     def _has_topics_to_learn(self) -> bool:
@@ -174,6 +173,7 @@ class Analysis:
         }
 
     def _clear(self) -> None:
+        self._empty_store()
         con = self._connection
         raw, given = self._tables
         if self._growing is not None:
@@ -188,11 +188,19 @@ class Analysis:
             for table in tables & self._tables_of(database, "estimated_size > 0"):
                 con.execute(f"DELETE FROM {database}.{table}")
             con.commit()
-        con.begin()
-        self._empty_store()
-        con.commit()
+
+    def _keep(self) -> None:
+        """Let what is stored outlast the transaction, for whoever takes the database."""
+        if self._is_stored:
+            self._connection.commit()
+            self._is_stored, self._is_kept = False, True
 
     def _empty_store(self) -> None:
+        if self._is_stored:
+            self._connection.rollback()
+            self._is_stored = False
+        if not self._is_kept:
+            return
         filled = {
             name
             for (name,) in self._read(
@@ -203,6 +211,7 @@ class Analysis:
         for table in TABLES.values():
             if "run_id" in table.columns and table.full_name in filled:
                 self._connection.execute(f"DELETE FROM {table.full_name}")
+        self._is_kept = False
 
 
 Analyse = Callable[[StagedEvents], Analysis]
