@@ -141,7 +141,12 @@ def test_what_is_known_of_ros_does_not_change(make: Make, ingest: Ingest) -> Non
     ]
 
 
-def test_a_kernel_trace_lies_anywhere(make: Make, ingest: Ingest, tmp_path: Path) -> None:
+def test_a_kernel_trace_of_an_older_tracer_lies_anywhere(
+    make: Make, ingest: Ingest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It gives a received packet another name."""
+    monkeypatch.setattr("network.RECEIVED", "netif_receive_skb")
+    monkeypatch.setattr("kernel_traces.RECEIVED", "netif_receive_skb")
     network = make()
     for number in range(50):
         network.carry("alpha", "beta", number * 1_000_000, identification=number + 1)
@@ -266,14 +271,3 @@ def test_one_clock_needs_no_packets(tmp_path: Path, ingest: Ingest) -> None:
     network.write()
     database = ingest(directory)
     assert not {"no_network_packets", "network_packets_unused"} & set(details(database))
-
-
-def test_the_name_that_older_tracers_give_a_received_packet(
-    make: Make, ingest: Ingest, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("network.RECEIVED", "netif_receive_skb")
-    monkeypatch.setattr("kernel_traces.RECEIVED", "netif_receive_skb")
-    network = make()
-    traffic(network, 0.5)
-    network.write()
-    assert beta(ingest(network.directory))["method"] == "packets"

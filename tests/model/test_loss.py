@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse
+from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
 
@@ -11,6 +11,17 @@ from msgflow.db.finding import find
 
 MS = 1_000_000
 GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM gap ORDER BY start_ns, cpu"
+Gaps = list[tuple[str, int | None, int, int, int | None]]
+
+
+def alone(system: RosSystem, trace: int, path: str | None = None) -> None:
+    """This trace is of a host of its own: several systems side by side."""
+    system.add_source(trace, f"host {trace}", f"boot {trace}", path=path)
+
+
+def gaps_of(model: Analysis, trace: int) -> Gaps:
+    """What GAPS says, of one of several traces."""
+    return model.rows(GAPS.replace("ORDER", f"WHERE trace_id = {trace + 1} ORDER"))
 
 
 def test_continuous_packets_have_no_gap(system: RosSystem, analyse: Analyse) -> None:
@@ -156,24 +167,28 @@ def test_an_idle_stream_does_not_hide_a_pause(system: RosSystem, analyse: Analys
     assert analyse(system).rows(GAPS) == [("pause", None, 10 * MS, 50 * MS, None)]
 
 
-@pytest.mark.parametrize(("length", "is_pause"), [(MS - 1, False), (MS, True)])
-def test_nobody_stops_and_starts_within_a_millisecond(
-    system: RosSystem, analyse: Analyse, length: int, is_pause: bool
-) -> None:
-    for cpu in (0, 1):
-        system.add_packet(0, 10 * MS, cpu=cpu)
-        system.add_packet(10 * MS + length, 60 * MS, cpu=cpu)
-    assert bool(analyse(system).rows(GAPS)) is is_pause
+def test_nobody_stops_and_starts_within_a_millisecond(system: RosSystem, analyse: Analyse) -> None:
+    lengths = (MS - 1, MS)
+    for trace, length in enumerate(lengths):
+        alone(system, trace)
+        for cpu in (0, 1):
+            system.add_packet(0, 10 * MS, cpu=cpu, trace=trace)
+            system.add_packet(10 * MS + length, 60 * MS, cpu=cpu, trace=trace)
+    model = analyse(system)
+    assert [bool(gaps_of(model, trace)) for trace in (0, 1)] == [False, True]
 
 
-def events_at(system: RosSystem, *moments: int) -> None:
+def events_at(system: RosSystem, *moments: int, trace: int = 0) -> None:
     for moment in moments:
-        system.add("ros2:rclcpp_executor_wait_for_work", Thread(100), ts=moment, timeout=-1)
+        system.add(
+            "ros2:rclcpp_executor_wait_for_work", Thread(100, trace=trace), ts=moment, timeout=-1
+        )
 
 
-@pytest.mark.parametrize(
-    ("distance", "length", "is_pause"),
-    [
+def test_a_silence_as_is_usual_there_is_no_pause(system: RosSystem, analyse: Analyse) -> None:
+    """Something else ended the packets, and the next ones begin with their first events."""
+    # How long before it another silence ended, how long that was, and whether it is a pause.
+    cases = (
         # As long as the silence between packets, and longer; a little less.
         (500 * MS, 20 * MS, False),
         (500 * MS, 25 * MS, False),
@@ -181,54 +196,58 @@ def events_at(system: RosSystem, *moments: int) -> None:
         # It ends less than a second before, or has ended by then.
         (1_000 * MS - 1, 20 * MS, False),
         (1_000 * MS, 20 * MS, True),
-    ],
-)
-def test_a_silence_as_is_usual_there_is_no_pause(
-    system: RosSystem, analyse: Analyse, distance: int, length: int, is_pause: bool
-) -> None:
-    """Something else ended the packets, and the next ones begin with their first events."""
+    )
     end = 2_000 * MS
-    for cpu in (0, 1):
-        system.add_packet(0, end, cpu=cpu)
-        system.add_packet(end + 20 * MS, 2_100 * MS, cpu=cpu)
-    usual_end = end - distance
-    events_at(system, usual_end - length)
-    events_at(system, *range(usual_end, end, 10 * MS), end, end + 20 * MS)
-    expected = [("pause", None, end, end + 20 * MS, None)] if is_pause else []
-    assert analyse(system).rows(GAPS) == expected
+    for trace, (distance, length, _) in enumerate(cases):
+        alone(system, trace)
+        for cpu in (0, 1):
+            system.add_packet(0, end, cpu=cpu, trace=trace)
+            system.add_packet(end + 20 * MS, 2_100 * MS, cpu=cpu, trace=trace)
+        usual_end = end - distance
+        events_at(system, usual_end - length, trace=trace)
+        events_at(system, *range(usual_end, end, 10 * MS), end, end + 20 * MS, trace=trace)
+    model = analyse(system)
+    pause = [("pause", None, end, end + 20 * MS, None)]
+    for trace, case in enumerate(cases):
+        assert gaps_of(model, trace) == (pause if case[-1] else []), case
 
 
-@pytest.mark.parametrize(("distance", "is_pause"), [(4_000 * MS - 1, False), (4_000 * MS, True)])
 def test_long_silences_are_compared_with_what_is_farther_away(
-    system: RosSystem, analyse: Analyse, distance: int, is_pause: bool
+    system: RosSystem, analyse: Analyse
 ) -> None:
     """A second of silence with the four seconds around it; here with those behind it."""
-    for cpu in (0, 1):
-        system.add_packet(0, 1_000 * MS, cpu=cpu)
-        system.add_packet(2_000 * MS, 9_000 * MS, cpu=cpu)
-    events_at(system, *range(900 * MS, 1_001 * MS, 10 * MS))
-    quiet = 2_000 * MS + distance
-    events_at(system, *range(2_000 * MS, quiet, 10 * MS), quiet, quiet + 1_000 * MS)
-    expected = [("pause", None, 1_000 * MS, 2_000 * MS, None)] if is_pause else []
-    assert analyse(system).rows(GAPS) == expected
+    for trace, distance in enumerate((4_000 * MS - 1, 4_000 * MS)):
+        alone(system, trace)
+        for cpu in (0, 1):
+            system.add_packet(0, 1_000 * MS, cpu=cpu, trace=trace)
+            system.add_packet(2_000 * MS, 9_000 * MS, cpu=cpu, trace=trace)
+        events_at(system, *range(900 * MS, 1_001 * MS, 10 * MS), trace=trace)
+        quiet = 2_000 * MS + distance
+        events_at(system, *range(2_000 * MS, quiet, 10 * MS), trace=trace)
+        events_at(system, quiet, quiet + 1_000 * MS, trace=trace)
+    model = analyse(system)
+    assert gaps_of(model, 0) == []
+    assert gaps_of(model, 1) == [("pause", None, 1_000 * MS, 2_000 * MS, None)]
 
 
-def silent_at(system: RosSystem, *flushes: int, since: int = 1, **first: int | None) -> None:
+def silent_at(
+    system: RosSystem, *flushes: int, since: int = 1, trace: int = 0, **first: int | None
+) -> None:
     """A system that is silent for 300 ms again and again, and packets that were ended meanwhile.
 
     Each ends `since` after its last event, and the next begins with its first one. An event of the
     last packet is at its end; `first` is said of the first packets.
     """
-    events_at(system, *range(0, 6_001 * MS, 300 * MS))
+    events_at(system, *range(0, 6_001 * MS, 300 * MS), trace=trace)
     for cpu in (0, 1):
         begin, said = 0, first
         for end in flushes:
-            system.add_packet(begin, end, last_event=end - since, cpu=cpu, **said)
+            system.add_packet(begin, end, last_event=end - since, cpu=cpu, trace=trace, **said)
             begin, said = end // (300 * MS) * 300 * MS + 300 * MS, {}
-        system.add_packet(begin, 6_000 * MS, cpu=cpu)
+        system.add_packet(begin, 6_000 * MS, cpu=cpu, trace=trace)
 
 
-STOPPED = [("pause", None, 2_050 * MS, 2_100 * MS, None)]
+STOPPED: Gaps = [("pause", None, 2_050 * MS, 2_100 * MS, None)]
 
 
 def test_who_stops_in_a_quiet_system_pauses(system: RosSystem, analyse: Analyse) -> None:
@@ -242,33 +261,35 @@ def test_a_packet_that_is_full_was_not_ended(system: RosSystem, analyse: Analyse
     assert analyse(system).rows(GAPS) == []
 
 
-@pytest.mark.parametrize(("late", "expected"), [(5 * MS, []), (5 * MS + 1, STOPPED)])
-@pytest.mark.parametrize("others", [(1_050, 50), (1_050, 3_050), (3_050, 4_050)])
 def test_a_timer_of_the_tracer_ends_packets_at_equal_distances(
-    system: RosSystem,
-    analyse: Analyse,
-    others: tuple[int, int],
-    late: int,
-    expected: list[tuple[str, None, int, int, None]],
+    system: RosSystem, analyse: Analyse
 ) -> None:
     """Within 5 ms; two others are before, around or behind, the outer one late."""
-    inner, outer = others
-    silent_at(system, *sorted((inner * MS, 2_050 * MS, outer * MS + late)))
-    assert [row for row in analyse(system).rows(GAPS) if row[2] == 2_050 * MS] == expected
+    cases = [
+        (others, late)
+        for others in ((1_050, 50), (1_050, 3_050), (3_050, 4_050))
+        for late in (5 * MS, 5 * MS + 1)
+    ]
+    for trace, ((inner, outer), late) in enumerate(cases):
+        alone(system, trace)
+        silent_at(system, *sorted((inner * MS, 2_050 * MS, outer * MS + late)), trace=trace)
+    model = analyse(system)
+    for trace, (others, late) in enumerate(cases):
+        found = [row for row in gaps_of(model, trace) if row[2] == 2_050 * MS]
+        assert found == (STOPPED if late > 5 * MS else []), others
 
 
-@pytest.mark.parametrize(("between", "expected"), [(3, []), (4, STOPPED)])
-def test_others_end_packets_between_those_of_a_timer(
-    system: RosSystem,
-    analyse: Analyse,
-    between: int,
-    expected: list[tuple[str, None, int, int, None]],
-) -> None:
+def test_others_end_packets_between_those_of_a_timer(system: RosSystem, analyse: Analyse) -> None:
     """Of those next to it, four on either side are compared; here at no equal distances."""
     before, after = (1_690, 1_130, 870, 460), (2_510, 2_930, 3_380, 3_710)
-    others = (50, *before[:between], 2_050, *after[:between], 4_050)
-    silent_at(system, *(at * MS for at in sorted(others)))
-    assert [row for row in analyse(system).rows(GAPS) if row[2] == 2_050 * MS] == expected
+    expected: dict[int, Gaps] = {3: [], 4: STOPPED}
+    for trace, between in enumerate(expected):
+        alone(system, trace)
+        others = (50, *before[:between], 2_050, *after[:between], 4_050)
+        silent_at(system, *(at * MS for at in sorted(others)), trace=trace)
+    model = analyse(system)
+    for trace, gaps in enumerate(expected.values()):
+        assert [row for row in gaps_of(model, trace) if row[2] == 2_050 * MS] == gaps
 
 
 def test_streams_are_ended_one_after_the_other(system: RosSystem, analyse: Analyse) -> None:
@@ -281,32 +302,25 @@ def test_streams_are_ended_one_after_the_other(system: RosSystem, analyse: Analy
     assert analyse(system).rows(GAPS) == STOPPED
 
 
-@pytest.mark.parametrize(
-    ("path", "expected"),
-    [
-        ("/t/snapshot-1-20260101-120000-3/ust/uid/0/64-bit", []),
-        ("snapshot-2-1", []),
-        ("/t/my-snapshot-1/ust", STOPPED),
-        ("/t/snapshot/ust", STOPPED),
-    ],
-)
-def test_earlier_snapshots_ended_packets_of_a_snapshot(
-    system: RosSystem,
-    analyse: Analyse,
-    path: str,
-    expected: list[tuple[str, None, int, int, None]],
-) -> None:
-    system.add_source(0, "alpha", "boot", path=path)
-    silent_at(system, 2_050 * MS)
-    assert analyse(system).rows(GAPS) == expected
+def test_earlier_snapshots_ended_packets_of_a_snapshot(system: RosSystem, analyse: Analyse) -> None:
+    expected: dict[str, Gaps] = {
+        "/t/snapshot-1-20260101-120000-3/ust/uid/0/64-bit": [],
+        "snapshot-2-1": [],
+        "/t/my-snapshot-1/ust": STOPPED,
+        "/t/snapshot/ust": STOPPED,
+    }
+    for trace, path in enumerate(expected):
+        alone(system, trace, path)
+        silent_at(system, 2_050 * MS, trace=trace)
+    model = analyse(system)
+    assert {path: gaps_of(model, trace) for trace, path in enumerate(expected)} == expected
 
 
-@pytest.mark.parametrize("lost", [3, None])
-def test_buffers_that_wrapped_are_a_snapshot(
-    system: RosSystem, analyse: Analyse, lost: int | None
-) -> None:
+def test_buffers_that_wrapped_are_a_snapshot(system: RosSystem, analyse: Analyse) -> None:
     """As packets before the first one are missing, or, without numbers, may be."""
-    silent_at(system, 2_050 * MS, lost_packets=lost)
+    for trace, lost in enumerate((3, None)):
+        alone(system, trace)
+        silent_at(system, 2_050 * MS, trace=trace, lost_packets=lost)
     assert analyse(system).rows("SELECT * FROM gap WHERE kind = 'pause'") == []
 
 

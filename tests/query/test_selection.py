@@ -270,10 +270,9 @@ def test_totals_add_up(database: Database) -> None:
     assert totals == sorted(totals, reverse=True)
 
 
-@pytest.mark.parametrize(
-    ("at", "share"),
-    few([("median", 50), ("p90", 90), ("p95", 95), ("max", 100)], ("p90", 90)),
-)
+# Quantiles of other flows: tests/flow/test_end_to_end.py.
+@pytest.mark.thorough
+@pytest.mark.parametrize(("at", "share"), [("median", 50), ("p90", 90), ("p95", 95), ("max", 100)])
 def test_the_flow_at_a_quantile(database: Database, at: str, share: int) -> None:
     every = latencies(database, to="/base/motors")[::-1]
     found = rows(database, "critical-path", to="/base/motors", at=at)

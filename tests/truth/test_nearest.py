@@ -67,9 +67,7 @@ def unstamped(
     return get
 
 
-@pytest.mark.parametrize(
-    "change", few(CHANGES, "as_recorded", "publications_missing", "clock_drifts")
-)
+@pytest.mark.parametrize("change", few(CHANGES, "publications_missing", "clock_drifts"))
 @pytest.mark.parametrize(
     "name", few(["tracecompass-ros2", "sync_1_1", "partial_sync", "pingpong"], "sync_1_1")
 )
