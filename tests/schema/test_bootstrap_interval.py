@@ -28,7 +28,10 @@ def con() -> Iterator[duckdb.DuckDBPyConnection]:
 
 
 def ends(
-    con: duckdb.DuckDBPyConnection, block_length: int, widenings: list[float]
+    con: duckdb.DuckDBPyConnection,
+    block_length: int,
+    widenings: list[float],
+    resamples: int = 400,
 ) -> dict[str, list[float]]:
     con.execute(
         "CREATE OR REPLACE TEMP TABLE block AS "
@@ -37,7 +40,8 @@ def ends(
         {"length": block_length, "widenings": widenings},
     )
     found = con.execute(
-        "SELECT statistic, ends FROM derive.bootstrap_interval('measure', 'block', 400, 0.95, 0)"
+        "SELECT statistic, ends "
+        f"FROM derive.bootstrap_interval('measure', 'block', {resamples}, 0.95, 0)"
     )
     return dict(found.fetchall())
 
@@ -57,6 +61,36 @@ def test_intervals_are_as_much_wider_as_blocks_are_few(con: duckdb.DuckDBPyConne
         low, high = drawn[statistic]
         assert low < high
         assert wider[statistic] == pytest.approx([widening * low, widening * high])
+
+
+def test_twenty_resamples_have_to_lie_beyond_the_ends(con: duckdb.DuckDBPyConnection) -> None:
+    assert ends(con, 5, [1, 1, 1, 1], 400)
+    assert not ends(con, 5, [1, 1, 1, 1], 399)
+
+
+@pytest.mark.parametrize(
+    ("number", "block_length", "narrowing", "drawn"),
+    [
+        pytest.param(1_000, 1, 1, 1_000, id="all"),
+        pytest.param(2_000, 1, sqrt(0.5), 1_000, id="no more than a thousand"),
+        pytest.param(2_600, 260, 1, 870, id="ten blocks, of each every third"),
+    ],
+)
+def test_so_many_values_are_drawn(
+    con: duckdb.DuckDBPyConnection, number: int, block_length: int, narrowing: float, drawn: int
+) -> None:
+    """Of values that are 0 or 1, the sum of those drawn is a whole number."""
+    con.execute(
+        "UPDATE measure SET number = $number, mean_ns = list_avg(drawn), series = drawn "
+        "FROM (SELECT list_transform(range($number), lambda i: hash(i) % 2) AS drawn) "
+        "WHERE side = 'a'",
+        {"number": number},
+    )
+    ((mean,),) = con.execute("SELECT mean_ns::DOUBLE FROM measure WHERE side = 'a'").fetchall()
+    # Its ends are those of single resamples.
+    for end in ends(con, block_length, [1, 1, 1, 1], 401)["mean"]:
+        total = drawn * (mean - end / narrowing)
+        assert total == pytest.approx(round(total), abs=1e-6)
 
 
 @pytest.mark.parametrize("number", [500, 2_000])
