@@ -73,5 +73,8 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
         finally:
             timer.cancel()
             connection.close()
+            # It would keep the connection until after the program has ended, which DuckDB's
+            # binding complains of on stderr, amid the line that somebody types.
+            timer.join()
     except (_duckdb.Error, UnicodeError):
         return ()

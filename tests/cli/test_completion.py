@@ -7,12 +7,15 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import duckdb
 import pytest
 from hostile import HOSTILE, renamed
 from thorough import few
+
+from msgflow.db.known_names import known_names
 
 PROGRAM = [sys.executable, "-c", "import sys; sys.argv = ['msgflow']; "
            "from msgflow.__main__ import main; main()"]  # fmt: skip
@@ -168,6 +171,12 @@ def test_a_database_in_use_has_no_names(small_database: Path, tmp_path: Path) ->
     shutil.copyfile(small_database, copy)
     with duckdb.connect(str(copy)):
         assert ask(["query", "info-topics", "--run", "m"], tmp_path, database=copy) == []
+
+
+def test_nothing_keeps_the_database_open(small_database: Path) -> None:
+    """What still has it when Python ends makes DuckDB's binding write to stderr."""
+    assert known_names(small_database, "run", "")
+    assert not [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
 
 
 def test_views_of_a_foreign_file_do_not_run_for_ever(tmp_path: Path) -> None:
