@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import duckdb
@@ -173,10 +174,19 @@ def test_a_database_in_use_has_no_names(small_database: Path, tmp_path: Path) ->
         assert ask(["query", "info-topics", "--run", "m"], tmp_path, database=copy) == []
 
 
-def test_nothing_keeps_the_database_open(small_database: Path) -> None:
+def test_nothing_keeps_the_database_open(
+    small_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What still has it when Python ends makes DuckDB's binding write to stderr."""
+
+    class OnABusyMachine(threading.Timer):
+        def run(self) -> None:
+            super().run()
+            time.sleep(0.2)
+
+    monkeypatch.setattr("msgflow.db.known_names.Timer", OnABusyMachine)
     assert known_names(small_database, "run", "")
-    assert not [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
+    assert not [each for each in threading.enumerate() if isinstance(each, OnABusyMachine)]
 
 
 def test_views_of_a_foreign_file_do_not_run_for_ever(tmp_path: Path) -> None:
