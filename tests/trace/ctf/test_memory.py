@@ -11,16 +11,8 @@ import msgflow.trace
 
 
 def test_longer_trace_takes_no_more(tmp_path: Path) -> None:
-    def peak(name: str, packets: int) -> int:
-        streams = {
-            stream: [
-                Packet([Event(begin + n, "ros2:x", (n,)) for n in range(100)])
-                for begin in range(0, packets * 100, 100)
-            ]
-            for stream in range(2)
-        }
-        content = TraceContent({"ros2:x": {"n": "u64"}}, streams)
-        with msgflow.trace.open([write_trace(tmp_path / name, content)]) as traces:
+    def peak(trace: Path) -> int:
+        with msgflow.trace.open([trace]) as traces:
             tracemalloc.start()
             try:
                 for item in traces.batches(batch_rows=400):
@@ -29,5 +21,18 @@ def test_longer_trace_takes_no_more(tmp_path: Path) -> None:
             finally:
                 tracemalloc.stop()
 
-    peak("warm", 10)
-    assert peak("long", 320) < 1.4 * peak("short", 80)
+    def least(name: str, packets: int) -> int:
+        """On a busy machine, more or less of a trace is read ahead."""
+        streams = {
+            stream: [
+                Packet([Event(begin + n, "ros2:x", (n,)) for n in range(100)])
+                for begin in range(0, packets * 100, 100)
+            ]
+            for stream in range(2)
+        }
+        content = TraceContent({"ros2:x": {"n": "u64"}}, streams)
+        trace = write_trace(tmp_path / name, content)
+        return min(peak(trace) for _ in range(3))
+
+    least("warm", 10)
+    assert least("long", 320) < 1.4 * least("short", 80)
