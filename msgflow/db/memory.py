@@ -61,10 +61,14 @@ class Memory:
                 self._con.execute("SET memory_limit = ?", [self._limit])
 
     @contextlib.contextmanager
-    def threads(self, share: float) -> Iterator[None]:
-        """Let this share of its threads, at least one, do all work of the database."""
+    def threads(self, count: int) -> Iterator[None]:
+        """Let so many threads do all work of the database.
+
+        Args:
+            count: below zero, so many fewer than usual; one is left in any case.
+        """
         ((usual,),) = self._con.execute("SELECT current_setting('threads')").fetchall()
-        self._con.execute(f"SET threads = {max(1, int(usual * share))}")
+        self._con.execute(f"SET threads = {max(1, count if count > 0 else usual + count)}")
         try:
             yield
         finally:

@@ -18,7 +18,9 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Copy what staging has under the name of a store table, inside the open transaction.
 
     Ids in staging are above 0; in the store those of a run come after what is there. Tables without
-    a row are left alone: each statement takes longer than its few rows.
+    a row are left alone: each statement takes longer than its few rows. Which ones have none is
+    known of what was there when the transaction began: staging is filled before it, and one run is
+    stored in it.
     """
     staged = {
         name

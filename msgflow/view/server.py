@@ -108,7 +108,7 @@ class Turns:
         if answer is not None:
             return answer
         # Each thread takes memory of its own.
-        with self._turn(alone=True), self._memory.threads(0):
+        with self._turn(alone=True), self._memory.threads(1):
             try:
                 give_back_freed_memory()
                 steps = chain(_GROWTH, repeat(_GROWTH[-1]))

@@ -26,7 +26,8 @@
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- column: meanwhile_callback_ids BIGINT[]  Callbacks that ran meanwhile, the longest first;
 --     NULL: none
--- column: meanwhile_ns BIGINT[] [ns]  How long each of them did
+-- column: meanwhile_ns BIGINT[] [ns]  How long each of them did, from earliest_ns on (from
+--     latest_ns if that is unknown); those on several threads may lie side by side
 -- needs: derive.callback_ready, derive.executor_waits, derive.executor_meanwhile
 CREATE OR REPLACE MACRO main.executor_wait_explained(runs) AS TABLE
 WITH ready AS MATERIALIZED (

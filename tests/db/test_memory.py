@@ -58,9 +58,9 @@ def test_fewer_threads() -> None:
     with duckdb.connect() as con:
         memory = Memory(con, None)
         con.execute("SET threads = 5")
-        for share, count in ((0.5, 2), (0, 1), (1, 5)):
-            with memory.threads(share):
-                assert threads() == count
+        for count, left in ((1, 1), (2, 2), (-1, 4), (-9, 1)):
+            with memory.threads(count):
+                assert threads() == left
             assert threads() == 5
 
 

@@ -154,6 +154,7 @@ def test_a_new_database_is_the_same_with_and_without_a_cache(
     monkeypatch.undo()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     whole = kept.read_bytes()
+    assert cache.read("database", STORAGE_VERSION) is not None
     for damage in (b"", whole[:-1], whole[:5000] + b"x" + whole[5001:]):
         kept.write_bytes(damage)
         assert cache.read("database", STORAGE_VERSION) is None

@@ -61,7 +61,10 @@ def shown_as(way: str, path: Path, page: Page, **options: Any) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("way", few(["served", "file"], "file"))
-def test_names_are_only_ever_text(way: str, systems: Path, tmp_path: Path, page: Page) -> None:
+def test_names_are_only_ever_text(
+    way: str, systems: Path, tmp_path: Path, page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report_module, "MOST_CRITICAL", 1)
     path = renamed(systems, tmp_path / "hostile.duckdb", HOSTILE)
     ((number,),) = _first_publication(path)
     with shown_as(way, path, page, **({"run": 1} if way == "file" else {})) as address:
