@@ -13,6 +13,7 @@ import duckdb
 import pytest
 import thorough
 from hypothesis import settings
+from ingested import made_once
 
 from msgflow.db.migrate import create
 from msgflow.ingest import ingest
@@ -114,7 +115,6 @@ def small_database(_small_database: Path, tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Ingests a simulated system, once for all tests; `trace` is beside it. Read it only."""
-    from ingested import made_once
 
     def database(system: str, factor: float) -> Path:
         def make(path: Path) -> None:

@@ -57,11 +57,10 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     for table in TABLES.values():
         key = f"{table.name}_id"
         if key in table.columns:
-            bases[key] = 0
-            if table.name not in filled:
-                continue
-            row = con.execute(f"SELECT coalesce(max({key}), 0) FROM {table.full_name}").fetchone()
-            bases[key] = 0 if row is None else int(row[0])
+            row = None
+            if table.name in filled:
+                row = con.execute(f"SELECT max({key}) FROM {table.full_name}").fetchone()
+            bases[key] = 0 if row is None else int(row[0] or 0)
     return bases
 
 

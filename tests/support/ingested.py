@@ -57,11 +57,14 @@ def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:
 
 
 def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
-    """Return the path for which `make` makes a file, once for all workers of a test run."""
+    """Return the path for which `make` makes a file, once for all workers of a test run.
+
+    Where it fails, it fails for all of them.
+    """
     base = factory.getbasetemp()
     directory = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / f"once_{name}"
     path = directory / f"{name}.duckdb"
-    done = directory / "done"
+    done, failed = directory / "done", directory / "failed"
     try:
         directory.mkdir()
     except FileExistsError:
@@ -70,6 +73,10 @@ def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path],
     else:
         try:
             make(path)
+        except BaseException:
+            failed.touch()
+            raise
         finally:
             done.touch()
+    assert not failed.exists(), f"it could not be made — {path}"
     return path
