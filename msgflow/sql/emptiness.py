@@ -33,6 +33,11 @@ _MACRO = re.compile(
 )
 # Of joins whose rows are those of the left side, at most.
 _LEFT = ("LEFT", "ANTI", "SINGLE", "MARK")
+# Macros and list functions of DuckDB that give each row a value, as its scalar functions do.
+_OF_EACH_ROW = (
+    "array_to_string", "list_append", "list_avg", "list_max", "list_min", "list_prepend",
+    "list_sum", "nullif", "range", "unnest",
+)  # fmt: skip
 # What may hold an aggregate, which makes a row of nothing.
 _AGGREGATING = ("select_list", "having", "qualify", "modifiers")
 
@@ -110,7 +115,7 @@ def _scalar_functions(con: duckdb.DuckDBPyConnection) -> frozenset[str]:
         "SELECT function_name FROM duckdb_functions() GROUP BY function_name "
         "HAVING bool_and(internal AND function_type = 'scalar')"
     ).fetchall()
-    return frozenset(name for (name,) in rows) | {"unnest"}
+    return frozenset(name for (name,) in rows) | set(_OF_EACH_ROW)
 
 
 def _all(conditions: list[Condition]) -> Condition:

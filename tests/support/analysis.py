@@ -188,6 +188,8 @@ class Analysis:
             for table in tables & self._tables_of(database, "estimated_size > 0"):
                 con.execute(f"DELETE FROM {database}.{table}")
             con.commit()
+            # Until then, rows that are gone still count, and nothing is known to be empty.
+            con.execute(f"CHECKPOINT {database}")
 
     def _keep(self) -> None:
         """Let what is stored outlast the transaction, for whoever takes the database."""

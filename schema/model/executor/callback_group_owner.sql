@@ -48,7 +48,7 @@ owned AS (
     FROM added AS a
     LEFT JOIN staging.executor_named AS x
         ON a.process_id = x.process_id AND a.executor_addr = x.executor_addr
-    GROUP BY ALL
+    GROUP BY a.event_id, a.process_id, a.callback_group_addr, a.group_type_name
 )
 SELECT
     min(event_id) AS event_id,

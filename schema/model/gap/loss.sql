@@ -1,0 +1,82 @@
+-- name: staging.loss
+-- description: What packets tell of lost ones. A packet counts what was lost since the one before
+--     ended: behind its own last event until it ended, and, since the next packet is opened only
+--     when there is room, between the end of the one before and its begin (only there, if the
+--     packet takes no time); on its CPU only. Lost packets lie between the packets around them, in
+--     whichever chunks of the recording these are; before the first packet of a stream, as its
+--     number tells; and behind the last, where others have later events: stopping flushes a packet
+--     into every stream.
+-- grain: one row per stretch of time in which a stream lost something
+-- needs: staging.stream_packet, staging.source
+WITH lossy_packet AS (
+    SELECT
+        *,
+        lost_packet_count IS NOT DISTINCT FROM 0 AND coalesce(begin_ns > previous_end_ns, false)
+            AS is_opened_late,
+        known_end_ns <= begin_ns AS is_instant
+    FROM staging.stream_packet
+    WHERE discarded_event_count IS DISTINCT FROM 0
+),
+lost_event AS (
+    SELECT
+        trace_id,
+        cpu_id AS cpu,
+        'loss' AS kind,
+        coalesce(last_event_ns, begin_ns) AS start_ns,
+        known_end_ns AS end_ns,
+        discarded_event_count AS event_count
+    FROM lossy_packet
+    WHERE NOT (is_instant AND is_opened_late)
+    UNION ALL
+    -- How many of them were lost before the packet was opened, nobody counted, unless no time was
+    -- left for others.
+    SELECT
+        trace_id, cpu_id, 'loss', previous_end_ns, begin_ns,
+        CASE WHEN is_instant THEN discarded_event_count END
+    FROM lossy_packet
+    WHERE is_opened_late
+),
+lost_packet AS (
+    SELECT
+        trace_id,
+        cpu_id AS cpu,
+        'packets' AS kind,
+        least(coalesce(previous_end_ns, recording_begin_ns), begin_ns) AS start_ns,
+        begin_ns AS end_ns,
+        NULL::BIGINT AS event_count
+    FROM staging.stream_packet
+    WHERE lost_packet_count IS DISTINCT FROM 0
+        AND (previous_end_ns IS NOT NULL OR begin_ns > recording_begin_ns)
+),
+stream_end AS (
+    SELECT
+        recording_index,
+        arg_max(trace_id, begin_ns) AS trace_id,
+        arg_max(cpu_id, begin_ns) AS cpu,
+        max(known_end_ns) AS end_ns
+    FROM staging.stream_packet
+    GROUP BY recording_index, stream_class_id, stream_instance_id
+),
+recording_end AS (
+    SELECT
+        recording_index,
+        max(last_event_ns) AS last_event_ns,
+        max(greatest(known_end_ns, last_event_ns)) AS end_ns
+    FROM staging.stream_packet
+    GROUP BY recording_index
+    HAVING bool_or(end_ns IS NOT NULL)
+),
+missing_end AS (
+    SELECT
+        s.trace_id, s.cpu, 'packets' AS kind, s.end_ns AS start_ns, e.end_ns,
+        NULL::BIGINT AS event_count
+    FROM stream_end AS s
+    JOIN recording_end AS e ON s.recording_index = e.recording_index
+    JOIN staging.source AS t ON s.recording_index = t.trace_index
+    WHERE s.end_ns < e.last_event_ns AND starts_with(t.tracer, 'lttng')
+)
+SELECT trace_id, cpu, kind, start_ns, end_ns, event_count FROM lost_event
+UNION ALL
+SELECT trace_id, cpu, kind, start_ns, end_ns, event_count FROM lost_packet
+UNION ALL
+SELECT trace_id, cpu, kind, start_ns, end_ns, event_count FROM missing_end
