@@ -62,13 +62,15 @@ class Memory:
 
     @contextlib.contextmanager
     def threads(self, count: int) -> Iterator[None]:
-        """Let so many threads do all work of the database.
+        """Let at most so many threads do all work of the database.
 
         Args:
             count: below zero, so many fewer than usual; one is left in any case.
         """
         ((usual,),) = self._con.execute("SELECT current_setting('threads')").fetchall()
-        self._con.execute(f"SET threads = {max(1, count if count > 0 else usual + count)}")
+        self._con.execute(
+            f"SET threads = {max(1, min(usual, count) if count > 0 else usual + count)}"
+        )
         try:
             yield
         finally:

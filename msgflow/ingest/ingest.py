@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -26,15 +25,14 @@ from msgflow.db.runs import require_run_name
 from msgflow.db.spill import most_spilled
 from msgflow.db.store import delete, store
 from msgflow.db.workspace import creating, workspace
-from msgflow.errors import DatabaseError, TraceError, UsageError
+from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import judge, model, staging
 from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
+from msgflow.ingest.names import fallback_name, free_name, hostnames_of, require_free_name
 from msgflow.links import declare_links, read_links
-from msgflow.run.choice import is_run_name
 from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
-from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -43,10 +41,14 @@ if TYPE_CHECKING:
     from msgflow.clocks import ClockSync
     from msgflow.links import LinksFile
     from msgflow.sql.interrupt import Interrupts
-    from msgflow.trace import Progress, TraceInfo
+    from msgflow.trace import Progress
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
 _KEPT_BLOCKS = "96MB"
+
+# As many events as another thread of the database is worth: below, statements take less time to run
+# than to be shared out.
+_EVENTS_PER_THREAD = 500_000
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ def ingest(
         watch.enter("opening the traces")
         with trace_package.open(paths, reader=reader, strict=strict) as traces:
             judge.require_ros_traces(traces.traces)
-            hostnames = _hostnames(traces.traces, hosts or {})
+            hostnames = hostnames_of(traces.traces, hosts or {})
             migrate.require_ingestable(database)
             with (
                 contextlib.nullcontext() if database.exists() else creating(database),
@@ -180,7 +182,7 @@ def ingest(
                 if not target.is_new:
                     attach(con, target.path)
                     if name is not None and not replace:
-                        _require_free_name(con, name)
+                        require_free_name(con, name)
                 staging.attach(con, directory / "raw.duckdb")
                 # Its settings stay open, for more memory, which nothing but our own SQL can reach.
                 shut_in(con, beside=[directory, *([keep_staging] if keep_staging else [])])
@@ -198,25 +200,26 @@ def ingest(
                         progress=watch.reading,
                     )
                 judge.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
-                names = (name, _fallback_name(paths))
-                run = interruptible(
-                    con,
-                    lambda: _write(
+                names = (name, fallback_name(paths))
+                events = sum(loaded.event_counts.values())
+                with memory.threads(1 + events // _EVENTS_PER_THREAD):
+                    run = interruptible(
                         con,
-                        memory,
-                        target,
-                        names,
-                        loaded,
-                        (declared, clocks),
-                        keep_staging,
-                        watch,
-                        interrupts,
-                    ),
-                )
+                        lambda: _write(
+                            con,
+                            memory,
+                            target,
+                            names,
+                            loaded,
+                            (declared, clocks),
+                            keep_staging,
+                            watch,
+                            interrupts,
+                        ),
+                    )
                 watch.enter("closing the database")
                 staging.leave(con)
                 warnings = _finished(con, database, target)
-        events = sum(loaded.event_counts.values())
         return IngestReport(*run, events, watch.finish(), warnings)
 
 
@@ -300,7 +303,7 @@ def _store(
     delete(con, sorted(replaced))
     if replaced:
         con.execute("RESET max_vacuum_tasks")  # their room is used again
-    run_name = name or _free_name(con, fallback)
+    run_name = name or free_name(con, fallback)
     con.execute(
         "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "
         "start_ns, end_ns, event_count) SELECT ?, ?, now() AT TIME ZONE 'UTC', ?, ?, "
@@ -337,72 +340,6 @@ def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
         )
     if name is not None:
         require_run_name(name)
-
-
-def _fallback_name(paths: Sequence[str | Path]) -> str:
-    name = archive.stem(Path(os.path.realpath(paths[0])))
-    return name if is_run_name(name) else f"run-{name}".rstrip("-")
-
-
-def _require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
-    if name in _names(con):
-        raise UsageError(
-            f"the database has a run of that name already — {name}",
-            "give another --name, or --replace",
-        )
-
-
-def _free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
-    taken = _names(con)
-    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
-    return next(candidate for candidate in candidates if candidate not in taken)
-
-
-def _names(con: duckdb.DuckDBPyConnection) -> set[str]:
-    return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
-
-
-def _hostnames(
-    traces: Sequence[TraceInfo], hosts: Mapping[str, str | Path | Sequence[str | Path]]
-) -> dict[int, str]:
-    """Return the name of each trace for which one is given: that of the deepest path above it."""
-    given = _host_paths(hosts)
-    names: dict[int, str] = {}
-    used: set[Path] = set()
-    for trace in traces:
-        above = [path for path in (trace.path, *trace.path.parents) if path in given]
-        if above:
-            names[trace.index] = given[above[0]][0]
-            used.add(above[0])
-    for root, (name, path) in given.items():
-        if root in used:
-            continue
-        if any(root in trace.path.parents for trace in traces):
-            raise UsageError(
-                f"other hosts have all traces below the path given for host {name} — {path}",
-                "leave it out, or leave out one of the deeper paths",
-            )
-        raise TraceError(
-            f"none of the traces lies below the path given for host {name} — {path}",
-            "give --host NAME=PATH with a directory that holds traces of this ingest",
-        )
-    return names
-
-
-def _host_paths(
-    hosts: Mapping[str, str | Path | Sequence[str | Path]],
-) -> dict[Path, tuple[str, str | Path]]:
-    """Return the name that belongs to each path, and the path as it was given."""
-    given: dict[Path, tuple[str, str | Path]] = {}
-    for name, paths in hosts.items():
-        for path in [paths] if isinstance(paths, str | Path) else paths:
-            other, _ = given.setdefault(Path(os.path.realpath(path)), (name, path))
-            if other != name:
-                raise UsageError(
-                    f"two names are given for the host of one path: {other} and {name} — {path}",
-                    "leave out one of the two",
-                )
-    return given
 
 
 @dataclass(frozen=True)

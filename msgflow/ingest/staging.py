@@ -94,12 +94,21 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     # What is staged is of no use after a crash.
     con.execute(f"ATTACH '{_quoted(path)}' AS raw (RECOVERY_MODE no_wal_writes)")
     con.execute("ATTACH ':memory:' AS staging")
-    for statement in statements():
+    for statement in _tables():
         con.execute(statement)
 
 
 def statements() -> tuple[str, ...]:
     """Return what creates all that is staged before the model is built, in `raw` and `staging`."""
+    catalogue = load()
+    return (
+        *_tables(),
+        _event_view(catalogue.of_threads),
+        _predecessor_view(catalogue.of_threads),
+    )
+
+
+def _tables() -> tuple[str, ...]:
     catalogue = load()
     return (
         *(
@@ -116,18 +125,15 @@ def statements() -> tuple[str, ...]:
         _PACKET_READ_ONCE_TABLE,
         _IMPLAUSIBLE_TABLE,
         _DAMAGE_TABLE,
-        _event_view(catalogue.of_threads),
-        _predecessor_view(catalogue.of_threads),
     )
 
 
 def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
-    """Let the views of all events be over fewer tables: these are empty, and take long to plan."""
-    left = [each for each in load().of_threads if f"raw.{each.table}" not in empty]
-    if left:
-        con.execute(_event_view(left))
-    if any(map(_event_predecessors, left)):
-        con.execute(_predecessor_view(left))
+    """Make the views of all events, over tables that are not empty: others take long to plan."""
+    known = load().of_threads
+    left = [each for each in known if f"raw.{each.table}" not in empty]
+    con.execute(_event_view(left or known))
+    con.execute(_predecessor_view([each for each in left if _event_predecessors(each)] or known))
 
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:

@@ -58,7 +58,7 @@ def test_fewer_threads() -> None:
     with duckdb.connect() as con:
         memory = Memory(con, None)
         con.execute("SET threads = 5")
-        for count, left in ((1, 1), (2, 2), (-1, 4), (-9, 1)):
+        for count, left in ((1, 1), (2, 2), (9, 5), (-1, 4), (-9, 1)):
             with memory.threads(count):
                 assert threads() == left
             assert threads() == 5

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 
 import duckdb
@@ -11,6 +10,7 @@ import pytest
 
 from msgflow.errors import UsageError
 from msgflow.ingest import ingest
+from msgflow.ingest.names import fallback_name
 
 
 @pytest.mark.parametrize("name", ["all", "7", "-7", ""])
@@ -24,9 +24,8 @@ def test_a_name_that_means_something_else_is_refused(
 
 def test_a_directory_of_such_a_name_gives_another(tmp_path: Path) -> None:
     # What a run is called where no name is given: the ingest of each would take longer.
-    fallback = sys.modules[ingest.__module__]._fallback_name
     for name in ("all", "20260314"):
-        assert fallback([tmp_path / name]) == f"run-{name}"
+        assert fallback_name([tmp_path / name]) == f"run-{name}"
 
 
 def test_no_path_is_not_the_current_directory(new_database: Path) -> None:

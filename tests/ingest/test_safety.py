@@ -46,7 +46,7 @@ def fail_at(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
 
 FAILURES = {
     "reading": fail_while_reading,
-    "storing": lambda monkeypatch: fail_at(monkeypatch, "_free_name"),
+    "storing": lambda monkeypatch: fail_at(monkeypatch, "free_name"),
     "linking": lambda monkeypatch: fail_at(monkeypatch, "derive"),
 }
 

@@ -62,7 +62,9 @@ QUERIES: dict[str, tuple[str, ...]] = {
     "SELECT (SELECT max(i) FROM b) FROM a": ("a",),
     "SELECT unnest([i, i]) FROM a": ("a",),
     "SELECT i FROM a, unnest([1, 2])": ("a",),
-    "SELECT nullif(i, 0), list_sum([i]), list_min([i]), list_max([i]), list_avg([i]) FROM a": ("a",),
+    "SELECT nullif(i, 0), list_sum([i]), list_min([i]), list_max([i]), list_avg([i]) FROM a": (
+        "a",
+    ),
     "SELECT array_to_string(list_append(list_prepend(i, range(i)), i), '') FROM a": ("a",),
     "SELECT r.i FROM range(3) AS r (i)": (),
     "FROM (VALUES (1)) AS v (i)": (),

@@ -1,0 +1,97 @@
+"""What a run and its hosts are called."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import TraceError, UsageError
+from msgflow.run.choice import is_run_name
+from msgflow.trace import archive
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import duckdb
+
+    from msgflow.trace import TraceInfo
+
+
+def fallback_name(paths: Sequence[str | Path]) -> str:
+    """Return what a run is called for which no name is given: like the first of its paths."""
+    name = archive.stem(Path(os.path.realpath(paths[0])))
+    return name if is_run_name(name) else f"run-{name}".rstrip("-")
+
+
+def require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
+    """Raise a `UsageError` if a run of the database has that name."""
+    if name in _names(con):
+        raise UsageError(
+            f"the database has a run of that name already — {name}",
+            "give another --name, or --replace",
+        )
+
+
+def free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
+    """Return the name, with a number behind it if a run of the database has it."""
+    taken = _names(con)
+    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def _names(con: duckdb.DuckDBPyConnection) -> set[str]:
+    return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
+
+
+def hostnames_of(
+    traces: Sequence[TraceInfo], hosts: Mapping[str, str | Path | Sequence[str | Path]]
+) -> dict[int, str]:
+    """Return the name of each trace for which one is given: that of the deepest path above it.
+
+    Args:
+        traces: the traces.
+        hosts: name of a host -> path or paths; the traces below belong to that host.
+
+    Raises:
+        UsageError: a path has two names, or deeper ones leave it no trace.
+        TraceError: there is no trace below a path.
+    """
+    given = _host_paths(hosts)
+    names: dict[int, str] = {}
+    used: set[Path] = set()
+    for trace in traces:
+        above = [path for path in (trace.path, *trace.path.parents) if path in given]
+        if above:
+            names[trace.index] = given[above[0]][0]
+            used.add(above[0])
+    for root, (name, path) in given.items():
+        if root in used:
+            continue
+        if any(root in trace.path.parents for trace in traces):
+            raise UsageError(
+                f"other hosts have all traces below the path given for host {name} — {path}",
+                "leave it out, or leave out one of the deeper paths",
+            )
+        raise TraceError(
+            f"none of the traces lies below the path given for host {name} — {path}",
+            "give --host NAME=PATH with a directory that holds traces of this ingest",
+        )
+    return names
+
+
+def _host_paths(
+    hosts: Mapping[str, str | Path | Sequence[str | Path]],
+) -> dict[Path, tuple[str, str | Path]]:
+    """Return the name that belongs to each path, and the path as it was given."""
+    given: dict[Path, tuple[str, str | Path]] = {}
+    for name, paths in hosts.items():
+        for path in [paths] if isinstance(paths, str | Path) else paths:
+            other, _ = given.setdefault(Path(os.path.realpath(path)), (name, path))
+            if other != name:
+                raise UsageError(
+                    f"two names are given for the host of one path: {other} and {name} — {path}",
+                    "leave out one of the two",
+                )
+    return given
