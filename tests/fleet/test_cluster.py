@@ -37,7 +37,7 @@ pytest.importorskip("ray", reason="ray is not installed")
 pytest.importorskip("moto.moto_server", reason="moto[server] is not installed")
 
 LAKE = "s3://fleet/lake"
-GOOD = 3
+GOOD = 2
 SOURCES = ("s3://fleet/night/*",)
 
 
