@@ -23,12 +23,11 @@ MACROS = [
     if header.params and header.params[0].name == "only_run"
 ]
 FILLED = {
-    "derive.annotated_input",
     "derive.annotated_publication",
     "derive.annotated_run",
     "derive.link_causal",
     "derive.link_causal_direct",
-    "derive.link_causal_periodic_async",
+    "derive.link_causal_indirect",
 }
 
 
@@ -46,10 +45,7 @@ def test_of_another_run_there_is_nothing(declared: Path) -> None:
     con = connect(declared, read_only=True)
     counts = {
         header.name: tuple(
-            con.execute(
-                f"SELECT count(*) FROM {header.name}({', '.join('?' for _ in header.params)})",
-                [run, "periodic_async"][: len(header.params)],
-            ).fetchall()[0][0]
+            con.execute(f"SELECT count(*) FROM {header.name}(?)", [run]).fetchall()[0][0]
             for run in (1, 2)
         )
         for header in MACROS

@@ -6,21 +6,9 @@
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
 -- needs: derive.link_causal_direct, derive.link_causal_take_adjacent,
---     derive.link_causal_periodic_async, derive.link_causal_partial_sync,
---     store.callback_instance, store.take, store.publication
+--     derive.link_causal_indirect, store.callback_instance, store.take, store.publication
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
-WITH indirect AS (
-    SELECT
-        run_id, callback_instance_id, publication_id, 'periodic_async' AS kind, annotation_id,
-        candidate_count, is_loss_affected
-    FROM derive.link_causal_periodic_async(only_run)
-    UNION ALL
-    SELECT
-        run_id, callback_instance_id, publication_id, 'partial_sync', annotation_id,
-        candidate_count, is_loss_affected
-    FROM derive.link_causal_partial_sync(only_run)
-),
-link AS (
+WITH link AS (
     SELECT
         run_id, callback_instance_id, take_id, publication_id, publisher_id, 'direct' AS kind,
         NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, is_loss_affected
@@ -38,7 +26,7 @@ link AS (
         x.run_id, x.callback_instance_id, i.take_id, x.publication_id, b.publisher_id, x.kind,
         x.annotation_id, x.candidate_count,
         x.is_loss_affected OR i.is_loss_affected OR b.is_loss_affected
-    FROM indirect AS x
+    FROM derive.link_causal_indirect(only_run) AS x
     JOIN store.callback_instance AS i ON x.callback_instance_id = i.callback_instance_id
     JOIN store.publication AS b ON x.publication_id = b.publication_id
     WHERE i.run_id = only_run AND b.run_id = only_run

@@ -1,38 +1,41 @@
--- name: derive.annotated_input
+-- name: derive.link_causal_indirect
 -- kind: macro
--- description: The message that each cache held when an output of an annotation was published:
---     the latest instance of the input's callback (by effective end) that ended at or before the
---     cut, or nested inside the publishing instance and before the publication. The input whose
---     own instance publishes is none of these. The trace does not show when a node reads its
---     caches. So other instances are candidates, too: those that began before the publication,
---     and ended after the instance in the cache at the cut began. A firing needs a message of
---     every input: if there was none at the cut, the last of the candidates counts, and "no
---     message" is one more candidate. Nothing is linked across a gap in the record of either
---     thread.
+-- description: Messages that were kept until another callback published, as annotations tell.
+--     `periodic_async`: a publication uses the latest message of each input, whatever was used
+--     before; the caches are never emptied. `partial_sync`: publications need a message of every
+--     input, and use each once. The firing's own message is a direct link; of every other input the
+--     latest counts that came after the caches were last emptied and did not fire itself.
+--     What a cache held when an output was published is the latest instance of the input's callback
+--     (by effective end) that ended at or before the cut, or nested inside the publishing instance
+--     and before the publication. The input whose own instance publishes is none of these. The
+--     trace does not show when a node reads its caches. So other instances are candidates, too:
+--     those that began before the publication, and ended after the instance in the cache at the cut
+--     began. A firing needs a message of every input: if there was none at the cut, the last of the
+--     candidates counts, and "no message" is one more candidate. Nothing is linked across a gap in
+--     the record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
--- param: wanted_kind VARCHAR  Kind of the annotations
 -- needs: derive.annotated_publication, derive.annotated_run, derive.partial_sync_firing,
 --     store.annotation, store.annotation_input, store.callback_instance, store.thread_break,
 --     derive.exposed_trace, derive.recording_gap
-CREATE OR REPLACE MACRO derive.annotated_input(only_run, wanted_kind) AS TABLE
+CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
 WITH nesting AS (
     SELECT DISTINCT parent_id
     FROM store.callback_instance
     WHERE run_id = only_run AND parent_id IS NOT NULL
 ),
--- No rows for periodic_async: its caches are never emptied.
+-- None are periodic_async: its caches are never emptied.
 firing AS MATERIALIZED (
     SELECT annotation_id, callback_instance_id, first_event_id, emptied_event_id, kept_event_id
     FROM derive.partial_sync_firing(only_run)
-    WHERE wanted_kind = 'partial_sync'
 ),
 -- All publications of a firing use the same messages, except for those that come meanwhile, in
 -- callback instances nested in the firing.
 demand AS MATERIALIZED (
     SELECT
-        b.run_id, b.annotation_id, b.publication_id, b.callback_instance_id AS publishing_id,
-        b.trace_id, b.thread_id, b.start_ns, b.start_event_id, b.cut_event_id,
+        b.run_id, b.annotation_id, b.kind, b.publication_id,
+        b.callback_instance_id AS publishing_id, b.trace_id, b.thread_id, b.start_ns,
+        b.start_event_id, b.cut_event_id,
         i.subscription_id,
         CASE
             WHEN n.parent_id IS NULL THEN coalesce(f.first_event_id, b.start_event_id)
@@ -45,8 +48,8 @@ demand AS MATERIALIZED (
     LEFT JOIN firing AS f
         ON b.annotation_id = f.annotation_id AND b.callback_instance_id = f.callback_instance_id
     LEFT JOIN nesting AS n ON b.callback_instance_id = n.parent_id
-    WHERE b.kind = wanted_kind AND b.subscription_id IS DISTINCT FROM i.subscription_id
-        AND (wanted_kind = 'periodic_async' OR f.annotation_id IS NOT NULL)
+    WHERE b.subscription_id IS DISTINCT FROM i.subscription_id
+        AND (b.kind = 'periodic_async' OR f.annotation_id IS NOT NULL)
 ),
 -- A callback instance that fires is no candidate: its own firing used its message.
 run AS MATERIALIZED (
@@ -58,7 +61,7 @@ run AS MATERIALIZED (
     JOIN derive.annotated_run(only_run) AS r ON i.subscription_id = r.subscription_id
     ANTI JOIN firing AS f
         ON a.annotation_id = f.annotation_id AND r.callback_instance_id = f.callback_instance_id
-    WHERE a.run_id = only_run AND a.kind = wanted_kind
+    WHERE a.run_id = only_run
 ),
 -- Instances that end at the same moment (at a gap) count once: the last to begin stands for all.
 ended AS (
@@ -201,12 +204,12 @@ counted AS (
 ),
 cached AS (
     SELECT
-        d.run_id, d.annotation_id, d.publication_id, d.publishing_id, d.subscription_id,
-        d.trace_id, d.thread_id, d.start_ns, d.start_event_id,
+        d.run_id, d.annotation_id, d.kind, d.publication_id, d.trace_id, d.thread_id, d.start_ns,
+        d.start_event_id,
         coalesce(
             n.callback_instance_id,
             d.callback_instance_id,
-            CASE WHEN wanted_kind = 'partial_sync' THEN p.callback_instance_id END
+            CASE WHEN d.kind = 'partial_sync' THEN p.callback_instance_id END
         ) AS callback_instance_id,
         coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT AS candidate_count
     FROM there AS d
@@ -221,9 +224,8 @@ cached AS (
 ),
 found AS MATERIALIZED (
     SELECT
-        c.run_id, c.annotation_id, c.publication_id, c.publishing_id, c.subscription_id,
-        c.callback_instance_id, c.candidate_count,
-        c.trace_id, c.thread_id, c.start_ns, c.start_event_id,
+        c.run_id, c.annotation_id, c.kind, c.publication_id, c.callback_instance_id,
+        c.candidate_count, c.trace_id, c.thread_id, c.start_ns, c.start_event_id,
         i.trace_id AS input_trace_id,
         i.thread_id AS input_thread_id,
         i.start_ns AS input_start_ns,
@@ -273,11 +275,10 @@ crossing AS (
 )
 SELECT
     f.run_id,
-    f.annotation_id,
-    f.publication_id,
-    f.publishing_id,
-    f.subscription_id,
     f.callback_instance_id,
+    f.publication_id,
+    f.kind,
+    f.annotation_id,
     f.candidate_count::BIGINT AS candidate_count,
     x.publication_id IS NOT NULL AS is_loss_affected
 FROM found AS f

@@ -125,10 +125,8 @@ def test_links_are_those_of_the_definition(fresh_database: Path) -> None:
                 [[None if x is None else str(x) for x in row.values()] for row in content],
             )
         found = con.execute(
-            "SELECT callback_instance_id, publication_id, kind, candidate_count FROM ("
-            "SELECT *, 'periodic_async' AS kind FROM derive.link_causal_periodic_async(1) "
-            "UNION ALL SELECT *, 'partial_sync' FROM derive.link_causal_partial_sync(1)) "
-            "ORDER BY ALL"
+            "SELECT callback_instance_id, publication_id, kind, candidate_count "
+            "FROM derive.link_causal_indirect(1) ORDER BY ALL"
         ).fetchall()
     assert found == expected
     counts = {(kind, min(count, 4)) for _, _, kind, count in expected}
