@@ -91,6 +91,6 @@ UNION ALL
 SELECT
     CASE type WHEN 'service' THEN 'link_response' ELSE type END, 'callback_instance', cb,
     CASE type WHEN 'service' THEN 'response_sent' ELSE 'publication' END, "out", is_seen,
-    CASE type WHEN 'service' THEN 'derive.link_response' ELSE 'derive.link_causal_' || type END
+    CASE type WHEN 'service' THEN 'derive.link_response' ELSE 'derive.link_causal_indirect' END
 FROM link
 WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL;

@@ -390,7 +390,7 @@ SELECT
             WHERE callback_instance_id IS NOT NULL
         )
     ),
-    'derive.link_causal_' || c.kind
+    CASE c.kind WHEN 'direct' THEN 'derive.link_causal_direct' ELSE 'derive.link_causal_indirect' END
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
 LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
@@ -402,7 +402,7 @@ SELECT
     t.is_whole AND p.is_whole AND (c.take_id, c.publication_id) NOT IN (
         SELECT (take_id, publication_id) FROM doubtful_cause WHERE callback_instance_id IS NULL
     ),
-    'derive.link_causal_' || c.kind
+    CASE c.kind WHEN 'direct' THEN 'derive.link_causal_direct' ELSE 'derive.link_causal_indirect' END
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
 JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id

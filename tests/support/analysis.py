@@ -133,6 +133,7 @@ class Analysis:
             else:
                 if header.name in self._kept:
                     self._connection.execute(f"DROP TABLE {header.name}")
+                    self._kept.discard(header.name)
                 self._growing.add(header)
             self._built.add(header.name)
         self._connection.begin()

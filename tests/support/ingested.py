@@ -15,6 +15,10 @@ import pytest
 from msgflow.ingest import ingest
 
 
+# The longest takes ten.
+_SECONDS_TO_MAKE = 300
+
+
 @dataclass(frozen=True)
 class Ingested:
     """A database with one run, open for reading."""
@@ -59,7 +63,7 @@ def contents(path: Path) -> dict[str, list[tuple[Any, ...]]]:
 def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
     """Return the path for which `make` makes a file, once for all workers of a test run.
 
-    Where it fails, it fails for all of them.
+    Where it fails, or takes too long, it fails for all of them.
     """
     base = factory.getbasetemp()
     directory = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / f"once_{name}"
@@ -68,7 +72,9 @@ def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path],
     try:
         directory.mkdir()
     except FileExistsError:
+        end = time.monotonic() + _SECONDS_TO_MAKE
         while not done.exists():
+            assert time.monotonic() < end, f"who makes it takes too long, or was killed — {path}"
             time.sleep(0.1)
     else:
         try:
