@@ -14,7 +14,6 @@ import pytest
 
 from msgflow.ingest import ingest
 
-
 # The longest takes ten.
 _SECONDS_TO_MAKE = 300
 
