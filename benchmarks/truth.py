@@ -9,8 +9,7 @@ recorded systems in ../shared/traces are compared likewise where that folder exi
 
 For each kind of link: how many there were, how many of these the trace decides, how many rows were
 found, wrong ones, and decided ones that are missing. Precision is the share of the rows that are
-true, recall the share of the decided links that were found; both must be 1.000. Links that this
-version of msgflow has no rule for are counted apart.
+true, recall the share of the decided links that were found; both must be 1.000.
 
 Then, for each message that a subscription did not take, the true reason beside the one given, and
 where the trace does not decide it why not. The exit code is 1 if a figure that must be 1.000 is
@@ -261,8 +260,7 @@ def show(judged: list[Judged]) -> list[Judged]:
     for one in judged:
         score = one.score
         mark = " " if one.is_good else "✗"
-        notes = f"  ({score.not_built} not built)" if score.not_built else ""
-        notes += f"  ({score.misguessed} misguessed)" if score.misguessed else ""
+        notes = f"  ({score.misguessed} misguessed)" if score.misguessed else ""
         notes += f"  ({score.repeated} repeated)" if score.repeated else ""
         notes += f"  ({score.doubted} doubted)" if score.doubted else ""
         print(

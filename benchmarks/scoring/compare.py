@@ -32,7 +32,6 @@ class Score:
             of the pairs of a message and a subscription, reasons excused for want of events.
         happened: true ones.
         decided: those of them that the trace decides, which must be found.
-        not_built: likewise, but this version of msgflow has no rule for them.
         found: rows.
         wrong: rows that are not true.
         misguessed: likewise, of rows that say to be one of several possible ones.
@@ -47,7 +46,6 @@ class Score:
     kind: str
     happened: int
     decided: int
-    not_built: int
     found: int
     wrong: int
     misguessed: int
@@ -125,18 +123,12 @@ def _excused(connection: duckdb.DuckDBPyConnection, excused: int) -> Score:
     wrong = max(excused - allowed, 0)
     precision = 1 - wrong / excused if excused else 1.0
     return Score(
-        "excused", pairs or 0, 0, 0, excused, wrong, 0, 0, 0, 0, precision, 1.0,
+        "excused", pairs or 0, 0, excused, wrong, 0, 0, 0, 0, precision, 1.0,
         f"at most {allowed}",
     )  # fmt: skip
 
 
 def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
-    connection.execute(
-        "CREATE TEMP TABLE built AS SELECT schema_name || '.' || view_name AS name "
-        "FROM duckdb_views() WHERE database_name = 'analysed' AND schema_name = 'derive' "
-        "UNION SELECT schema_name || '.' || function_name FROM duckdb_functions() "
-        "WHERE database_name = 'analysed' AND schema_name = 'derive'"
-    )
     steps = ("holes", source) if source == "simulated" else (source,)
     for name in (*steps, "found", "score"):
         connection.execute((_SQL / f"{name}.sql").read_text())

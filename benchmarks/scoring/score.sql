@@ -73,13 +73,11 @@ expected AS (
     SELECT
         l.kind,
         count(*) AS happened,
-        count(*) FILTER (l.is_decided AND b.name IS NOT NULL) AS decided,
-        count(*) FILTER (l.is_decided AND b.name IS NULL) AS not_built,
-        count(*) FILTER (l.is_decided AND b.name IS NOT NULL AND v.from_id IS NULL) AS missing,
+        count(*) FILTER (l.is_decided) AS decided,
+        count(*) FILTER (l.is_decided AND v.from_id IS NULL) AS missing,
         -- Runs are marked where anything of the host is missing meanwhile.
         count(*) FILTER (l.is_decided AND v.is_guess AND l.kind <> 'callback_run') AS doubted
     FROM truth_link AS l
-    LEFT JOIN built AS b ON l.needs = b.name
     LEFT JOIN hit AS v
         ON l.kind = v.kind AND l.from_id = v.from_id AND l.to_id = v.to_id
     GROUP BY l.kind
@@ -88,7 +86,6 @@ SELECT
     coalesce(e.kind, f.kind) AS kind,
     coalesce(e.happened, 0) AS happened,
     coalesce(e.decided, 0) AS decided,
-    coalesce(e.not_built, 0) AS not_built,
     coalesce(f.found, 0) AS found,
     coalesce(f.wrong, 0) AS wrong,
     coalesce(f.misguessed, 0) AS misguessed,
