@@ -65,32 +65,25 @@ link AS (
 )
 SELECT
     'transport' AS kind, 'publication' AS from_kind, p.id AS from_id, 'take' AS to_kind,
-    k.id AS to_id, p.seen = 1 AND k.seen = 1 AS is_decided,
-    CASE m.flavour
-        WHEN 'humble' THEN 'derive.link_transport_nearest' ELSE 'derive.link_transport_exact'
-    END AS needs
+    k.id AS to_id, p.seen = 1 AND k.seen = 1 AS is_decided
 FROM take AS k
-CROSS JOIN (SELECT flavour FROM recorded WHERE t = 'meta') AS m
 JOIN pub AS p ON k.msg = p.id
 WHERE k.kind IN ('topic', 'intra')
 UNION ALL
 SELECT
-    k.kind, k.kind || '_sent', p.id, k.kind || '_taken', k.id, p.seen = 1 AND k.seen = 1,
-    'derive.' || k.kind
+    k.kind, k.kind || '_sent', p.id, k.kind || '_taken', k.id, p.seen = 1 AND k.seen = 1
 FROM take AS k
 JOIN pub AS p ON k.msg = p.id
 WHERE k.kind IN ('request', 'response')
 UNION ALL
 SELECT
     CASE kind WHEN 'request' THEN 'link_request' ELSE 'direct' END, 'callback_instance', cb,
-    CASE kind WHEN 'request' THEN 'request_sent' ELSE 'publication' END, id, seen = 1,
-    CASE kind WHEN 'request' THEN 'derive.link_request' ELSE 'derive.link_causal_direct' END
+    CASE kind WHEN 'request' THEN 'request_sent' ELSE 'publication' END, id, seen = 1
 FROM pub
 WHERE cb IS NOT NULL AND kind <> 'response'
 UNION ALL
 SELECT
     CASE type WHEN 'service' THEN 'link_response' ELSE type END, 'callback_instance', cb,
-    CASE type WHEN 'service' THEN 'response_sent' ELSE 'publication' END, "out", is_seen,
-    CASE type WHEN 'service' THEN 'derive.link_response' ELSE 'derive.link_causal_indirect' END
+    CASE type WHEN 'service' THEN 'response_sent' ELSE 'publication' END, "out", is_seen
 FROM link
 WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL;

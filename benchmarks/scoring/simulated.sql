@@ -326,21 +326,21 @@ untold_process AS (
 )
 SELECT
     'publication' AS kind, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id,
-    is_any AS is_decided, 'derive.link_transport' AS needs
+    is_any AS is_decided, NULL::VARCHAR AS needs
 FROM recorded
 WHERE kind = 'publication'
 UNION ALL
-SELECT 'take', kind, id, kind, id, is_rmw_take OR is_dequeue, 'derive.link_transport'
+SELECT 'take', kind, id, kind, id, is_rmw_take OR is_dequeue, NULL
 FROM recorded
 WHERE kind = 'take'
 UNION ALL
-SELECT 'callback_instance', kind, id, kind, id, is_start, 'derive.link_transport'
+SELECT 'callback_instance', kind, id, kind, id, is_start, NULL
 FROM recorded
 WHERE kind = 'callback_instance'
 UNION ALL
 SELECT
     'callback_run', 'callback_instance', c.callback_instance_id::VARCHAR, 'callback_end',
-    c.callback_instance_id::VARCHAR, w.id IS NOT NULL, 'derive.link_transport'
+    c.callback_instance_id::VARCHAR, w.id IS NOT NULL, NULL
 FROM simulated_callback_instance AS c
 LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
 WHERE c.end_ns IS NOT NULL
@@ -349,13 +349,13 @@ SELECT
     'kind', 'callback_instance', c.callback_instance_id::VARCHAR, 'is_' || c.kind,
     c.callback_instance_id::VARCHAR,
     r.is_start AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM unknown_process),
-    'derive.link_transport'
+    NULL
 FROM simulated_callback_instance AS c
 JOIN recorded AS r ON r.kind = 'callback_instance' AND c.callback_instance_id::VARCHAR = r.id
 UNION ALL
 SELECT
     'called_with', 'take', t.take_id::VARCHAR, 'callback_instance',
-    c.callback_instance_id::VARCHAR, w.id IS NOT NULL AND t.is_whole, 'derive.link_transport'
+    c.callback_instance_id::VARCHAR, w.id IS NOT NULL AND t.is_whole, NULL
 FROM simulated_callback_instance AS c
 JOIN (SELECT id AS take_id, is_whole FROM recorded WHERE kind = 'take') AS t
     ON c.take_id::VARCHAR = t.take_id
@@ -364,7 +364,7 @@ UNION ALL
 -- Those that end; whether they must be found is not judged.
 SELECT
     'executor_state', 'state_start', concat_ws('/', host, pid, tid, start_ns), 'state_end',
-    concat_ws('/', host, pid, tid, start_ns), false, 'derive.link_transport'
+    concat_ws('/', host, pid, tid, start_ns), false, NULL
 FROM simulated_executor_state
 WHERE end_ns IS NOT NULL
 UNION ALL
@@ -390,7 +390,7 @@ SELECT
             WHERE callback_instance_id IS NOT NULL
         )
     ),
-    CASE c.kind WHEN 'direct' THEN 'derive.link_causal_direct' ELSE 'derive.link_causal_indirect' END
+    NULL
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
 LEFT JOIN whole_callback AS w ON c.callback_instance_id::VARCHAR = w.id
@@ -402,7 +402,7 @@ SELECT
     t.is_whole AND p.is_whole AND (c.take_id, c.publication_id) NOT IN (
         SELECT (take_id, publication_id) FROM doubtful_cause WHERE callback_instance_id IS NULL
     ),
-    CASE c.kind WHEN 'direct' THEN 'derive.link_causal_direct' ELSE 'derive.link_causal_indirect' END
+    NULL
 FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
 JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id
@@ -410,7 +410,7 @@ WHERE c.callback_instance_id IS NULL
 UNION ALL
 SELECT
     split_part(s.kind, '_', 1), s.kind, s.id, t.kind, t.id, s.is_any AND t.is_any,
-    'derive.' || split_part(s.kind, '_', 1)
+    NULL
 FROM recorded AS s
 JOIN recorded AS t
     ON s.kind IN ('request_sent', 'response_sent') AND t.kind = replace(s.kind, 'sent', 'taken')
@@ -418,7 +418,7 @@ JOIN recorded AS t
 UNION ALL
 SELECT
     'link_request', 'callback_instance', q.sender_callback_instance_id::VARCHAR, 'request_sent',
-    s.id, s.is_any AND w.id IS NOT NULL, 'derive.link_request'
+    s.id, s.is_any AND w.id IS NOT NULL, NULL
 FROM simulated_request AS q
 JOIN recorded AS s ON s.kind = 'request_sent' AND q.request_id::VARCHAR = s.id
 LEFT JOIN whole_callback AS w ON q.sender_callback_instance_id::VARCHAR = w.id
@@ -426,7 +426,7 @@ WHERE q.sender_callback_instance_id IS NOT NULL
 UNION ALL
 SELECT
     'link_response', 'callback_instance', q.callback_instance_id::VARCHAR, 'response_sent', s.id,
-    s.is_any AND t.is_any AND w.id IS NOT NULL, 'derive.link_response'
+    s.is_any AND t.is_any AND w.id IS NOT NULL, NULL
 FROM simulated_request AS q
 JOIN recorded AS s ON s.kind = 'response_sent' AND q.request_id::VARCHAR = s.id
 JOIN recorded AS t ON t.kind = 'request_taken' AND q.request_id::VARCHAR = t.id

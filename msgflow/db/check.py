@@ -61,29 +61,28 @@ def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[Chec
 
 def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
     relations = {
-        table.name: found
+        table.name: [
+            (column.name, column.references)
+            for column in table.columns.values()
+            if column.references not in (None, f"{table.name}.{column.name}")
+        ]
         for table in TABLES.values()
-        if (
-            found := [
-                (column.name, column.references)
-                for column in table.columns.values()
-                if column.references not in (None, f"{table.name}.{column.name}")
-            ]
-        )
     }
     blocks = _blocks(con, {reference for each in relations.values() for _, reference in each})
     of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
+    selects = [
+        f"SELECT '{table}', ["
+        + ", ".join(_broken(column, reference, blocks[reference]) for column, reference in each)
+        + f"] FROM {SCHEMA}.{table} AS child{of_run}"
+        for table, each in relations.items()
+        if each
+    ]
     # One statement: each takes longer to plan than its few rows to count.
-    counted = con.execute(
-        " UNION ALL ".join(
-            f"SELECT '{table}', [{counts}] FROM {SCHEMA}.{table} AS child{of_run}"
-            for table, references in relations.items()
-            for counts in [", ".join(_broken(*each, blocks[each[1]]) for each in references)]
-        )
-    ).fetchall()
-    row_counts = dict(counted)
+    row_counts = dict(con.execute(" UNION ALL ".join(selects)).fetchall())
     for table, references in relations.items():
-        for (column, reference), row_count in zip(references, row_counts[table], strict=True):
+        for (column, reference), row_count in zip(
+            references, row_counts.get(table, []), strict=True
+        ):
             yield CheckResult(
                 f"relation.{table}.{column}",
                 RELATION_SEVERITY,

@@ -2,9 +2,9 @@
 -- description: Silences in which nothing was recorded: tracing had been stopped. It was so where it
 --     can be nothing else: packets of one trace ended before they were full, not at equal
 --     distances, and no snapshot is recorded, whose buffers keep what earlier ones did to them.
---     Else it was one if at least a millisecond passed, and the recording is nowhere else silent
---     for as long, within four times that or a second before and after. Nor is it one where the
---     numbers of all streams skip packets meanwhile: those are lost.
+--     Else it was one if the recording is nowhere else silent for as long, within four times that
+--     or a second before and after. Nor is it one where the numbers of all streams skip packets
+--     meanwhile: those are lost.
 -- grain: one row per pause of a recording
 -- needs: staging.silence, staging.stream_packet, staging.recording, staging.source, staging.event,
 --     staging.pause_limit
