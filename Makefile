@@ -9,6 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := .demo
 HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()' 2>/dev/null
+HAS_CHROMIUM := { command -v chromium-headless-shell || command -v chromium; } >/dev/null 2>&1
 
 # Shell function: apt_install PACKAGE...; fails where apt is missing or not allowed.
 APT := apt_install() { \
@@ -51,7 +52,10 @@ test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n auto --dist worksteal $(SELECTED)
+	@# Statements that show the values of a failed assert take each worker ten seconds to compile:
+	@# what failed runs once more with them, and has failed all the same.
+	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(SELECTED) \
+		|| { $(BIN)/pytest --last-failed --last-failed-no-failures none $(SELECTED); exit 1; }
 
 bench: $(VENV)/.installed babeltrace
 	$(BIN)/python benchmarks/run.py
@@ -93,8 +97,9 @@ babeltrace:
 	@$(HAS_BT2) || echo "note: no bt2: the tests that compare with Babeltrace 2 are skipped" >&2
 
 chromium:
-	@$(APT); command -v chromium >/dev/null || apt_install chromium || true
-	@command -v chromium >/dev/null \
+	@$(HAS_CHROMIUM) || { $(APT); \
+		apt_install chromium-headless-shell || apt_install chromium || true; }
+	@$(HAS_CHROMIUM) \
 		|| echo "note: no chromium: the tests that look at pages are skipped" >&2
 
 compiler:

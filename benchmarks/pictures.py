@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult, urlsplit
 
+from browser import ARGUMENTS, find_browser
 from playwright.sync_api import sync_playwright
 
 from msgflow.database import open_db
@@ -40,7 +41,6 @@ EVENTS_PER_FACTOR = 66_000
 BARS_PER_EVENT = 0.636
 # Each page is opened so often; first paint is the median.
 TIMES = 3
-ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 
 
 def made(directory: Path, events: float) -> Path:
@@ -59,9 +59,8 @@ def look(address: str, database: Path) -> tuple[int, float, list[float]]:
     Nothing may go wrong on the page meanwhile, nothing be fetched from elsewhere, and what lights
     up when a message is picked is what `flow_both` returns.
     """
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=find_browser(), args=ARGUMENTS)
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         wrong: list[str] = []
         page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)

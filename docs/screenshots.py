@@ -8,7 +8,6 @@ A test takes them anew and looks whether something is on them.
 
 from __future__ import annotations
 
-import shutil
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -21,8 +20,10 @@ from msgflow.database import Database, open_db
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from browser import ARGUMENTS, find_browser
+
 IMAGES = Path(__file__).parent / "images"
-ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
 EXECUTORS_ALONE = "hide=kind:timer,kind:subscription,kind:service,kind:client,kind:publisher"
 # The callback of a map in rviz, some seconds after the begin.
 _MAP = """
@@ -108,11 +109,10 @@ def written(opened: Database, picture: Picture, target: Path) -> str:
 def taken(target: Path, names: list[str]) -> list[Path]:
     """Simulate the systems, look at the pages of each, keep what was seen; return the files."""
     target.mkdir(parents=True, exist_ok=True)
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
     files = []
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         directory = Path(name)
-        browser = playwright.chromium.launch(executable_path=program, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=find_browser(), args=ARGUMENTS)
         for picture in PICTURES:
             if names and picture.name not in names:
                 continue

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.tables import SCHEMA, TABLES
+from msgflow.sql.parsed import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,14 +50,11 @@ def run_checks(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> lis
 
 
 def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
-    of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
+    of_run, values = ("", []) if run_id is None else (" WHERE run_id = ?", [run_id])
     for header in objects.load("health/check"):
-        yield CheckResult(
-            header.name,
-            header.severity or "error",
-            _count(con, f"SELECT count(*) FROM ({header.body}){of_run}"),
-            header.description,
-        )
+        statement = parsed(con, f"SELECT count(*) FROM ({header.body}){of_run}")
+        ((row_count,),) = con.execute(statement, values).fetchall()
+        yield CheckResult(header.name, header.severity or "error", row_count, header.description)
 
 
 def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
@@ -119,7 +117,3 @@ def _broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
         return f"count(*) FILTER (child.{column} < {block[0]} OR child.{column} > {block[1]})"
     table, _, key = reference.partition(".")
     return f"count(*) FILTER (child.{column} NOT IN (SELECT {key} FROM {SCHEMA}.{table}))"
-
-
-def _count(con: duckdb.DuckDBPyConnection, query: str) -> int:
-    return int(con.execute(query).fetchall()[0][0])

@@ -15,6 +15,7 @@ from msgflow.ingest.catalogue import load
 from msgflow.ingest.outline import creating, empty_tables
 from msgflow.ingest.reported import restore
 from msgflow.sql.emptiness import NEVER
+from msgflow.sql.parsed import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -84,7 +85,7 @@ class Growing:
     def add(self, header: Header) -> None:
         """Create an object of the model, after all that it needs."""
         if header.kind != "view":
-            self._con.execute(creating(header))
+            self._con.execute(parsed(self._con, creating(header)))
             return
         if header.name == STAGED and not self.is_empty(STAGED):
             header = staged([each for each in of_model() if not self.is_empty(each.name)])
@@ -92,7 +93,7 @@ class Growing:
             self._con.execute(f"CREATE TABLE {header.name} AS {empty_tables()[header.name]}")
             self.empty.add(header.name)
             return
-        ((count,),) = self._con.execute(creating(header)).fetchall()
+        ((count,),) = self._con.execute(parsed(self._con, creating(header))).fetchall()
         if not count:
             self.empty.add(header.name)
 

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 _SLACK_NS = 100_000
 
 # Tables that are made of each other, in this order, and gone in the end.
-_TABLES = ("session_trace", "told_namespace", "coverage", "overlap")
+_TABLES = ("session_trace", "told_namespace")
+_TABLES_OF_OVERLAP = ("coverage", "overlap")
 
 
 @dataclass(frozen=True)
@@ -83,28 +84,40 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
     """
     for table in _TABLES:
         _make(con, table)
-    left_out = np.empty(0, np.int64)
-    if con.execute("SELECT 1 FROM overlap LIMIT 1").fetchall():
-        con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
-        _make(con, "left_out")
-        con.execute("DROP VIEW thread_event")
-        con.execute("INSERT INTO staging.left_out\n" + statements().header("left_out_between").body)
-        left_out = con.execute("SELECT event_id FROM left_out ORDER BY ALL").fetchnumpy()[
-            "event_id"
-        ]
-        con.execute("DROP TABLE left_out")
     told = con.execute("SELECT host, vpid, pid_ns FROM told_namespace").fetchnumpy()
-    hosts = con.execute("SELECT host FROM session_trace ORDER BY trace_index").fetchnumpy()["host"]
+    traces = con.execute(
+        "SELECT host, session FROM session_trace ORDER BY trace_index"
+    ).fetchnumpy()
+    # What is in the record twice, two sessions have recorded.
+    left_out = _left_out(con) if np.unique(traces["session"]).size > 1 else np.empty(0, np.int64)
     for table in _TABLES:
         con.execute(f"DROP TABLE {table}")
     processes = _process(told["host"], told["vpid"])
     order = np.argsort(processes)
     return Corrections(
-        np.asarray(left_out),
+        left_out,
         processes[order],
         np.asarray(told["pid_ns"], np.int64)[order],
-        np.asarray(hosts, np.int64),
+        np.asarray(traces["host"], np.int64),
     )
+
+
+def _left_out(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
+    """Return the ids of events that another trace holds as well, in order, and say where."""
+    event_ids = np.empty(0, np.int64)
+    for table in _TABLES_OF_OVERLAP:
+        _make(con, table)
+    if con.execute("SELECT 1 FROM overlap LIMIT 1").fetchall():
+        con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
+        _make(con, "left_out")
+        con.execute("DROP VIEW thread_event")
+        con.execute("INSERT INTO staging.left_out\n" + statements().header("left_out_between").body)
+        found = con.execute("SELECT event_id FROM left_out ORDER BY ALL").fetchnumpy()
+        event_ids = np.asarray(found["event_id"], np.int64)
+        con.execute("DROP TABLE left_out")
+    for table in _TABLES_OF_OVERLAP:
+        con.execute(f"DROP TABLE {table}")
+    return event_ids
 
 
 def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:

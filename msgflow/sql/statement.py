@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
+from msgflow.sql.parsed import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -69,9 +70,10 @@ class Statements:
         """
         inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
         text = self.text(name)
-        used = connection.extract_statements(text)[0].named_parameters
+        statement = parsed(connection, text)
+        used = statement.named_parameters
         bound = {key: values.get(key, inherited.get(key)) for key in used}
-        return connection.sql(text, params=bound)
+        return connection.sql(statement, params=bound)
 
 
 @cache

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from browser import find_browser
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"
@@ -42,7 +42,7 @@ def test_documents_show_all_pictures_and_none_is_blank() -> None:
 @pytest.mark.thorough
 def test_they_can_be_taken_anew(tmp_path: Path) -> None:
     pytest.importorskip("playwright")
-    if shutil.which("chromium") is None and shutil.which("chromium-browser") is None:
+    if find_browser() is None:
         pytest.skip("no Chromium here: apt install chromium")
     # By a process of its own: two of Playwright cannot be in one.
     subprocess.run([sys.executable, ROOT / "docs" / "screenshots.py", tmp_path], check=True)

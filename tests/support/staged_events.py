@@ -224,6 +224,5 @@ class StagedEvents:
 
 
 def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: pa.RecordBatch) -> None:
-    con.register("staged_rows", rows)
-    con.execute(f"INSERT INTO {table} SELECT * FROM staged_rows")
-    con.unregister("staged_rows")
+    database, _, name = table.partition(".")
+    con.from_arrow(rows).insert_into(f"{database}.main.{name}")

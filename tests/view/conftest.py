@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import duckdb
 import pytest
+from browser import ARGUMENTS, find_browser
 from ingested import made_once
 from served import Page, Served
 
@@ -21,10 +22,6 @@ from msgflow.db.connection import connect
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 from msgflow.view import report as view_report
-
-# The sandbox of Chromium needs rights that test machines do not give; nothing foreign is opened.
-_ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
-_NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 @pytest.fixture(scope="session")
@@ -113,13 +110,13 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Path],
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     """A real browser; without one these tests are skipped."""
-    program = next(filter(None, map(shutil.which, _NAMES)), None)
+    program = find_browser()
     if program is None:
         pytest.skip("no Chromium here: apt install chromium")
     playwright = pytest.importorskip("playwright.sync_api")
     os.environ.setdefault("PLAYWRIGHT_SKIP_BROWSER_DOWNLOAD", "1")
     with playwright.sync_playwright() as running_playwright:
-        browser = running_playwright.chromium.launch(executable_path=program, args=_ARGUMENTS)
+        browser = running_playwright.chromium.launch(executable_path=program, args=ARGUMENTS)
         yield browser
         browser.close()
 
