@@ -75,7 +75,7 @@ def test_much_goes_wrong(
     bucket: ObjectStore, cluster: Any, recordings: Path, tmp_path: Path
 ) -> None:
     scratch = tmp_path / "scratch"
-    bucket.refuse_every = 10
+    bucket.refuse_every = 25
     with Watcher(LAKE) as watcher:
         driver = start_ingest(SOURCES, LAKE, cluster.address, scratch)
         # A worker in the middle of writing, with the process that does it.

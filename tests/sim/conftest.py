@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -68,10 +69,15 @@ class Recording:
 
     def truth(self, sql: str) -> list[tuple[Any, ...]]:
         """Rows of a query over the truth tables."""
-        with duckdb.connect() as connection:
-            for name, path in self.simulation.truth.items():
-                connection.execute(f"CREATE VIEW {name} AS FROM '{path}'")
-            return connection.execute(sql).fetchall()
+        return _truth(self.simulation.directory).execute(sql).fetchall()
+
+
+@cache
+def _truth(directory: Path) -> duckdb.DuckDBPyConnection:
+    connection = duckdb.connect()
+    for path in (directory / "truth").glob("*.parquet"):
+        connection.execute(f"CREATE TABLE {path.stem} AS FROM '{path}'")
+    return connection
 
 
 @pytest.fixture(scope="session")

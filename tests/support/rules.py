@@ -44,7 +44,7 @@ def _as_made(*statements: str) -> Iterator[duckdb.DuckDBPyConnection]:
 
 @cache
 def _made(statements: tuple[str, ...]) -> duckdb.DuckDBPyConnection:
-    con = duckdb.connect()
+    con = duckdb.connect(config={"threads": 1})
     for statement in statements:
         con.execute(statement)
     return con
