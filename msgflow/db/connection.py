@@ -117,8 +117,9 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path, state: str | Non
             hint,
         )
     with database_errors(path):
-        row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
-        if row is None or row[0] != definition_hash():
+        # All rows: a connection with a result that is not at its end makes no relations.
+        rows = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchall()
+        if rows != [(definition_hash(),)]:
             raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
         require_ours_unless_known(con, path, state)
 

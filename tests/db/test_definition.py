@@ -227,7 +227,8 @@ def test_a_file_that_is_ours_is_looked_at_once(
 
     monkeypatch.setattr(definition, "require_ours", looked)
     for read_only in (True, True, False):
-        connect(small_database, read_only=read_only).close()
+        with connect(small_database, read_only=read_only) as con:
+            assert con.sql("SELECT count(*) FROM main.run").fetchall() == [(2,)]
     assert len(looks) == 1
 
     # Copied over by its owner, with the size and the times of before.
