@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
 import signal
 import sys
@@ -52,6 +53,16 @@ def pytest_configure(config: pytest.Config) -> None:
         sys.modules["bt2"] = None  # type: ignore[assignment]
         bt2_library.ROOTS = ()
         bt2_library.PREFIXES = ()
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage less often: thousands of tests were walked through each time."""
+    gc.freeze()
+    gc.set_threshold(50_000)
+
+
+def pytest_sessionfinish() -> None:
+    gc.unfreeze()
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:
