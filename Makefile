@@ -9,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := .demo
 HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()' 2>/dev/null
-HAS_CHROMIUM := { command -v chromium-headless-shell || command -v chromium; } >/dev/null 2>&1
+HAS_CHROMIUM := PYTHONPATH=benchmarks $(BIN)/python -c 'from browser import find_browser; exit(not find_browser())'
 
 # Shell function: apt_install PACKAGE...; fails where apt is missing or not allowed.
 APT := apt_install() { \
@@ -52,7 +52,7 @@ test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	@# Statements that show the values of a failed assert take each worker ten seconds to compile:
+	@# Statements that show the values of a failed assert take each worker ten seconds to compile in a fresh clone:
 	@# what failed runs once more with them, and has failed all the same.
 	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(SELECTED) \
 		|| { $(BIN)/pytest --last-failed --last-failed-no-failures none $(SELECTED); exit 1; }

@@ -56,13 +56,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Look for garbage less often: thousands of tests were walked through each time."""
+    """Look for garbage less often, and not among the tests: that took a tenth of their time."""
     gc.freeze()
     gc.set_threshold(50_000)
 
 
 def pytest_sessionfinish() -> None:
-    gc.unfreeze()
+    gc.unfreeze()  # else what is frozen outlives the libraries that it belongs to
 
 
 def pytest_deselected(items: Sequence[pytest.Item]) -> None:

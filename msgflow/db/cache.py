@@ -63,8 +63,8 @@ def is_usable() -> bool:
         return False
 
 
-def keep(kind: str, made_by: str, content: bytes, *, most: int = _MOST_OF_A_KIND) -> None:
-    """Keep something, if possible, and no more than so many of its kind: the latest."""
+def keep(kind: str, made_by: str, content: bytes) -> None:
+    """Keep something, if possible."""
     with contextlib.suppress(OSError, RuntimeError):
         path = _file(kind, made_by)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,7 +75,7 @@ def keep(kind: str, made_by: str, content: bytes, *, most: int = _MOST_OF_A_KIND
         finally:
             aside.unlink(missing_ok=True)
         kept = sorted(path.parent.glob(f"{kind}-*"), key=lambda old: old.stat().st_mtime)
-        for old in kept[:-most]:
+        for old in kept[:-_MOST_OF_A_KIND]:
             old.unlink()
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.definition import remember, require_ours_unless_known, state_of
+from msgflow.db.definition import remember, require_ours
 from msgflow.db.objects import definition_hash, head_revision, is_before_release, known_revisions
 from msgflow.db.opening import open_file, opening, require_file
 from msgflow.db.spill import remove_abandoned
@@ -34,10 +34,9 @@ def connect(
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
-    state = state_of(path)
     con = open_file(path, read_only=read_only, memory_limit=memory_limit, may_grow=may_grow)
     try:
-        require_current(con, path, state)
+        require_current(con, path)
     except BaseException:
         con.close()
         raise
@@ -94,16 +93,10 @@ def is_empty(con: duckdb.DuckDBPyConnection) -> bool:
     return row is not None and row[0] == 0
 
 
-def require_current(con: duckdb.DuckDBPyConnection, path: Path, state: str | None = None) -> None:
+def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     """Raise unless the database has the schema revision and the views of this msgflow.
 
     Neither views nor macros are used for that: what is in a foreign file might do anything.
-
-    Args:
-        con: to the database.
-        path: its file.
-        state: of the file before `con` opened it; its definitions are looked at in any case
-            when None.
 
     Raises:
         DatabaseError: it is foreign, damaged, newer, or has to be upgraded.
@@ -117,11 +110,10 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path, state: str | Non
             hint,
         )
     with database_errors(path):
-        # All rows: a connection with a result that is not at its end makes no relations.
-        rows = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchall()
-        if rows != [(definition_hash(),)]:
+        row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
+        if row is None or row[0] != definition_hash():
             raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
-        require_ours_unless_known(con, path, state)
+        require_ours(con, path)
 
 
 def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:

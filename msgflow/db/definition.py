@@ -2,14 +2,11 @@
 
 A file from elsewhere can hold any SQL under our names, which would run with the first query. DuckDB
 renders definitions its own way, and what it read from a file not as what was just created: hence
-they are compared with those of a new file, which are kept in the user's cache. To ask DuckDB for
-all definitions takes a third of the time of opening a file: one that was found to be ours is not
-asked again before it changes.
+they are compared with those of a new file, which are kept in the user's cache.
 """
 
 from __future__ import annotations
 
-import os
 import shlex
 import tempfile
 from functools import cache
@@ -29,11 +26,6 @@ if TYPE_CHECKING:
 Definitions = dict[str, str]
 
 _KIND = "definitions"
-_FOUND = "found"
-_MOST_FOUND = 64
-
-# What DuckDB takes up when it opens a database.
-_BESIDE = ("", ".wal", ".wal.checkpoint", ".wal.recovery")
 
 # Keys are left out: where they stand in the statement differs, and none has SQL in it.
 _RENDERED = r"""
@@ -73,45 +65,6 @@ WHERE NOT internal AND database_name = current_database()
 def rendered(con: duckdb.DuckDBPyConnection) -> Definitions:
     """Return the definitions in the current database, without reading any of its tables."""
     return dict(con.execute(_RENDERED).fetchall())
-
-
-def state_of(path: Path) -> str | None:
-    """Return what is another one once something wrote to a database or took its place.
-
-    None where the system does not tell when a file was changed, other than its owner likes.
-    """
-    if os.name != "posix":
-        return None
-    told = []
-    for ending in _BESIDE:
-        try:
-            found = path.with_name(path.name + ending).stat()
-        except OSError:
-            told.append("none")
-        else:
-            told.append(f"{found.st_dev} {found.st_ino} {found.st_size} {found.st_ctime_ns}")
-    return ", ".join(told)
-
-
-def require_ours_unless_known(
-    con: duckdb.DuckDBPyConnection, path: Path, state: str | None
-) -> None:
-    """Raise unless it is ours, but look only where this state of its file was not found to be.
-
-    Args:
-        con: to the database.
-        path: its file.
-        state: of the file before `con` opened it.
-
-    Raises:
-        DatabaseError: see `require_ours`.
-    """
-    if state is not None and cache_of_user.read(_FOUND, state) is not None:
-        return
-    require_ours(con, path)
-    # Else it is not known which of the two was opened.
-    if state is not None and state == state_of(path):
-        cache_of_user.keep(_FOUND, state, b"", most=_MOST_FOUND)
 
 
 def require_ours(con: duckdb.DuckDBPyConnection, path: Path, *, only_tables: bool = False) -> None:

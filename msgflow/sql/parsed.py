@@ -16,6 +16,9 @@ def parsed(con: duckdb.DuckDBPyConnection, text: str) -> duckdb.Statement:
     Args:
         con: any connection; it parses.
         text: its SQL. What a user writes does not belong here: it is kept as long as the process.
+
+    Raises:
+        ValueError: it is no statement, or more than one.
     """
     if text not in _KNOWN:
         (_KNOWN[text],) = con.extract_statements(text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import sys
@@ -16,7 +15,7 @@ from thorough import few
 
 import msgflow
 from msgflow.clocks import apply_clocks, read_clock_sync
-from msgflow.db import connection, definition, migrate, objects
+from msgflow.db import definition, migrate, objects
 from msgflow.db.connection import connect
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
@@ -70,7 +69,6 @@ def test_a_changed_database_is_neither_read_nor_written(
 ) -> None:
     secret = tmp_path / "secret.txt"
     secret.write_text("secret")
-    connect(small_database, read_only=True).close()  # as it was, it was ours
     with duckdb.connect(str(small_database)) as con:
         con.execute(CHANGES[name].format(secret=secret))
     before = small_database.read_bytes()
@@ -189,7 +187,6 @@ def test_the_cache_is_used_and_not_needed(
     small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(connection, "state_of", lambda path: None)
     definition.expected.cache_clear()
     msgflow.open_db(small_database).runs()
     (cached,) = (tmp_path / "cache" / "msgflow").glob("definitions-*")
@@ -212,57 +209,6 @@ def test_the_cache_is_used_and_not_needed(
     definition.expected.cache_clear()
     msgflow.open_db(small_database).runs()
     definition.expected.cache_clear()
-
-
-def test_a_file_that_is_ours_is_looked_at_once(
-    small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    looks: list[Path] = []
-    require_ours = definition.require_ours
-
-    def looked(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-        looks.append(path)
-        require_ours(con, path)
-
-    monkeypatch.setattr(definition, "require_ours", looked)
-    for read_only in (True, True, False):
-        with connect(small_database, read_only=read_only) as con:
-            assert con.sql("SELECT count(*) FROM main.run").fetchall() == [(2,)]
-    assert len(looks) == 1
-
-    # Copied over by its owner, with the size and the times of before.
-    changed = tmp_path / "changed.duckdb"
-    shutil.copy2(small_database, changed)
-    with duckdb.connect(str(changed)) as con:
-        con.execute("CREATE MACRO main.sum(x) AS 42")
-    times = small_database.stat()
-    small_database.write_bytes(changed.read_bytes())
-    os.utime(small_database, ns=(times.st_atime_ns, times.st_mtime_ns))
-    for _ in range(2):
-        with pytest.raises(DatabaseError, match=r"macro main\.sum"):
-            connect(small_database, read_only=True)
-    assert len(looks) == 3
-
-
-@pytest.mark.parametrize("ending", [".wal", ".wal.checkpoint", ".wal.recovery"])
-def test_what_waits_beside_a_file_is_of_its_state(small_database: Path, ending: str) -> None:
-    """DuckDB takes up what such a file has when it opens the database."""
-    before = definition.state_of(small_database)
-    assert before == definition.state_of(small_database)
-    small_database.with_name(small_database.name + ending).write_bytes(b"")
-    assert definition.state_of(small_database) != before
-
-
-def test_a_file_whose_place_was_taken_meanwhile_is_looked_at_again(
-    small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    with connect(small_database, read_only=True) as con:
-        shutil.rmtree(tmp_path / "cache")
-        definition.require_ours_unless_known(con, small_database, "another")
-        definition.require_ours_unless_known(con, small_database, None)
-    assert not list((tmp_path / "cache").rglob("found-*"))
 
 
 def test_an_ingest_into_a_new_file_fills_the_cache(

@@ -44,6 +44,7 @@ def _as_made(*statements: str) -> Iterator[duckdb.DuckDBPyConnection]:
 
 @cache
 def _made(statements: tuple[str, ...]) -> duckdb.DuckDBPyConnection:
+    # Of a few rows, there is nothing to share out.
     con = duckdb.connect(config={"threads": 1})
     for statement in statements:
         con.execute(statement)
