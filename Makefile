@@ -50,7 +50,7 @@ test: SELECTED := -m 'not thorough'
 test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(BIN)/mypy --num-workers auto
 	$(BIN)/lint-imports
 	@# Statements that show the values of a failed assert take each worker ten seconds to compile in a fresh clone:
 	@# what failed runs once more with them, and has failed all the same.

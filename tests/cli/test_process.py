@@ -229,7 +229,8 @@ def piped(*arguments: object) -> bytes:
 @pytest.mark.parametrize("form", few(["json", "csv", "markdown", "table --wide"], "csv"))
 def test_a_terminal_gets_the_same_bytes_as_a_pipe(small_database: Path, form: str) -> None:
     arguments = ("query", "info-runs", "--db", small_database, "--format", *form.split())
-    assert on_terminal(command(*arguments)) == piped(*arguments) != b""
+    pipe = subprocess.run(command(*arguments), stdout=subprocess.PIPE, check=True).stdout
+    assert on_terminal(command(*arguments)) == pipe == piped(*arguments) != b""
 
 
 @pytest.mark.parametrize(
