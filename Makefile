@@ -52,8 +52,8 @@ test test-all: $(VENV)/.developed babeltrace chromium
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --num-workers auto
 	$(BIN)/lint-imports
-	@# Statements that show the values of a failed assert take each worker ten seconds to compile in a fresh clone:
-	@# what failed runs once more with them, and has failed all the same.
+	@# To show the values of a failed assert, each worker compiles all tests for ten seconds in a
+	@# fresh clone: only what failed runs once more with them, and has failed all the same.
 	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(SELECTED) \
 		|| { $(BIN)/pytest --last-failed --last-failed-no-failures none $(SELECTED); exit 1; }
 
