@@ -18,7 +18,7 @@ from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs, run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.choice import choose_runs
-from msgflow.sql.failure import database_errors, in_words
+from msgflow.sql.failure import MORE_MEMORY, database_errors, in_words
 from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
@@ -942,6 +942,8 @@ def capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> Query
 
 def sql_error(error: duckdb.Error) -> QueryError:
     """Return what DuckDB says about SQL that somebody gave."""
+    if isinstance(error, duckdb.OutOfMemoryException):
+        return QueryError("the SQL needs more memory than it may take", MORE_MEMORY)
     # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import OUTPUT, DatabaseOption, RunOption
+from msgflow.cli.options import OUTPUT, DatabaseOption, MemoryLimitOption, RunOption
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
@@ -37,6 +37,7 @@ def command(
     form: Annotated[
         CheckFormat, typer.Option("--format", help="How to write it", rich_help_panel=OUTPUT)
     ] = CheckFormat.TABLE,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
@@ -49,7 +50,7 @@ def command(
     from msgflow.database import Database
     from msgflow.query.clocks import clock_verdicts
 
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         findings = opened.findings(run=run)
         runs = opened.query("clocks", run=run).runs if opened.runs() else ()
         verdicts = clock_verdicts(opened.connection, runs, only_several=True)

@@ -16,6 +16,7 @@ from msgflow.cli.options import (
     DatabaseOption,
     FormatOption,
     InternalOption,
+    MemoryLimitOption,
     OutputOption,
     WideOption,
 )
@@ -68,6 +69,7 @@ def command(
     form: Format | None,
     wide: bool,
     output: Path | None,
+    memory_limit: str | None,
     database: Path,
     **own: Any,
 ) -> None:
@@ -83,7 +85,7 @@ def command(
     from msgflow.query.compare import parse_conditions
 
     parse_conditions(fail_on or [])
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         given = {name + "_" * iskeyword(name): value for name, value in given_of(own).items()}
         comparison = opened.compare(run_a, run_b, internal=internal, **given)
     result = comparison.result
@@ -116,6 +118,7 @@ def _signature() -> Signature:
                     ("form", FormatOption, None),
                     ("wide", WideOption, False),
                     ("output", OutputOption, None),
+                    ("memory_limit", MemoryLimitOption, None),
                     ("database", DatabaseOption, DEFAULT_DATABASE),
                 )
             ),

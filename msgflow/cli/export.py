@@ -13,6 +13,7 @@ from msgflow.cli.options import (
     SELECTION,
     DatabaseOption,
     EndOption,
+    MemoryLimitOption,
     RunOption,
     SkipFirstOption,
     StartOption,
@@ -65,6 +66,7 @@ def parquet(
     end: EndOption = None,
     skip_first: SkipFirstOption = None,
     force: _ForceOption = False,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write public views to DIR/VIEW/run_id=ID/data.parquet.
@@ -77,7 +79,7 @@ def parquet(
     """
     from msgflow.database import Database
 
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         exported = opened.export_parquet(
             directory,
             views or (),
@@ -99,6 +101,7 @@ def csv(
     end: EndOption = None,
     skip_first: SkipFirstOption = None,
     force: _ForceOption = False,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write public views to DIR/VIEW.csv. If anything fails, nothing is written.
@@ -110,7 +113,7 @@ def csv(
     """
     from msgflow.database import Database
 
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         exported = opened.export_csv(
             directory,
             views or (),
@@ -139,6 +142,7 @@ def perfetto(
     start: StartOption = None,
     end: EndOption = None,
     skip_first: SkipFirstOption = None,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, in the browser).
@@ -152,7 +156,7 @@ def perfetto(
     from msgflow.cli.output import count, print_runs, print_status
     from msgflow.database import Database
 
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         trace = opened.export_perfetto(output, run=run, start=start, end=end, skip_first=skip_first)
     print_runs([trace.run])
     print_status(
@@ -190,6 +194,7 @@ def series(
             rich_help_panel=OUTPUT,
         ),
     ] = Times.RELATIVE,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write measured values side by side: one row per moment, one column per path.
@@ -203,7 +208,7 @@ def series(
     form = format_of(output)
     if form not in (Format.CSV, Format.PARQUET):
         raise UsageError(f"series are written as CSV or Parquet — {output}", "FILE.csv")
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         result = opened.series(what, run=run, start=start, end=end, skip_first=skip_first)
     print_result(result.with_times(times), form, output)
 

@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     SELECTION,
     DatabaseOption,
     InternalOption,
+    MemoryLimitOption,
     OutputOption,
     RunOption,
 )
@@ -148,6 +149,7 @@ def command(
             rich_help_panel=OUTPUT,
         ),
     ] = None,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Print the flow of one message: what caused it, and what it caused.
@@ -171,7 +173,7 @@ def command(
         raise UsageError("--from and --to choose among the slowest flows", "--slowest 1")
     if slowest is not None and slowest > 1 and (html is not None or form is FlowFormat.JSON):
         raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         starts: dict[str, Any] = {
             "topic": topic,
             "at": at,

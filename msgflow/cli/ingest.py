@@ -88,6 +88,7 @@ def command(
         str | None,
         typer.Option(
             "--memory-limit",
+            envvar="MSGFLOW_MEMORY_LIMIT",
             metavar="SIZE",
             help="Maximum memory for the database, such as 2GB; more makes large traces faster",
             show_default="grows with need",

@@ -18,6 +18,16 @@ DatabaseOption = Annotated[
     Path,
     typer.Option("--db", envvar="MSGFLOW_DB", metavar="FILE", help="Database file"),
 ]
+MemoryLimitOption = Annotated[
+    str | None,
+    typer.Option(
+        "--memory-limit",
+        envvar="MSGFLOW_MEMORY_LIMIT",
+        metavar="SIZE",
+        help="Maximum memory for the database, such as 2GB; what does not fit goes to disk",
+        show_default="four fifths of the machine",
+    ),
+]
 RunOption = Annotated[
     str | None,
     typer.Option(

@@ -16,6 +16,7 @@ from msgflow.cli.options import (
     EndOption,
     FormatOption,
     InternalOption,
+    MemoryLimitOption,
     OutputOption,
     RunOption,
     SkipFirstOption,
@@ -48,6 +49,7 @@ COMMON_OPTIONS = frozenset(
         "help",
         "internal",
         "list",
+        "memory_limit",
         "output",
         "run",
         "show",
@@ -120,6 +122,7 @@ def build_command(header: Header) -> Any:
         ("times", TimesOption, None),
         ("show", _ShowOption, False),
         ("list_queries", _ListOption, False),
+        ("memory_limit", MemoryLimitOption, None),
         ("database", DatabaseOption, DEFAULT_DATABASE),
     ):
         parameters.append(
@@ -148,7 +151,7 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
             "tables for people have times with their units — --times",
             "--format csv, json, jsonl or parquet, or a file with such a suffix",
         )
-    with Database(given["database"]) as database:
+    with Database(given["database"], memory_limit=given["memory_limit"]) as database:
         result = database.query(
             header.name,
             run=given["run"],

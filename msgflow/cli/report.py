@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     EndOption,
     LakePageOption,
     LakeWhereOption,
+    MemoryLimitOption,
     RunOption,
     StartOption,
 )
@@ -71,6 +72,7 @@ def command(
     ] = "20MB",
     lake: LakePageOption = None,
     where: LakeWhereOption = None,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Write the pages of a run to one file that any browser opens, without a server.
@@ -97,7 +99,7 @@ def command(
         print_status(f"{count(page.runs, 'run')} of {lake} in {output}: open it in a browser")
         return
     require_no_where(where)
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         report = opened.report(
             output, run=run, compare=compare, start=start, end=end, path_text=path, max_size=size
         )

@@ -8,7 +8,13 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
+from msgflow.cli.options import (
+    DatabaseOption,
+    FormatOption,
+    MemoryLimitOption,
+    OutputOption,
+    WideOption,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.text_file import read_text
@@ -36,6 +42,7 @@ def command(
     form: FormatOption = None,
     wide: WideOption = False,
     output: OutputOption = None,
+    memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Run SQL on the public views, read-only and without access to other files.
@@ -46,7 +53,7 @@ def command(
     from msgflow.database import Database
 
     statements = statements_of(text, file, 'msgflow sql "SELECT * FROM run"')
-    with Database(database) as opened:
+    with Database(database, memory_limit=memory_limit) as opened:
         result = opened.sql(statements, limit=limit or None)
     print_result(result, form, output, wide=wide)
 

@@ -30,6 +30,7 @@ def command(
         str | None,
         typer.Option(
             "--memory-limit",
+            envvar="MSGFLOW_MEMORY_LIMIT",
             metavar="SIZE",
             help="Maximum memory for queries",
             show_default="250MB, more while a query needs it",

@@ -20,8 +20,11 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-DEFAULT_LIMIT = "400MB"
+DEFAULT_LIMIT = "240MB"
 _LOADING_BYTES = 128_000_000
+# With less, even opening fails.
+_LEAST_BYTES = 20_000_000
+_EXAMPLE = "--memory-limit 2GB"
 # Of a limit that the user gave, if that is more.
 _LOADING_SHARE = 4
 _SHARE_OF_MACHINE = 0.7
@@ -120,19 +123,34 @@ class Memory:
         )
 
     def _bytes(self) -> int:
-        now = self._con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
-        number, unit = now.split()
-        power = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB").index(unit)
-        return round(float(number) * float(1024**power))
+        return _limit_bytes(self._con)
 
     def _set(self, limit: str) -> None:
-        try:
-            self._con.execute("SET memory_limit = ?", [limit])
-        except duckdb.Error as error:
-            raise DatabaseError(
-                f"not an amount of memory — {limit}", "--memory-limit 2GB"
-            ) from error
+        set_memory_limit(self._con, limit)
         self._limit = limit
+
+
+def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
+    """Let a connection take so much memory.
+
+    Raises:
+        DatabaseError: that is no amount, or none that a database can work with.
+    """
+    try:
+        con.execute("SET memory_limit = ?", [limit])
+    except duckdb.Error as error:
+        raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE) from error
+    if limit.strip().startswith("-"):  # DuckDB takes it for no limit
+        raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE)
+    if _limit_bytes(con) < _LEAST_BYTES:
+        raise DatabaseError(f"too little memory for any database — {limit}", _EXAMPLE)
+
+
+def _limit_bytes(con: duckdb.DuckDBPyConnection) -> int:
+    now = con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0]
+    number, unit = now.split()
+    power = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB").index(unit)
+    return round(float(number) * float(1024**power))
 
 
 def _machine_bytes() -> int:

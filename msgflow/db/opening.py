@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
+from msgflow.db.memory import set_memory_limit
 from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
@@ -30,18 +31,19 @@ def open_file(
     but for the memory limit where that may grow.
 
     Raises:
-        DatabaseError: it is locked by another process, or no DuckDB file.
+        DatabaseError: it is locked by another process, or no DuckDB file; or `memory_limit` is no
+            amount of memory.
     """
     require_file(path)
     config: dict[str, str | bool | int | float | list[str]] = {}
-    if memory_limit is not None:
-        config["memory_limit"] = memory_limit
     if not read_only:
         config["storage_compatibility_version"] = STORAGE_VERSION
     with opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
         # A file that this process has open already is the same database, with its settings.
         if not _is_shut_in(con):
+            if memory_limit is not None:
+                set_memory_limit(con, memory_limit)
             _prepare(con)
             con.execute("SET temp_directory = ?", [str(spill_directory(path))])
             con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from msgflow.trace import Progress
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
-_KEPT_BLOCKS = "96MB"
+_KEPT_BLOCKS = "48MB"
 
 # As many events as another thread of the database is worth: below, statements take less time to run
 # than to be shared out.
@@ -183,7 +183,7 @@ def ingest(
                     attach(con, target.path)
                     if name is not None and not replace:
                         require_free_name(con, name)
-                staging.attach(con, directory / "raw.duckdb")
+                staging.attach(con, directory)
                 # Its settings stay open, for more memory, which nothing but our own SQL can reach.
                 shut_in(con, beside=[directory, *([keep_staging] if keep_staging else [])])
                 watch.enter("reading the traces")

@@ -1,14 +1,15 @@
 """Staging: what was read, and what the model makes of it, until it is stored.
 
-`raw` is a temporary database file with one table per tracepoint, the packets, and the threads, all
-as read. `staging` is a database in memory, which spills to the temporary directory:
-`staging.source` (one row per trace), `staging.event_count`, `staging.declared` (tracepoints that
-were enabled in a trace, also if they never occurred), `staging.left_out` (events that another trace
-holds as well), `staging.ignored` (patterns of events to leave out, with the events that match, NULL
-if none does), `staging.packet_read_once` (packets that a trace holds twice, or where it is NULL
-several traces), `staging.implausible` (values that were left out), `staging.damage`,
-`staging.event` (all events of known tracepoints but those of the kernel, without payload),
-`staging.predecessor` (the pointers from event to event), and the objects of `schema/model`.
+`raw` and `staging` are temporary database files. A database in memory would have to compress what
+it spills, and keep the beginning of each column of each row group. `raw` has one table per
+tracepoint, the packets, and the threads, all as read. `staging` has `staging.source` (one row per
+trace), `staging.event_count`, `staging.declared` (tracepoints that were enabled in a trace, also if
+they never occurred), `staging.left_out` (events that another trace holds as well),
+`staging.ignored` (patterns of events to leave out, with the events that match, NULL if none does),
+`staging.packet_read_once` (packets that a trace holds twice, or where it is NULL several traces),
+`staging.implausible` (values that were left out), `staging.damage`, `staging.event` (all events of
+known tracepoints but those of the kernel, without payload), `staging.predecessor` (the pointers
+from event to event), and the objects of `schema/model`.
 """
 
 from __future__ import annotations
@@ -89,11 +90,17 @@ CREATE TABLE staging.damage (
 """
 
 
-def attach(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-    """Attach `raw` at `path`, with an empty table per tracepoint, and `staging` in memory."""
-    # What is staged is of no use after a crash.
-    con.execute(f"ATTACH '{_quoted(path)}' AS raw (RECOVERY_MODE no_wal_writes)")
-    con.execute("ATTACH ':memory:' AS staging")
+def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
+    """Attach `raw`, with an empty table per tracepoint, and `staging`.
+
+    Args:
+        con: the connection.
+        directory: where their files are made; None leaves both in memory.
+    """
+    for name in ("raw", "staging"):
+        path = ":memory:" if directory is None else _quoted(directory / f"{name}.duckdb")
+        # What is staged is of no use after a crash.
+        con.execute(f"ATTACH '{path}' AS {name} (RECOVERY_MODE no_wal_writes)")
     for statement in _tables():
         con.execute(statement)
 
@@ -145,7 +152,7 @@ def empty(con: duckdb.DuckDBPyConnection) -> None:
 
 @contextlib.contextmanager
 def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
-    """Keep `raw` as it is first written, meanwhile.
+    """Keep what is staged as it is first written, meanwhile.
 
     It is read a few times and thrown away: writing it anew, or compressed, costs more than it
     saves.
@@ -158,7 +165,7 @@ def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
 
 
 def leave(con: duckdb.DuckDBPyConnection) -> None:
-    """Let the connection close without writing `raw` once more.
+    """Let the connection close without writing what is staged once more.
 
     That holds for all databases of the connection: what must last needs a checkpoint before.
     """

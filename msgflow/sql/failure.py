@@ -26,6 +26,8 @@ _DAMAGE = re.compile(
 # DuckDB 2.0 fails at times where dictionaries of strings pass through several joins; the same
 # statement seldom meets it twice (duckdb/duckdb#24807 is the like of it).
 _MISTAKE = re.compile(r"dict-surviving")
+# What helps where a question needs more memory than it may take.
+MORE_MEMORY = "give more with --memory-limit, or ask for less with --start and --end"
 _OF_FILES = (
     duckdb.IOException,
     duckdb.FatalException,

@@ -15,65 +15,68 @@ WITH called AS (
     ANTI JOIN derive.flow_caller AS f ON l.caller_id = f.callback_instance_id
     WHERE l.run_id = only_run
 ),
-message AS (
-    SELECT l.publication_id
-    FROM store.link_causal AS l
-    ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
-    WHERE l.run_id = only_run AND l.take_id IS NOT NULL
-    UNION ALL
-    SELECT publication_id FROM called WHERE take_id IS NOT NULL
+caller AS (
+    SELECT DISTINCT callback_instance_id FROM derive.flow_caller
 ),
--- Each publication, and once more for each instance that published it or called for it. They are
--- grouped, not joined: what a join looks up stays in memory until the query ends.
-run AS (
+-- Each publication, and once more for each cause that it has. They are grouped, not joined: what a
+-- join looks up stays in memory until the query ends.
+cause AS (
     SELECT
-        run_id, publication_id, publisher_id, NULL::BIGINT AS callback_instance_id,
-        NULL::BIGINT[] AS route
+        run_id, publication_id, publisher_id, false AS is_message,
+        NULL::BIGINT AS callback_instance_id
     FROM store.publication
     WHERE run_id = only_run
     UNION ALL
-    SELECT l.run_id, l.publication_id, l.publisher_id, l.callback_instance_id, NULL
-    FROM store.link_causal AS l
-    ANTI JOIN derive.flow_caller AS c ON l.callback_instance_id = c.callback_instance_id
-    WHERE l.run_id = only_run AND l.take_id IS NULL
-    UNION ALL
-    SELECT run_id, publication_id, publisher_id, caller_id, route FROM called WHERE take_id IS NULL
-),
-source AS (
     SELECT
-        r.run_id,
-        r.publication_id,
-        r.publisher_id,
-        min(r.callback_instance_id) AS callback_instance_id,
-        list({'callback_instance_id': r.callback_instance_id, 'route': r.route})
-            FILTER (WHERE r.route IS NOT NULL) AS ways
-    FROM run AS r
-    JOIN store.publisher AS p ON r.publisher_id = p.publisher_id
-    ANTI JOIN message AS m ON r.publication_id = m.publication_id
+        l.run_id, l.publication_id, l.publisher_id, l.take_id IS NOT NULL,
+        CASE WHEN l.take_id IS NULL THEN l.callback_instance_id END
+    FROM store.link_causal AS l
+    WHERE l.run_id = only_run
+        -- Not a join either: DuckDB would keep the links for it, which are far more.
+        AND (
+            SELECT c.callback_instance_id
+            FROM caller AS c
+            WHERE c.callback_instance_id = l.callback_instance_id
+        ) IS NULL
+    UNION ALL
+    SELECT
+        run_id, publication_id, publisher_id, take_id IS NOT NULL,
+        CASE WHEN take_id IS NULL THEN caller_id END
+    FROM called
+),
+caused AS (
+    SELECT
+        c.run_id,
+        c.publication_id,
+        c.publisher_id,
+        bool_or(c.is_message) AS is_message,
+        min(c.callback_instance_id) AS callback_instance_id
+    FROM cause AS c
+    JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
     WHERE NOT p.is_internal
-    GROUP BY r.run_id, r.publication_id, r.publisher_id
+    GROUP BY c.run_id, c.publication_id, c.publisher_id
+),
+root AS (
+    SELECT
+        run_id, publication_id, publisher_id, is_message,
+        CASE WHEN NOT is_message THEN callback_instance_id END AS callback_instance_id
+    FROM caused
+),
+way AS (
+    SELECT publication_id, caller_id, min(route) AS route
+    FROM called
+    WHERE take_id IS NULL
+    GROUP BY publication_id, caller_id
 )
 SELECT
-    run_id,
-    publication_id,
-    publisher_id,
-    true AS is_source,
-    CASE WHEN callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
+    r.run_id,
+    r.publication_id,
+    r.publisher_id,
+    NOT r.is_message AS is_source,
+    CASE WHEN r.callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
         AS root_kind,
-    coalesce(callback_instance_id, publication_id) AS root_id,
-    CASE WHEN ways IS NULL THEN []::BIGINT[]
-        ELSE coalesce(
-            list_min(list_filter(
-                ways, lambda way: way.callback_instance_id = source.callback_instance_id
-            )).route,
-            []
-        ) END AS route
-FROM source
-UNION ALL
-SELECT
-    b.run_id, b.publication_id, b.publisher_id, false, 'publication', b.publication_id,
-    []::BIGINT[]
-FROM store.publication AS b
-JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-SEMI JOIN message AS m ON b.publication_id = m.publication_id
-WHERE b.run_id = only_run AND NOT p.is_internal
+    coalesce(r.callback_instance_id, r.publication_id) AS root_id,
+    coalesce(w.route, []::BIGINT[]) AS route
+FROM root AS r
+LEFT JOIN way AS w
+    ON r.publication_id = w.publication_id AND r.callback_instance_id = w.caller_id

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -44,6 +45,33 @@ def test_every_command_has_help(msgflow: Msgflow, command: str) -> None:
     assert result.exit_code == 0
     assert f"Usage: msgflow {command}" in result.stdout
     assert result.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "query callbacks",
+        "sql 'SELECT 1'",
+        "check",
+        "report -o page.html",
+        "flow --topic /chatter",
+        "compare 1 2",
+        "export parquet views",
+        "export perfetto -o trace.pftrace",
+        "export csv rows",
+        "export series series.csv",
+    ],
+)
+def test_memory_can_be_limited(
+    msgflow: Msgflow, small_database: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    words = [*shlex.split(command), "--db", small_database]
+    for result in (
+        msgflow(*words, "--memory-limit", "plenty"),
+        monkeypatch.setenv("MSGFLOW_MEMORY_LIMIT", "plenty") or msgflow(*words),
+    ):
+        assert result.exit_code == 4
+        assert "not an amount of memory — plenty" in result.stderr
 
 
 def test_without_a_command_the_help_is_printed(msgflow: Msgflow) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import duckdb
 import pytest
 
-from msgflow.db.memory import Memory
+from msgflow.db.memory import Memory, set_memory_limit
 from msgflow.errors import DatabaseError
 
 # Holds all its rows in memory at once, whatever may spill.
@@ -30,6 +30,21 @@ def test_a_limit_that_the_user_gave_is_kept() -> None:
         with pytest.raises(DatabaseError, match="need more memory than 40MB"):
             memory.run(lambda: con.execute(HUNGRY).fetchall())
         assert limit_of(con) == "38.1 MiB"
+
+
+@pytest.mark.parametrize(
+    ("limit", "what"),
+    [("plenty", "not an amount"), ("-1", "not an amount"), ("19MB", "too little memory")],
+)
+def test_a_limit_that_nothing_can_work_with(limit: str, what: str) -> None:
+    with duckdb.connect() as con, pytest.raises(DatabaseError, match=f"{what}.* — {limit}"):
+        set_memory_limit(con, limit)
+
+
+def test_a_small_limit() -> None:
+    with duckdb.connect() as con:
+        set_memory_limit(con, "21MB")
+        assert limit_of(con) == "20.0 MiB"
 
 
 def test_less_while_traces_are_read() -> None:
@@ -68,7 +83,7 @@ def test_too_little_to_read() -> None:
     with duckdb.connect() as con:
         usual = Memory(con, None)
         before = limit_of(con)
-        with pytest.raises(DatabaseError, match="need more memory than 400MB"), usual.loading():
+        with pytest.raises(DatabaseError, match="need more memory than 240MB"), usual.loading():
             con.execute(HUNGRY)
         assert limit_of(con) == before
 

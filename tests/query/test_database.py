@@ -80,6 +80,30 @@ def test_a_query_can_use_more_than_memory(small_database: Path) -> None:
     assert rows.to_arrow().to_pylist() == [{"n": 4_000_000}]
 
 
+def test_what_needs_more_memory_than_it_may_take_says_so(small_database: Path) -> None:
+    all_at_once = "SELECT len(list(range)) AS n FROM range(9000000)"
+    with (
+        msgflow.open_db(small_database, memory_limit="60MB") as database,
+        pytest.raises(QueryError, match="needs more memory than it may take") as raised,
+    ):
+        database.sql(all_at_once)
+    assert "--memory-limit" in str(raised.value.hint)
+    with (
+        msgflow.open_db(small_database, memory_limit="60MB") as database,
+        pytest.raises(QueryError, match="needs more memory than it may take — callbacks") as raised,
+    ):
+        database.query("callbacks", where=f"start_ns > ({all_at_once})")
+    assert "--memory-limit" in str(raised.value.hint)
+
+
+def test_a_limit_that_is_no_amount_is_not_blamed_on_the_file(small_database: Path) -> None:
+    with (
+        msgflow.open_db(small_database, memory_limit="plenty") as database,
+        pytest.raises(DatabaseError, match="not an amount of memory — plenty"),
+    ):
+        database.runs()
+
+
 def test_the_schema_is_described(small_database: Path) -> None:
     with msgflow.open_db(small_database) as database:
         rows = database.schema().to_arrow().to_pylist()

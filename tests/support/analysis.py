@@ -43,7 +43,7 @@ class Analysis:
         self._connection.execute("SET threads = 1")
         self._connection.execute("SET disabled_optimizers = 'join_order'")
         attach(self._connection, path)
-        staging.attach(self._connection, Path(":memory:"))
+        staging.attach(self._connection, None)
         self._tables = self._tables_of("raw"), self._tables_of("staging")
         self._views = self._views_of_staging()
         # Tables of the model that stand there without a row, as those before needed them.

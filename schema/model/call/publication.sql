@@ -1,27 +1,11 @@
 -- name: staging.publication
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
--- needs: staging.publication_call, staging.publication_origin, staging.publisher,
---     staging.callback_left_over, staging.callback_pair, staging.beside_gap, staging.callback_gap,
---     staging.publication_next
-WITH publisher_of AS (
-    SELECT o.start_event_id, p.publisher_id
-    FROM staging.publication_origin AS o
-    JOIN staging.publisher AS p ON o.publisher_event_id = p.event_id
-    UNION ALL
-    SELECT o.start_event_id, p.publisher_id
-    FROM staging.publication_origin AS o
-    JOIN staging.publisher AS p
-        ON o.process_id = p.process_id AND o.unknown_handle = p.publisher_handle
-    WHERE p.is_inferred
-),
--- Apart, since what is sorted should be narrow.
-numbered AS (
-    SELECT start_event_id, row_number() OVER (ORDER BY start_event_id) AS publication_id
-    FROM staging.publication_call
-),
+-- needs: staging.publication_call, staging.publication_number, staging.callback_left_over,
+--     staging.callback_pair, staging.beside_gap, staging.callback_gap, staging.publication_next
+
 -- An end without a begin says nothing of where its thread is; what came before it does.
-stray AS (
+WITH stray AS (
     SELECT c.start_event_id, c.thread_id
     FROM staging.publication_call AS c
     JOIN staging.callback_left_over AS e ON c.callback_event_id = e.event_id
@@ -57,7 +41,7 @@ interrupted AS (
 SELECT
     n.publication_id,
     c.trace_index + 1 AS trace_id,
-    p.publisher_id,
+    n.publisher_id,
     c.process_id,
     c.thread_id,
     c.start_ns,
@@ -76,8 +60,7 @@ SELECT
         AS is_loss_affected,
     x.next_event_ns
 FROM staging.publication_call AS c
-JOIN numbered AS n ON c.start_event_id = n.start_event_id
-LEFT JOIN publisher_of AS p ON c.start_event_id = p.start_event_id
+JOIN staging.publication_number AS n ON c.start_event_id = n.start_event_id
 LEFT JOIN placed AS q ON c.start_event_id = q.start_event_id
 LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
     ON c.start_event_id = behind.event_id

@@ -2,38 +2,18 @@
 -- description: Callback instances, numbered in the order in which they began, with the one that
 --     each is nested in.
 -- grain: one row per callback instance
--- needs: staging.callback_run, staging.callback_binding, staging.callback, staging.take,
---     staging.beside_gap, staging.callback_gap, staging.request_origin
-WITH callback_of AS (
-    SELECT b.start_event_id, c.callback_id
-    FROM staging.callback_binding AS b
-    JOIN staging.callback AS c ON b.callback_event_id = c.event_id
-    UNION ALL
-    SELECT b.start_event_id, c.callback_id
-    FROM staging.callback_binding AS b
-    JOIN (
-        SELECT process_id, callback_handle, min(callback_id) AS callback_id
-        FROM staging.callback
-        WHERE created_ns IS NULL
-        GROUP BY process_id, callback_handle
-    ) AS c ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
-    WHERE b.callback_event_id IS NULL
-),
--- Apart, since what is sorted should be narrow.
-place AS (
-    SELECT start_event_id, row_number() OVER (ORDER BY start_event_id) AS callback_instance_id
-    FROM staging.callback_run
-),
-numbered AS (
+-- needs: staging.callback_run, staging.callback_number, staging.beside_gap, staging.callback_gap,
+--     staging.request_origin
+WITH numbered AS (
     SELECT
-        p.callback_instance_id,
+        c.callback_instance_id,
         r.trace_index + 1 AS trace_id,
         c.callback_id,
         r.process_id,
         r.thread_id,
         r.start_ns,
         r.end_ns,
-        t.take_id,
+        c.take_id,
         r.is_intra_process,
         r.depth,
         r.is_plain,
@@ -41,9 +21,7 @@ numbered AS (
         r.end_event_id,
         r.effective_end_event_id
     FROM staging.callback_run AS r
-    JOIN place AS p ON r.start_event_id = p.start_event_id
-    JOIN callback_of AS c ON r.start_event_id = c.start_event_id
-    LEFT JOIN staging.take AS t ON r.start_event_id = t.callback_start_event_id
+    JOIN staging.callback_number AS c ON r.start_event_id = c.start_event_id
 ),
 nested AS (
     SELECT n.callback_instance_id, p.callback_instance_id AS parent_id

@@ -4,7 +4,7 @@
 --     such event of the thread; the last one of a thread, or before a gap, has no end.
 -- grain: one row per executor event
 -- needs: staging.executor_event, staging.behind_gap, staging.executor_thread,
---     staging.callback_instance, staging.callback_pair
+--     staging.executor_callback
 WITH state AS (
     SELECT
         e.thread_id,
@@ -20,14 +20,6 @@ WITH state AS (
     SELECT thread_id, arg_max(kind, event_id), arg_max(ts_ns, event_id), NULL, max(event_id)
     FROM staging.executor_event
     GROUP BY thread_id
-),
--- The first callback instance after the event: the callback event before it was earlier.
-first_run AS (
-    SELECT p.executor_event_id, min(c.callback_instance_id) AS callback_instance_id
-    FROM staging.callback_pair AS p
-    JOIN staging.callback_instance AS c ON p.start_event_id = c.start_event_id
-    WHERE coalesce(p.previous_callback_event_id < p.executor_event_id, true)
-    GROUP BY p.executor_event_id
 )
 SELECT
     t.executor_id,
@@ -37,7 +29,9 @@ SELECT
     s.end_ns,
     -- Not a join: DuckDB would keep the states in memory for it, which are four times as many.
     (
-        SELECT callback_instance_id FROM first_run WHERE executor_event_id = s.start_event_id
+        SELECT c.callback_instance_id
+        FROM staging.executor_callback AS c
+        WHERE c.executor_event_id = s.start_event_id
     ) AS callback_instance_id,
     s.start_event_id
 FROM state AS s

@@ -10,7 +10,7 @@
 -- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
 --     store.executor_thread, store.executor_state, store.thread_break
 WITH sized AS (
-    SELECT executor_id, thread_count FROM derive.executor_size
+    SELECT executor_id, thread_count, NULL::BIGINT AS until_ns FROM derive.executor_size
 ),
 release AS (
     SELECT

@@ -6,7 +6,8 @@
 --     once; in a longer one nothing was ready when it began. What a callback that spins waits for
 --     is no business of its executor.
 -- grain: one row per wait of an executor that was seen to end
--- param: executors VARCHAR  Name of rows with an executor_id each: those to look at
+-- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Waits that
+--     began after the last of these moments are left out (where all are NULL: none)
 -- needs: store.executor_state, store.callback_instance, derive.executor_run
 CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
 WITH wait AS (
@@ -15,6 +16,9 @@ WITH wait AS (
     WHERE state = 'wait'
         AND end_ns IS NOT NULL
         AND executor_id IN (SELECT executor_id FROM query_table(executors))
+        AND start_ns <= (
+            SELECT coalesce(max(until_ns), 9223372036854775807) FROM query_table(executors)
+        )
 ),
 -- Threads with a callback that may spin: it does not end before the next event of the executor, nor
 -- did the last wait of the thread begin before it.

@@ -57,7 +57,9 @@ busy AS MATERIALIZED (
     ASOF LEFT JOIN (
         SELECT executor_id, start_ns, end_ns, before_ns
         FROM stretch
+        -- Often it is only the first callbacks that have such moments.
         WHERE executor_id IN (SELECT executor_id FROM moment)
+            AND start_ns <= (SELECT max(at_ns) FROM moment)
     ) AS b ON m.executor_id = b.executor_id AND m.at_ns >= b.start_ns
 ),
 blocked AS (
@@ -95,9 +97,9 @@ silent AS (
     SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
 ),
 looked_up AS (
-    SELECT executor_id FROM drowsy
-    UNION
-    SELECT executor_id FROM silent
+    SELECT executor_id, max(at_ns) AS until_ns FROM drowsy GROUP BY executor_id
+    UNION ALL
+    SELECT executor_id, 9223372036854775807 FROM silent
 ),
 poll AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns FROM derive.executor_poll('looked_up')
