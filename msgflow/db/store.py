@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from msgflow.db.tables import Column, Table
 
 
+# Joins of more rows than fit into memory give them in any order, in which ids and times take far more
+# room. To put fewer rows in order costs more than it saves.
+_ROWS_WORTH_ORDERING = 1_000_000
+
+
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Copy what staging has under the name of a store table, inside the open transaction.
 
@@ -22,19 +27,19 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     known of what was there when the transaction began: staging is filled before it, and one run is
     stored in it.
     """
-    staged = {
-        name
-        for (name,) in con.execute(
-            "SELECT table_name FROM duckdb_tables() "
+    staged = dict(
+        con.execute(
+            "SELECT table_name, estimated_size FROM duckdb_tables() "
             "WHERE database_name = 'staging' AND schema_name = 'main' AND estimated_size > 0 "
-            "UNION ALL SELECT view_name FROM duckdb_views() "
+            "UNION ALL SELECT view_name, 0 FROM duckdb_views() "
             "WHERE database_name = 'staging' AND schema_name = 'main'"
         ).fetchall()
-    }
+    )
     bases = _bases(con)
     for table in TABLES.values():
         if table.name in staged:
-            _copy(con, table, run_id, bases)
+            is_large = staged[table.name] >= _ROWS_WORTH_ORDERING
+            _copy(con, table, run_id, bases, in_order=is_large)
 
 
 def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
@@ -64,11 +69,20 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     return bases
 
 
-def _copy(con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]) -> None:
+def _copy(
+    con: duckdb.DuckDBPyConnection,
+    table: Table,
+    run_id: int,
+    bases: dict[str, int],
+    *,
+    in_order: bool,
+) -> None:
     names = ", ".join(table.columns)
     values = ", ".join(_value(table, column, run_id, bases) for column in table.columns.values())
+    key = f"{table.name}_id"
+    order = f" ORDER BY {key}" if in_order and key in table.columns else ""
     con.execute(
-        f"INSERT INTO {table.full_name} ({names}) SELECT {values} FROM staging.{table.name}"
+        f"INSERT INTO {table.full_name} ({names}) SELECT {values} FROM staging.{table.name}{order}"
     )
 
 

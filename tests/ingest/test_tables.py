@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import duckdb
 import pyarrow as pa
 import pytest
 
-from msgflow.ingest import load
+from msgflow.ingest import load, staging
 
 
 @pytest.fixture
@@ -52,3 +54,14 @@ def test_not_too_many_wait(con: duckdb.DuckDBPyConnection) -> None:
     assert counts(con) == [0, 70, 0, 0]
     tables.flush()
     assert counts(con) == [40, 70, 40, 1]
+
+
+def test_what_is_staged_is_in_files(tmp_path: Path) -> None:
+    """What a database in memory spills is compressed, and some of it stays."""
+    with duckdb.connect() as con:
+        staging.attach(con, tmp_path)
+        places = con.execute(
+            "SELECT database_name, path FROM duckdb_databases() WHERE NOT internal ORDER BY ALL"
+        ).fetchall()
+    assert dict(places)["raw"] == str(tmp_path / "raw.duckdb")
+    assert dict(places)["staging"] == str(tmp_path / "staging.duckdb")

@@ -116,3 +116,24 @@ def test_the_first_of_several_callbacks_names_a_state(system: RosSystem, analyse
         system.end(MAIN, callback)
     system.idle(MAIN)
     assert [row[3] for row in analyse(system).rows(STATES)] == [1, None]
+
+
+def test_an_executor_that_waits_only_afterwards_was_not_idle(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """It says when it waits, so that it did not wait before; one that says nothing may have."""
+    source = Thread(200)
+    system.publisher(source, 0x10, "/topic")
+    for thread in (MAIN, Thread(300)):
+        system.subscription(thread, 0x30, "/topic", callback=0xC1)
+    system.publish(source, 0x10, 1)
+    for thread in (MAIN, Thread(300)):
+        system.take(thread, 0x30, 1)
+        system.start(thread, 0xC1)
+        system.end(thread, 0xC1)
+    system.idle(MAIN)
+    system.ready(MAIN)
+    assert analyse(system).rows(
+        "SELECT p.pid, w.idle_ns FROM executor_wait AS w JOIN thread AS t USING (thread_id) "
+        "JOIN process AS p USING (process_id) ORDER BY 1"
+    ) == [(100, 0), (300, None)]

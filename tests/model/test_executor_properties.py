@@ -32,6 +32,15 @@ WAITS = (
     "busy_max_ns, blocked_max_ns FROM executor_wait ORDER BY callback_instance_id"
 )
 
+IDLE = "SELECT earliest_ns, start_ns, idle_ns FROM executor_wait ORDER BY callback_instance_id"
+# What a callback that spins waits for is no business of its executor.
+SLEEPS = (
+    "SELECT s.start_ns, s.end_ns FROM executor_state AS s WHERE state = 'wait' "
+    "AND end_ns IS NOT NULL AND NOT EXISTS ("
+    f"FROM ({RUNS}) AS r (run, callback, thread_id, start_ns, end_ns) "
+    "WHERE r.thread_id = s.thread_id AND r.start_ns <= s.start_ns AND s.start_ns < r.end_ns)"
+)
+
 
 @dataclass(frozen=True)
 class Run:
@@ -56,6 +65,7 @@ def test_properties(analyse: Analyse, seed: int, threads: int, with_events: bool
     bounds_are_in_order(model)
     interference_is_that_of_all_pairs(model)
     busy_is_counted_instant_by_instant(model)
+    idle_is_the_sum_of_what_threads_wait(model)
 
 
 def activities_never_overlap_and_add_up_to_the_states(model: Analysis) -> None:
@@ -136,3 +146,18 @@ def busy_is_counted_instant_by_instant(model: Analysis) -> None:
         assert busy_min == busy(callback, latest, start)
         if earliest is not None:
             assert busy_max == busy(callback, earliest, start)
+
+
+def idle_is_the_sum_of_what_threads_wait(model: Analysis) -> None:
+    sleeps = model.rows(SLEEPS)
+    waits = model.rows(IDLE)
+    assert waits
+    for earliest, start, idle in waits:
+        if earliest is None or not sleeps:
+            assert idle is None
+            continue
+        inside = sorted((max(a, earliest), min(b, start)) for a, b in sleeps)
+        inside = [(a, b) for a, b in inside if a < b]
+        # One thread waits for all: two at once do not happen in rclcpp.
+        if all(end <= begin for (_, end), (begin, _) in pairwise(inside)):
+            assert idle == sum(b - a for a, b in inside)
