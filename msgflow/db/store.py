@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from msgflow.db.tables import Column, Table
 
 
-# Joins of more rows than fit into memory give them in any order, in which ids and times take far more
-# room. To put fewer rows in order costs more than it saves.
+# Joins of more rows than fit into memory give them in any order, in which ids and times take far
+# more room. To put fewer rows in order costs more than it saves.
 _ROWS_WORTH_ORDERING = 1_000_000
 
 
