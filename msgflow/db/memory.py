@@ -23,7 +23,7 @@ _T = TypeVar("_T")
 DEFAULT_LIMIT = "240MB"
 _LOADING_BYTES = 128_000_000
 # With less, even opening fails.
-_LEAST_BYTES = 20_000_000
+_LEAST_BYTES = 15_000_000
 _EXAMPLE = "--memory-limit 2GB"
 # Of a limit that the user gave, if that is more.
 _LOADING_SHARE = 4
