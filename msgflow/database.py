@@ -18,7 +18,7 @@ from msgflow.query.result import QueryResult
 from msgflow.query.run import first_line, read_runs, run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.choice import choose_runs
-from msgflow.sql.failure import MORE_MEMORY, database_errors, in_words
+from msgflow.sql.failure import database_errors, in_words, out_of_memory
 from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
@@ -106,8 +106,11 @@ class Database:
 
     def _ask(self, work: Callable[[], _T]) -> _T:
         """Return what `work` returns; Ctrl-C interrupts it."""
-        with database_errors(self.path):
-            return interruptible(self.connection, work)
+        try:
+            with database_errors(self.path):
+                return interruptible(self.connection, work)
+        except duckdb.OutOfMemoryException as error:
+            raise out_of_memory(str(self.path)) from error
 
     def ingest(
         self,
@@ -940,10 +943,10 @@ def capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> Query
     return QueryResult(table.slice(0, limit), notes=[note])
 
 
-def sql_error(error: duckdb.Error) -> QueryError:
+def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
     """Return what DuckDB says about SQL that somebody gave."""
     if isinstance(error, duckdb.OutOfMemoryException):
-        return QueryError("the SQL needs more memory than it may take", MORE_MEMORY)
+        return out_of_memory("the SQL", *more_memory)
     # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))

@@ -138,6 +138,8 @@ def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
     """
     try:
         con.execute("SET memory_limit = ?", [limit])
+    except duckdb.OutOfMemoryException as error:
+        raise DatabaseError(f"too little memory for this database — {limit}", _EXAMPLE) from error
     except duckdb.Error as error:
         raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE) from error
     if limit.strip().startswith("-"):  # DuckDB takes it for no limit

@@ -42,14 +42,18 @@ def open_file(
         con = duckdb.connect(str(path), read_only=read_only, config=config)
         # A file that this process has open already is the same database, with its settings.
         if not _is_shut_in(con):
-            if memory_limit is not None:
-                set_memory_limit(con, memory_limit)
-            _prepare(con)
-            con.execute("SET temp_directory = ?", [str(spill_directory(path))])
-            con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
-            shut_in(con)
-            if not may_grow:
-                con.execute("SET lock_configuration = true")
+            try:
+                if memory_limit is not None:
+                    set_memory_limit(con, memory_limit)
+                _prepare(con)
+                con.execute("SET temp_directory = ?", [str(spill_directory(path))])
+                con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
+                shut_in(con)
+                if not may_grow:
+                    con.execute("SET lock_configuration = true")
+            except BaseException:
+                con.close()  # nobody may meet it half prepared
+                raise
     remove_abandoned(path, is_ours_alone=not read_only)
     remove_abandoned_workspaces(path.absolute().parent)
     return con

@@ -182,7 +182,7 @@ def fleet_sql(
                 joined = "\n;\n".join(found)
                 return interruptible(con, lambda: capped(con.sql(joined), limit))
     except duckdb.Error as error:
-        raise sql_error(error) from error
+        raise sql_error(error, "ask about fewer runs with --where") from error
 
 
 def fleet_worst(

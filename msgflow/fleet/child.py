@@ -176,7 +176,7 @@ def _failed(error: Exception, stage: str, seconds: float) -> Outcome:
         hint = "ingest it again when it is complete"
     elif _is_full(error, message):
         reason = Reason.NO_SPACE
-    elif isinstance(error, MemoryError) or "out of memory" in message.lower():
+    elif isinstance(error, MemoryError) or _needs_memory(message):
         reason = Reason.TOO_LARGE
         hint = "give its worker more memory"
     elif isinstance(error, TraceError | UsageError):
@@ -190,6 +190,10 @@ def _failed(error: Exception, stage: str, seconds: float) -> Outcome:
         hint=hint and without_secrets(hint),
         seconds=seconds,
     )
+
+
+def _needs_memory(message: str) -> bool:
+    return "out of memory" in message.lower() or "more memory is needed" in message
 
 
 def _is_full(error: Exception, message: str) -> bool:

@@ -19,7 +19,7 @@ from msgflow.query.selection import CUT_COLUMN
 from msgflow.resources import resource_directory
 from msgflow.run.choice import Run, choose_one
 from msgflow.run.window import MAXIMUM_NS
-from msgflow.sql.failure import is_of_the_file
+from msgflow.sql.failure import is_of_the_file, out_of_memory
 from msgflow.sql.header import Header, read
 from msgflow.sql.statement import program
 
@@ -235,6 +235,8 @@ def compare(
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
+        if isinstance(error, duckdb.OutOfMemoryException):
+            raise out_of_memory("the comparison") from error
         raise QueryError(f"the comparison failed: {first_line(error)}") from error
     result = QueryResult(table, _header(), (first, second))
     result.notes.extend(_one_sided(result, what, first, second))

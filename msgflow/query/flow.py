@@ -12,7 +12,7 @@ from msgflow.query.names import require_names
 from msgflow.query.run import bind, first_line, read_runs
 from msgflow.run.choice import Run, choose_one
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
-from msgflow.sql.failure import is_of_the_file
+from msgflow.sql.failure import is_of_the_file, out_of_memory
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
@@ -147,6 +147,8 @@ def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
+        if isinstance(error, duckdb.OutOfMemoryException):
+            raise out_of_memory("the flow") from error
         raise QueryError(f"the flow cannot be read: {first_line(error)}") from error
 
 

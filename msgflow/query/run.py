@@ -27,7 +27,7 @@ from msgflow.query.selection import (
 from msgflow.query.show.human import format_duration
 from msgflow.run.choice import Run, choose_runs
 from msgflow.run.window import format_epoch, time_window
-from msgflow.sql.failure import MORE_MEMORY, is_of_the_file
+from msgflow.sql.failure import is_of_the_file, out_of_memory
 from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
 
@@ -126,9 +126,7 @@ def run_query(
                 f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
             ) from error
         if isinstance(error, duckdb.OutOfMemoryException):
-            raise QueryError(
-                f"the query needs more memory than it may take — {header.name}", MORE_MEMORY
-            ) from error
+            raise out_of_memory(header.name) from error
         raise QueryError(f"the query failed: {first_line(error)} — {header.name}") from error
     table, total, hidden, cut = without_counts(table)
     if not internal and INTERNAL_COLUMN in table.column_names:

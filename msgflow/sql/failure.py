@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.errors import DatabaseError
+from msgflow.errors import DatabaseError, QueryError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,8 +26,6 @@ _DAMAGE = re.compile(
 # DuckDB 2.0 fails at times where dictionaries of strings pass through several joins; the same
 # statement seldom meets it twice (duckdb/duckdb#24807 is the like of it).
 _MISTAKE = re.compile(r"dict-surviving")
-# What helps where a question needs more memory than it may take.
-MORE_MEMORY = "give more with --memory-limit, or ask for less with --start and --end"
 _OF_FILES = (
     duckdb.IOException,
     duckdb.FatalException,
@@ -66,6 +64,13 @@ def in_words(error: BaseException, path: Path) -> DatabaseError | None:
             "restore the file from a copy, or ingest the traces into a new one",
         )
     return None
+
+
+def out_of_memory(
+    what: str, hint: str = "give more with --memory-limit, or ask for less at a time"
+) -> QueryError:
+    """Return the error of a question that DuckDB had not enough memory for."""
+    return QueryError(f"more memory is needed than the database may take — {what}", hint)
 
 
 @contextmanager

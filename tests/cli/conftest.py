@@ -19,6 +19,7 @@ def msgflow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Msgflow:
     monkeypatch.chdir(directory)
     monkeypatch.delenv("MSGFLOW_DB", raising=False)
     monkeypatch.delenv("MSGFLOW_DEBUG", raising=False)
+    monkeypatch.delenv("MSGFLOW_MEMORY_LIMIT", raising=False)
 
     def run(*arguments: object, stdin: str | None = None) -> Result:
         return CliRunner().invoke(app, [str(argument) for argument in arguments], input=stdin)

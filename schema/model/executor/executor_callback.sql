@@ -1,7 +1,7 @@
 -- name: staging.executor_callback
--- description: What executors called: the first callback instance after an event of an executor,
---     as the callback event before it was earlier. A step of its own, so that only these few
---     columns are in memory when states look it up.
+-- description: The first callback instance after an event of an executor, with no begin or end of
+--     a callback between the two. A step of its own, so that only these few columns are in memory
+--     when states look it up.
 -- grain: one row per executor event that a callback directly followed
 -- needs: staging.callback_pair, staging.callback_number
 SELECT p.executor_event_id, min(n.callback_instance_id) AS callback_instance_id
