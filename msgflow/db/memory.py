@@ -144,7 +144,11 @@ def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
         raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE) from error
     if limit.strip().startswith("-"):  # DuckDB takes it for no limit
         raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE)
-    if _limit_bytes(con) < _LEAST_BYTES:
+    try:
+        is_enough = _limit_bytes(con) >= _LEAST_BYTES
+    except duckdb.OutOfMemoryException:  # not even for that question
+        is_enough = False
+    if not is_enough:
         raise DatabaseError(f"too little memory for any database — {limit}", _EXAMPLE)
 
 

@@ -34,7 +34,12 @@ def test_a_limit_that_the_user_gave_is_kept() -> None:
 
 @pytest.mark.parametrize(
     ("limit", "what"),
-    [("plenty", "not an amount"), ("-1", "not an amount"), ("14MB", "too little memory")],
+    [
+        ("plenty", "not an amount"),
+        ("-1", "not an amount"),
+        ("14MB", "too little memory"),
+        ("1B", "too little memory"),
+    ],
 )
 def test_a_limit_that_nothing_can_work_with(limit: str, what: str) -> None:
     with duckdb.connect() as con, pytest.raises(DatabaseError, match=f"{what}.* — {limit}"):

@@ -30,6 +30,7 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.task import PASSING, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.sim import simulate
+from msgflow.sql.failure import out_of_memory
 
 _LENGTH = 0.05
 
@@ -337,6 +338,15 @@ def test_what_may_pass_is_tried_again(
         assert fleet_ingest([source], lake).failed_before == 1
         fake(Outcome(reason="broken"))
         assert fleet_ingest([source], lake, options=Options(retry_failed=True)).failed == 1
+
+
+@pytest.mark.parametrize(
+    "error",
+    [MemoryError(), duckdb.OutOfMemoryException("Out of Memory Error: no"), out_of_memory("q")],
+)
+def test_too_little_memory_is_told_from_other_errors(error: Exception) -> None:
+    assert child._failed(error, "answers", 1.0).reason == "too_large"
+    assert child._failed(UsageError("no such query"), "answers", 1.0).reason != "too_large"
 
 
 def test_what_no_worker_has_is_not_tried(filled: Filled, tmp_path: Path) -> None:
