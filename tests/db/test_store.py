@@ -37,25 +37,13 @@ def stored(con: duckdb.DuckDBPyConnection) -> list[int]:
     return [take_id for (take_id,) in rows]
 
 
-def test_few_rows_are_stored_as_they_come(con: duckdb.DuckDBPyConnection) -> None:
-    store.store(con, 1)
-    assert stored(con) == [3, 1, 2]
-
-
+@pytest.mark.parametrize(("enough", "first"), [(4, [3, 1, 2]), (3, [1, 2, 3])])
 def test_many_rows_are_put_in_order(
-    con: duckdb.DuckDBPyConnection, monkeypatch: pytest.MonkeyPatch
+    con: duckdb.DuckDBPyConnection, monkeypatch: pytest.MonkeyPatch, enough: int, first: list[int]
 ) -> None:
-    """In any order, what is stored takes far more room."""
-    monkeypatch.setattr(store, "_ROWS_WORTH_ORDERING", 3)
+    """In any order, what is stored takes far more room; to sort few rows costs more."""
+    monkeypatch.setattr(store, "_ROWS_WORTH_ORDERING", enough)
     store.store(con, 1)
-    assert stored(con) == [1, 2, 3]
+    assert stored(con) == first
     store.store(con, 2)
-    assert stored(con) == [1, 2, 3, 4, 5, 6]
-
-
-def test_one_row_less_is_not_many(
-    con: duckdb.DuckDBPyConnection, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(store, "_ROWS_WORTH_ORDERING", 4)
-    store.store(con, 1)
-    assert stored(con) == [3, 1, 2]
+    assert stored(con) == [*first, *(take_id + 3 for take_id in first)]
