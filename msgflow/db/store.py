@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 
 # Joins of more rows than fit into memory give them in any order, in which ids and times take far
-# more room. To put fewer rows in order costs more than it saves.
+# more room. To put fewer rows in order costs more than it saves: what counts are those of the
+# largest table that is staged.
 _ROWS_WORTH_ORDERING = 1_000_000
 
 
@@ -36,9 +37,9 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
         ).fetchall()
     )
     bases = _bases(con)
+    is_large = max(staged.values(), default=0) >= _ROWS_WORTH_ORDERING
     for table in TABLES.values():
         if table.name in staged:
-            is_large = staged[table.name] >= _ROWS_WORTH_ORDERING
             _copy(con, table, run_id, bases, in_order=is_large)
 
 

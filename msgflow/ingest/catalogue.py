@@ -142,20 +142,31 @@ class Tracepoint:
             ]
         )
 
-    def create_table_sql(self, catalog: str, labels: Iterable[str]) -> str:
-        """Return the statement that creates the staging table in this catalog or schema."""
+    def columns(self, labels: Iterable[str]) -> tuple[tuple[str, str], ...]:
+        """Return (name, DuckDB's type) of the columns of the staging table."""
         types = {
             Origin.EVENT_ID: "BIGINT",
             Origin.TS_NS: "BIGINT",
             Origin.LABEL: f"ENUM({', '.join(repr(label) for label in labels)})",
         }
-        columns = [
+        return (
             *self.common_columns,
             *((before.column, types[before.origin]) for before in self.predecessors),
             *((field.name, field.type) for field in self.fields),
-        ]
-        body = ",\n".join(f'    "{name}" {sql_type}' for name, sql_type in columns)
-        return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
+        )
+
+    def create_table_sql(
+        self, catalog: str, labels: Iterable[str], table: str | None = None
+    ) -> str:
+        """Return the statement that creates the staging table in this catalog or schema.
+
+        Args:
+            catalog: where it is made.
+            labels: all that successors call events.
+            table: its name, unless that is `table`.
+        """
+        body = ",\n".join(f'    "{name}" {sql_type}' for name, sql_type in self.columns(labels))
+        return f'CREATE TABLE "{catalog}"."{table or self.table}" (\n{body}\n)'
 
 
 @dataclass(frozen=True)

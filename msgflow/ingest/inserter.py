@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _Item = TypeVar("_Item")
 
-_WAITING = 16
+_WAITING = 1
 _SECONDS_BETWEEN_LOOKS = 0.1
 
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import UsageError
-from msgflow.ingest import reconciled, staging
+from msgflow.ingest import reconciled, staging, whole
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.ignored import is_ignored, matches
 from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.inserter import Inserter
-from msgflow.ingest.sequences import Sequences
+from msgflow.ingest.sequences import Placed, Sequences
 from msgflow.sql.statement import program
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 
@@ -102,7 +102,7 @@ def load_traces(
         sequences = Sequences(catalogue, _hosts(sources))
         con.begin()
         try:
-            with Inserter(tables.add) as inserter:
+            with Inserter(tables.add_all) as inserter:
                 for batch in _placed(batches, sequences, corrections, implausible):
                     interrupts.check()
                     inserter.put(batch)
@@ -163,8 +163,8 @@ def _placed(
     sequences: Sequences,
     corrections: Corrections | None,
     implausible: Implausible,
-) -> Iterator[tuple[str, pa.RecordBatch]]:
-    """Yield (table, rows) of all batches, round by round."""
+) -> Iterator[Placed | tuple[str, pa.RecordBatch]]:
+    """Yield the events of all batches, round by round, and (table, rows) of what has no thread."""
     tracepoints = load().in_traces
     for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
         events = []
@@ -180,11 +180,7 @@ def _placed(
             if rows.num_rows:
                 events.append((tracepoints[batch.name].name, rows))
         if events:
-            placed = sequences.place(events)
-            yield "thread", placed.threads
-            yield "thread_name", placed.thread_names
-            for name, rows in placed.batches:
-                yield tracepoints[name].table, rows
+            yield sequences.place(events)
 
 
 def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, pa.RecordBatch]:
@@ -214,13 +210,26 @@ class _Tables:
         self._uncommitted = 0
         self.replaced: set[int] = set()
 
-    def add(self, item: tuple[str, pa.RecordBatch]) -> None:
-        """Add (table, rows).
+    def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:
+        """Add the events of a round, or (table, rows).
 
         Raises:
             UsageError: the database holds these packets already, and must not replace them.
         """
-        table, rows = item
+        if isinstance(item, tuple):
+            self.add(*item)
+            return
+        self.add("thread", item.threads)
+        self.add("thread_name", item.thread_names)
+        for table, rows in whole.staged(item.batches):
+            self.add(table, rows)
+
+    def add(self, table: str, rows: pa.RecordBatch) -> None:
+        """Add rows to a table.
+
+        Raises:
+            UsageError: the database holds these packets already, and must not replace them.
+        """
         if table == PACKET and self._may_hold:
             self.replaced |= self._same_packets(rows)
         self._waiting.setdefault(table, []).append(rows)

@@ -10,8 +10,7 @@ from msgflow.db import objects
 from msgflow.db.conditions import conditions_of_diagnostics, conditions_of_model, is_empty
 from msgflow.db.diagnostic import STAGED, of_model, staged
 from msgflow.db.tables import TABLES
-from msgflow.ingest import staging
-from msgflow.ingest.catalogue import load
+from msgflow.ingest import calls, staging
 from msgflow.ingest.outline import creating, empty_tables
 from msgflow.ingest.reported import restore
 from msgflow.sql.emptiness import NEVER
@@ -81,6 +80,11 @@ class Growing:
                 "WHERE database_name IN ('raw', 'staging') AND estimated_size = 0"
             ).fetchall()
         }
+        self.empty |= {
+            f"raw.{view}"
+            for view, tables in calls.parts().items()
+            if all(f"raw.{table}" in self.empty for table in tables)
+        }
 
     def add(self, header: Header) -> None:
         """Create an object of the model, after all that it needs."""
@@ -96,6 +100,10 @@ class Growing:
         ((count,),) = self._con.execute(parsed(self._con, creating(header))).fetchall()
         if not count:
             self.empty.add(header.name)
+        elif header.name == calls.TAKEN_APART:
+            calls.take_apart(self._con)
+            self.empty -= {f"raw.{calls.apart(layer)}" for layer in calls.layers()}
+            self.empty -= {f"raw.{view}" for view in calls.parts()}
 
     def is_empty(self, name: str) -> bool:
         """Tell whether an object has no row for certain, by what is built."""
@@ -130,11 +138,10 @@ def _needs(header: Header) -> frozenset[str]:
     if _WHOLE_RAW & set(header.needs):
         return frozenset(header.needs) | _raw_tables()
     words = set(re.findall(r"\w+", header.body))
-    return frozenset(header.needs) | {
-        name for name in _raw_tables() if name.removeprefix("raw.") in words
-    }
+    tables = {table for word in words for table in calls.parts().get(word, (word,))}
+    return frozenset(header.needs) | {f"raw.{table}" for table in tables} & _raw_tables()
 
 
 @functools.cache
 def _raw_tables() -> frozenset[str]:
-    return frozenset(f"raw.{tracepoint.table}" for tracepoint in load().tracepoints.values())
+    return frozenset(f"raw.{table}" for table in staging.read_tables())

@@ -2,9 +2,11 @@
 
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
-tracepoint, the packets, and the threads, all as read. `staging` has `staging.source` (one row per
-trace), `staging.event_count`, `staging.declared` (tracepoints that were enabled in a trace, also if
-they never occurred), `staging.left_out` (events that another trace holds as well),
+tracepoint, the packets, and the threads, all as read; calls whose layers directly follow each
+other are rows of tables of their own, and views then show all events of a tracepoint (`calls.py`).
+`staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
+(tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
+that another trace holds as well),
 `staging.ignored` (patterns of events to leave out, with the events that match, NULL if none does),
 `staging.packet_read_once` (packets that a trace holds twice, or where it is NULL several traces),
 `staging.implausible` (values that were left out), `staging.damage`, `staging.event` (all events of
@@ -15,8 +17,10 @@ from event to event), and the objects of `schema/model`.
 from __future__ import annotations
 
 import contextlib
+from functools import cache
 from typing import TYPE_CHECKING
 
+from msgflow.ingest import calls
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
 
 if TYPE_CHECKING:
@@ -89,6 +93,9 @@ CREATE TABLE staging.damage (
 )
 """
 
+# Views that say of all events what the tables of each tracepoint say.
+_OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
+
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
     """Attach `raw`, with an empty table per tracepoint, and `staging`.
@@ -119,9 +126,10 @@ def _tables() -> tuple[str, ...]:
     catalogue = load()
     return (
         *(
-            each.create_table_sql("raw", catalogue.labels)
+            each.create_table_sql("raw", catalogue.labels, calls.apart(each))
             for each in catalogue.tracepoints.values()
         ),
+        *calls.statements(),
         _PACKET_TABLE,
         _THREAD_TABLES,
         _SOURCE_TABLE,
@@ -145,9 +153,17 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    tables = [tracepoint.table for tracepoint in load().tracepoints.values()]
-    for table in (*tables, "packet", "thread", "thread_name"):
+    for table in (*read_tables(), "packet", "thread", "thread_name"):
         con.execute(f"TRUNCATE raw.{table}")
+
+
+@cache
+def read_tables() -> tuple[str, ...]:
+    """Return the tables of `raw` that events are read into."""
+    return (
+        *(calls.apart(tracepoint) for tracepoint in load().tracepoints.values()),
+        *(call.table for call in calls.CALLS),
+    )
 
 
 @contextlib.contextmanager
@@ -196,14 +212,23 @@ def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Write every staging table that has rows to `directory` as Parquet."""
+    """Write all that is staged and has rows to `directory` as Parquet.
+
+    Calls that were put together are written as the events that they are of.
+    """
     directory.mkdir(parents=True, exist_ok=True)
-    for database, table in con.execute(
-        "SELECT database_name, table_name FROM duckdb_tables() "
-        "WHERE database_name IN ('raw', 'staging') AND estimated_size > 0 ORDER BY ALL"
-    ).fetchall():
-        target = _quoted(directory / f"{database}.{table}.parquet")
-        con.execute(f"COPY {database}.\"{table}\" TO '{target}' (FORMAT parquet)")
+    names = con.execute(
+        "SELECT database_name || '.' || table_name FROM duckdb_tables() "
+        "WHERE database_name IN ('raw', 'staging') "
+        "UNION ALL SELECT database_name || '.' || view_name FROM duckdb_views() "
+        "WHERE database_name IN ('raw', 'staging') AND NOT internal ORDER BY ALL"
+    ).fetchall()
+    parts = {f"raw.{table}" for tables in calls.parts().values() for table in tables}
+    for (name,) in names:
+        is_told = name in parts or name in _OF_ALL_EVENTS
+        if not is_told and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
+            target = _quoted(directory / f"{name}.parquet")
+            con.execute(f"COPY {name} TO '{target}' (FORMAT parquet)")
 
 
 def _quoted(path: Path) -> str:

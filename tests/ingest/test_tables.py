@@ -35,10 +35,10 @@ def rows(count: int) -> pa.RecordBatch:
 
 def test_rows_wait_for_more(con: duckdb.DuckDBPyConnection) -> None:
     tables = load._Tables(con, may_hold=False, may_replace=False)
-    tables.add(("a", rows(60)))
+    tables.add("a", rows(60))
     assert counts(con) == [0, 0, 0, 0]
-    tables.add(("b", rows(60)))
-    tables.add(("a", rows(40)))
+    tables.add("b", rows(60))
+    tables.add("a", rows(40))
     assert counts(con) == [100, 0, 0, 0]
     tables.flush()
     assert counts(con) == [100, 60, 0, 0]
@@ -50,7 +50,7 @@ def test_not_too_many_wait(con: duckdb.DuckDBPyConnection) -> None:
     """Those of the table with most of them go first."""
     tables = load._Tables(con, may_hold=False, may_replace=False)
     for table, count in (("a", 40), ("b", 70), ("c", 40), ("d", 1)):
-        tables.add((table, rows(count)))
+        tables.add(table, rows(count))
     assert counts(con) == [0, 70, 0, 0]
     tables.flush()
     assert counts(con) == [40, 70, 40, 1]

@@ -21,7 +21,7 @@ from msgflow.errors import TraceError
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.load import _placed
-from msgflow.ingest.sequences import Sequences
+from msgflow.ingest.sequences import Placed, Sequences
 from msgflow.trace.ctf import compiled, compiled_columns, events
 
 pytestmark = needs_kernel
@@ -37,7 +37,8 @@ def batches(trace: Path, *, placed: bool = False) -> list[Any]:
             if placed:
                 sequences = Sequences(load(), [0] * len(traces.traces))
                 read = traces.batches(load().arrow_schemas())
-                found += _placed(read, sequences, None, Implausible())
+                for item in _placed(read, sequences, None, Implausible()):
+                    found += [item] if isinstance(item, tuple) else _tables(item)
             else:
                 found += [(item.name, item.batch) for item in traces.batches()]
             return [*found, dict(traces.event_counts), list(traces.damages)]
@@ -58,6 +59,11 @@ def assert_same(trace: Path, *, placed: bool = False) -> None:
         one[1].validate(full=True)
         assert one[1].schema == other[1].schema
         assert one[1].equals(other[1]) or _texts(one[1]) == _texts(other[1]), one[0]
+
+
+def _tables(placed: Placed) -> list[tuple[str, pa.RecordBatch]]:
+    names = [("thread", placed.threads), ("thread_name", placed.thread_names)]
+    return [*names, *placed.batches]
 
 
 def _texts(batch: pa.RecordBatch) -> list[str]:

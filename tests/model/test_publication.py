@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import pytest
 from analysis import Analyse
 from ros_system import WRITER, RosSystem
 from staged_events import STEP_NS, Thread
@@ -239,6 +242,25 @@ def test_layers_of_caret(system: RosSystem, analyse: Analyse) -> None:
     ]
     assert model.column("SELECT end_ns FROM publication ORDER BY 1") == [
         time + 4 * STEP_NS for time in first
+    ]
+
+
+@pytest.mark.parametrize(
+    ("hook", "stamp"),
+    [
+        ({"name": "ros2_caret:dds_write", "message": 0xA}, None),
+        ({"name": "ros2_caret:dds_bind_addr_to_stamp", "source_stamp": 777}, 777),
+    ],
+)
+def test_a_hook_of_caret_behind_the_last_layer_is_one_more(
+    system: RosSystem, analyse: Analyse, hook: dict[str, Any], stamp: int | None
+) -> None:
+    system.publisher(MAIN, 0x10, "/chatter")
+    time = system.publish(MAIN, 0x10)
+    system.add(thread=MAIN, **hook)
+    model = analyse(system)
+    assert model.rows("SELECT end_ns, source_timestamp_ns FROM publication") == [
+        (time + 3 * STEP_NS, stamp)
     ]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msgflow.db import objects
+from msgflow.ingest.calls import TAKEN_APART
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
 
@@ -31,6 +32,8 @@ SCHEMAS = {
     "program": "program",
 }
 _REFERENCE = re.compile(r"\b(?:staging|store|derive|main)\.[a-z_0-9]+\b")
+# What is read, but differs once calls were taken apart.
+_TAKEN_APART = re.compile(r"\b(?:raw\.whole_[a-z_]+|[a-z0-9_]+_apart)\b")
 _COMMENT = re.compile(r"--[^\n]*")
 
 
@@ -53,9 +56,10 @@ class SqlFile:
 
     @property
     def references(self) -> set[str]:
-        """Every object that the body names, with its schema, but for itself."""
-        text = "\n".join(self.header.statements)
-        return set(_REFERENCE.findall(_COMMENT.sub("", text))) - {self.header.name}
+        """Every object that the body names, or has to come after, but for itself."""
+        text = _COMMENT.sub("", "\n".join(self.header.statements))
+        after = {TAKEN_APART} if _TAKEN_APART.search(text) else set()
+        return ({*_REFERENCE.findall(text)} | after) - {self.header.name}
 
 
 def sql_paths() -> list[tuple[str, Path]]:

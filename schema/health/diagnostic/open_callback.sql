@@ -7,12 +7,12 @@
 -- grain: one row per trace
 -- severity: info
 -- phase: model
--- needs: staging.callback_instance
+-- needs: staging.callback_pair
 SELECT
-    trace_id,
+    trace_index + 1 AS trace_id,
     count(*) AS count,
     'callback instances without an end: the trace or the process ended, a callback threw, or '
     || 'events were lost' AS detail
-FROM staging.callback_instance
+FROM staging.callback_pair
 WHERE end_ns IS NULL
-GROUP BY trace_id
+GROUP BY trace_index

@@ -5,7 +5,7 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: model
--- needs: staging.callback, staging.callback_instance, diagnostic.process_label
+-- needs: staging.callback, staging.callback_number, diagnostic.process_label
 SELECT
     NULL AS trace_id,
     count(*) AS count,
@@ -17,7 +17,7 @@ JOIN process_label AS l ON c.process_id = l.process_id
 WHERE c.kind = 'unknown'
     AND c.callback_id IN (
         SELECT callback_id
-        FROM staging.callback_instance
+        FROM staging.callback_number
         WHERE callback_id IN (SELECT callback_id FROM staging.callback WHERE kind = 'unknown')
     )
 HAVING count(*) > 0

@@ -1,4 +1,5 @@
 -- name: staging.publication
+-- kind: inline
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
 -- needs: staging.publication_call, staging.publication_number, staging.callback_left_over,

@@ -3,7 +3,8 @@
 --     call is the replay of a message that was kept for a subscription that joined late. A buffer
 --     that is made anew at an address is empty.
 -- grain: one row per enqueue, dequeue or clearing of a ring buffer
--- needs: staging.located, staging.publication, staging.take
+-- needs: staging.located, staging.publication_call, staging.publication_number,
+--     staging.take_number
 WITH enqueue AS (
     SELECT
         event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten
@@ -13,9 +14,10 @@ published AS (
     SELECT e.event_id, b.publication_id
     FROM enqueue AS e
     ASOF JOIN (
-        SELECT publication_id, thread_id, start_event_id, end_event_id
-        FROM staging.publication
-        WHERE intra_ns IS NOT NULL
+        SELECT n.publication_id, c.thread_id, c.start_event_id, c.end_event_id
+        FROM staging.publication_call AS c
+        JOIN staging.publication_number AS n ON c.start_event_id = n.start_event_id
+        WHERE c.intra_ns IS NOT NULL
     ) AS b
         ON e.thread_id = b.thread_id AND e.event_id > b.start_event_id
     WHERE e.event_id <= b.end_event_id
@@ -31,8 +33,7 @@ SELECT
     d.trace_index + 1, d.process_id, 'dequeue', d.buffer, d."index", d.ts_ns, NULL, t.take_id,
     false, d.event_id
 FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
-LEFT JOIN (SELECT take_id, start_event_id FROM staging.take WHERE method = 'ring_buffer') AS t
-    ON d.event_id = t.start_event_id
+LEFT JOIN staging.take_number AS t ON d.event_id = t.start_event_id
 UNION ALL
 SELECT
     trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id

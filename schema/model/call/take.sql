@@ -1,23 +1,24 @@
 -- name: staging.take
+-- kind: inline
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
--- needs: staging.take_origin, staging.subscription, staging.beside_gap, staging.callback_gap,
---     staging.predecessor, raw
-WITH subscription_of AS (
-    SELECT o.start_event_id, s.subscription_id
-    FROM staging.take_origin AS o
-    JOIN staging.subscription AS s ON o.subscription_event_id = s.event_id
+-- needs: staging.take_chain, staging.take_number, staging.callback_pair, staging.beside_gap,
+--     staging.callback_gap, staging.predecessor, raw
+WITH every_take AS NOT MATERIALIZED (
+    SELECT
+        n.take_id, c.trace_index, n.subscription_id, c.process_id, c.thread_id, c.taken_ns,
+        c.source_timestamp_ns, c.method, c.start_event_id, c.end_event_id,
+        n.callback_start_event_id
+    FROM staging.take_chain AS c
+    JOIN staging.take_number AS n ON c.start_event_id = n.start_event_id
     UNION ALL
-    SELECT o.start_event_id, s.subscription_id
-    FROM staging.take_origin AS o
-    JOIN staging.subscription AS s
-        ON o.process_id = s.process_id AND o.rmw_handle = s.rmw_handle
-    WHERE o.subscription_event_id IS NULL AND s.is_inferred
-),
--- Apart, since what is sorted should be narrow.
-numbered AS (
-    SELECT start_event_id, row_number() OVER (ORDER BY start_event_id) AS take_id
-    FROM staging.take_origin
+    SELECT
+        n.take_id, p.trace_index, n.subscription_id, p.process_id, p.thread_id, p.start_ns,
+        NULL, 'callback_only', p.start_event_id, p.start_event_id, p.start_event_id
+    FROM staging.callback_pair AS p
+    JOIN (
+        SELECT * FROM staging.take_number WHERE start_event_id = callback_start_event_id
+    ) AS n ON p.start_event_id = n.start_event_id
 ),
 elsewhere AS (
     SELECT thread_id, event_id FROM staging.callback_gap WHERE NOT is_between
@@ -26,7 +27,7 @@ elsewhere AS (
 interrupted AS (
     SELECT o.start_event_id
     FROM (
-        SELECT * FROM staging.take_origin WHERE thread_id IN (SELECT thread_id FROM elsewhere)
+        SELECT * FROM every_take WHERE thread_id IN (SELECT thread_id FROM elsewhere)
     ) AS o
     ASOF JOIN elsewhere AS g
         ON o.thread_id = g.thread_id
@@ -42,9 +43,9 @@ remnant AS (
     WHERE p.sequence = 'call'
 )
 SELECT
-    n.take_id,
+    o.take_id,
     o.trace_index + 1 AS trace_id,
-    s.subscription_id,
+    o.subscription_id,
     o.process_id,
     o.thread_id,
     o.taken_ns,
@@ -58,9 +59,7 @@ SELECT
     OR inside.start_event_id IS NOT NULL
     OR (o.method = 'callback_only' AND o.start_event_id IN (SELECT event_id FROM remnant))
         AS is_loss_affected
-FROM staging.take_origin AS o
-JOIN numbered AS n ON o.start_event_id = n.start_event_id
-LEFT JOIN subscription_of AS s ON o.start_event_id = s.start_event_id
+FROM every_take AS o
 LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind
     ON o.start_event_id = behind.event_id
 LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE NOT is_behind) AS before

@@ -4,15 +4,15 @@
 --     the message without a traced take. A callback that none was traced for is a subscription of
 --     its own, a placeholder by its first instance.
 -- grain: one row per such take or callback instance
--- needs: staging.take_chain, staging.take_subscription, staging.callback_binding,
---     staging.buffer_owner
+-- needs: staging.take_subscription, staging.callback_binding, staging.buffer_owner
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, o.subscription_event_id, o.is_inferred
-    FROM staging.take_chain AS t
-    ANTI JOIN staging.take_subscription AS s ON t.start_event_id = s.start_event_id
+    FROM staging.take_subscription AS t
     JOIN staging.buffer_owner AS o
         ON t.process_id = o.process_id AND t.buffer_handle = o.buffer_handle
-    WHERE t.method = 'ring_buffer' AND o.subscription_event_id IS NOT NULL
+    WHERE t.method = 'ring_buffer'
+        AND t.subscription_event_id IS NULL
+        AND o.subscription_event_id IS NOT NULL
 ),
 lonely AS (
     SELECT start_event_id, process_id, callback_handle, callback_event_id

@@ -4,8 +4,8 @@
 --     frequent), else what it belongs to from the executor.
 -- grain: one row per callback object
 -- needs: staging.callback_known, staging.callback_binding, staging.callback_owner,
---     staging.subscription, staging.take, staging.timer, staging.service, staging.service_event,
---     staging.request_callback
+--     staging.subscription, staging.take_number, staging.timer, staging.service,
+--     staging.service_event, staging.request_callback
 WITH learned AS (
     SELECT
         b.process_id,
@@ -13,7 +13,7 @@ WITH learned AS (
         b.callback_event_id,
         mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
     FROM staging.callback_binding AS b
-    JOIN staging.take AS t ON b.start_event_id = t.callback_start_event_id
+    JOIN staging.take_number AS t ON b.start_event_id = t.callback_start_event_id
     WHERE b.kind IS NULL OR b.kind IN ('unknown', 'subscription')
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id
 ),

@@ -4,8 +4,8 @@
 --     of the executor between the two; an rmw take is not for an intra-process call, nor a dequeue
 --     for another; the subscriptions agree where both are known.
 -- grain: one row per callback_start
--- needs: staging.callback_run, staging.callback_known, staging.take_chain,
---     staging.take_subscription, staging.with_latest
+-- needs: staging.callback_run, staging.callback_known, staging.take_subscription,
+--     staging.with_latest
 WITH begun AS NOT MATERIALIZED (
     SELECT
         start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,
@@ -22,26 +22,6 @@ run AS (
         b.object_event_id AS callback_event_id, k.kind, k.subscription_event_id
     FROM staging.with_latest('begun', 'known') AS b
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
-),
-taken AS (
-    SELECT c.start_event_id, c.end_event_id, c.method, s.subscription_event_id
-    FROM staging.take_chain AS c
-    LEFT JOIN staging.take_subscription AS s ON c.start_event_id = s.start_event_id
-),
-bound AS (
-    SELECT
-        r.start_event_id,
-        t.start_event_id AS take_event_id,
-        t.subscription_event_id
-    FROM run AS r
-    JOIN taken AS t ON r.previous_event_id = t.end_event_id
-    -- As recorded: what the executor said after the take stands, whatever else was lost. It is NULL
-    -- only where the thread had no executor event at all.
-    WHERE (r.previous_executor_event_id IS NULL OR r.previous_executor_event_id < t.end_event_id)
-        AND r.is_intra_process = (t.method = 'ring_buffer')
-        AND r.kind IS DISTINCT FROM 'timer'
-        AND r.kind IS DISTINCT FROM 'service'
-        AND coalesce(r.subscription_event_id = t.subscription_event_id, true)
 )
 SELECT
     r.start_event_id,
@@ -50,7 +30,15 @@ SELECT
     r.is_intra_process,
     r.callback_event_id,
     r.kind,
-    b.take_event_id,
-    coalesce(r.subscription_event_id, b.subscription_event_id) AS subscription_event_id
+    t.start_event_id AS take_event_id,
+    coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id
 FROM run AS r
-LEFT JOIN bound AS b ON r.start_event_id = b.start_event_id
+LEFT JOIN staging.take_subscription AS t
+    ON r.previous_event_id = t.end_event_id
+    -- As recorded: what the executor said after the take stands, whatever else was lost. It is NULL
+    -- only where the thread had no executor event at all.
+    AND (r.previous_executor_event_id IS NULL OR r.previous_executor_event_id < t.end_event_id)
+    AND r.is_intra_process = (t.method = 'ring_buffer')
+    AND r.kind IS DISTINCT FROM 'timer'
+    AND r.kind IS DISTINCT FROM 'service'
+    AND coalesce(r.subscription_event_id = t.subscription_event_id, true)

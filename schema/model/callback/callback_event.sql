@@ -1,20 +1,20 @@
 -- name: staging.callback_event
--- description: Begins and ends of callbacks, with what comes before them on their thread: directly,
---     of callbacks, and of the executor (not across a gap). `segment` counts the gaps that their
---     thread has seen.
--- grain: one row per callback_start or callback_end
--- needs: staging.behind_gap, staging.callback_segment, staging.context, raw
+-- description: Begins and ends of callbacks that are not whole, with what comes before them on
+--     their thread: directly, of callbacks, and of the executor (not across a gap). `segment`
+--     counts the gaps that their thread has seen.
+-- grain: one row per such callback_start or callback_end
+-- needs: staging.taken_apart, staging.behind_gap, staging.callback_segment, staging.context, raw
 WITH event AS (
     SELECT
         event_id, ts_ns, trace_index, cpu_id, thread_index, callback AS callback_handle,
         true AS is_start, coalesce(is_intra_process = 1, false) AS is_intra_process,
         previous_call_event_id, previous_callback_event_id, previous_executor_event_id
-    FROM raw.ros2_callback_start
+    FROM raw.ros2_callback_start_apart
     UNION ALL
     SELECT
         event_id, ts_ns, trace_index, cpu_id, thread_index, callback, false, false,
         previous_call_event_id, previous_callback_event_id, NULL
-    FROM raw.ros2_callback_end
+    FROM raw.ros2_callback_end_apart
 ),
 located AS (
     SELECT e.*, c.thread_id, c.process_id

@@ -3,7 +3,7 @@
 --     callback and the take that it was called with. A step of its own: looked up for the whole
 --     instances at once, all three would stay in memory beside them.
 -- grain: one row per callback instance
--- needs: staging.callback_pair, staging.callback_binding, staging.callback, staging.take
+-- needs: staging.callback_pair, staging.callback_binding, staging.callback, staging.take_number
 WITH callback_of AS (
     SELECT b.start_event_id, c.callback_id
     FROM staging.callback_binding AS b
@@ -27,4 +27,4 @@ place AS (
 SELECT p.start_event_id, p.callback_instance_id, c.callback_id, t.take_id
 FROM place AS p
 JOIN callback_of AS c ON p.start_event_id = c.start_event_id
-LEFT JOIN staging.take AS t ON p.start_event_id = t.callback_start_event_id
+LEFT JOIN staging.take_number AS t ON p.start_event_id = t.callback_start_event_id

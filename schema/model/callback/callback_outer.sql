@@ -10,7 +10,11 @@
 WITH closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
     FROM staging.callback_open AS o
-    JOIN staging.callback_event AS e
+    JOIN (
+        SELECT event_id, thread_id, previous_callback_event_id FROM staging.callback_event
+        UNION ALL
+        SELECT start_event_id, thread_id, previous_callback_event_id FROM staging.callback_pair
+    ) AS e
         ON o.start_event_id = e.previous_callback_event_id AND o.thread_id = e.thread_id
     GROUP BY o.start_event_id
     UNION ALL

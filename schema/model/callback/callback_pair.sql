@@ -1,19 +1,28 @@
 -- name: staging.callback_pair
--- description: Begins of callbacks with their end; `is_plain` where no other begin or end of a
---     callback lies between.
+-- kind: inline
+-- description: Begins of callbacks with their end: whole ones, as they were put together while they
+--     were read, and the rest. `is_plain` where no other begin or end of a callback lies between.
 -- grain: one row per callback_start
--- needs: staging.callback_event, staging.callback_plain, staging.callback_left_over
-WITH found AS (
-    SELECT start_event_id, end_event_id, end_ns, true AS is_plain
-    FROM staging.callback_plain
-    UNION ALL
-    SELECT event_id, partner_event_id, partner_ns, false
-    FROM staging.callback_left_over
-    WHERE is_start
-)
+-- needs: staging.callback_rest, staging.taken_apart, staging.context, raw
 SELECT
-    s.event_id AS start_event_id, f.end_event_id, s.ts_ns AS start_ns, f.end_ns, s.trace_index,
-    s.thread_id, s.process_id, s.callback_handle, s.is_intra_process, s.previous_event_id,
-    s.previous_callback_event_id, s.previous_executor_event_id, s.executor_event_id, f.is_plain
-FROM staging.callback_event AS s
-JOIN found AS f ON s.event_id = f.start_event_id
+    w.callback_start_event_id AS start_event_id,
+    w.callback_end_event_id AS end_event_id,
+    w.callback_start_ts_ns AS start_ns,
+    w.callback_end_ts_ns AS end_ns,
+    w.trace_index,
+    c.thread_id,
+    c.process_id,
+    w.callback AS callback_handle,
+    coalesce(w.callback_start_is_intra_process = 1, false) AS is_intra_process,
+    w.callback_start_previous_call_event_id AS previous_event_id,
+    w.callback_start_previous_callback_event_id AS previous_callback_event_id,
+    w.callback_start_previous_executor_event_id AS previous_executor_event_id,
+    w.callback_start_previous_executor_event_id AS executor_event_id,
+    true AS is_plain
+FROM raw.whole_callback AS w
+JOIN staging.context AS c
+    ON w.thread_index = c.thread_index
+    AND w.callback_start_event_id >= c.from_event_id
+    AND w.callback_start_event_id < c.until_event_id
+UNION ALL
+FROM staging.callback_rest

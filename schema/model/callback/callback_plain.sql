@@ -1,6 +1,6 @@
 -- name: staging.callback_plain
--- description: Begins of callbacks whose end is the next begin or end of any callback on their
---     thread, which is nearly always so. No gap lies between.
+-- description: Begins of callbacks, not whole yet, whose end is the next begin or end of any
+--     callback on their thread. No gap lies between.
 -- grain: one row per such begin and end
 -- needs: staging.callback_event
 SELECT s.event_id AS start_event_id, e.event_id AS end_event_id, e.ts_ns AS end_ns

@@ -4,8 +4,9 @@
 --     smallest thread of such a group stands for it. A thread that serves several executors by
 --     name belongs to the one of which it ran most.
 -- grain: one row per thread that runs callbacks or emits executor events
--- needs: staging.callback_instance, staging.callback_group_entry, staging.callback_group_owner,
---     staging.executor_first, staging.thread
+-- needs: staging.callback_run, staging.callback_pair, staging.callback_number,
+--     staging.callback_group_entry, staging.callback_group_owner, staging.executor_first,
+--     staging.thread
 WITH RECURSIVE served AS (
     SELECT e.callback_id, g.executor_event_id
     FROM staging.callback_group_entry AS e
@@ -15,11 +16,12 @@ WITH RECURSIVE served AS (
 main_executor AS (
     SELECT thread_id, executor_event_id
     FROM (
-        SELECT i.thread_id, s.executor_event_id, count(*) AS run_count
-        FROM staging.callback_instance AS i
-        JOIN served AS s ON i.callback_id = s.callback_id
-        WHERE i.depth = 1
-        GROUP BY i.thread_id, s.executor_event_id
+        SELECT r.thread_id, s.executor_event_id, count(*) AS run_count
+        FROM staging.callback_run AS r
+        JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
+        JOIN served AS s ON n.callback_id = s.callback_id
+        WHERE r.depth = 1
+        GROUP BY r.thread_id, s.executor_event_id
     )
     QUALIFY row_number() OVER (
         PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id
@@ -29,9 +31,10 @@ main_executor AS (
 runs AS (
     SELECT thread_id, -1 - executor_event_id AS tie_id FROM main_executor
     UNION ALL
-    SELECT DISTINCT i.thread_id, i.callback_id
-    FROM staging.callback_instance AS i
-    ANTI JOIN served AS s ON i.callback_id = s.callback_id
+    SELECT DISTINCT r.thread_id, n.callback_id
+    FROM staging.callback_pair AS r
+    JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
+    ANTI JOIN served AS s ON n.callback_id = s.callback_id
 ),
 -- Each thread is tied to the smallest one that shares something with it, not to all.
 neighbour AS (

@@ -4,12 +4,11 @@
 --     which may be known; else it is a placeholder by the first dequeue. Where several callbacks
 --     follow on one buffer, or one on several, nobody can tell (NULL).
 -- grain: one row per process and ring buffer without a known subscription
--- needs: staging.take_chain, staging.take_subscription, staging.callback_binding
+-- needs: staging.take_subscription, staging.callback_binding
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, t.buffer_handle
-    FROM staging.take_chain AS t
-    ANTI JOIN staging.take_subscription AS s ON t.start_event_id = s.start_event_id
-    WHERE t.method = 'ring_buffer'
+    FROM staging.take_subscription AS t
+    WHERE t.method = 'ring_buffer' AND t.subscription_event_id IS NULL
 ),
 used AS (
     SELECT DISTINCT

@@ -1,7 +1,7 @@
 -- name: staging.request
 -- description: Requests; a side that was not traced is NULL.
 -- grain: one row per request and service that took it; one per request that no service took
--- needs: staging.request_origin, staging.client, staging.service, staging.callback_instance
+-- needs: staging.request_origin, staging.client, staging.service, staging.callback_number
 SELECT
     q.request_id,
     c.client_id,
@@ -15,4 +15,4 @@ SELECT
 FROM staging.request_origin AS q
 LEFT JOIN staging.client AS c ON q.client_event_id = c.event_id
 LEFT JOIN staging.service AS s ON q.service_event_id = s.event_id
-LEFT JOIN staging.callback_instance AS i ON q.callback_start_event_id = i.start_event_id
+LEFT JOIN staging.callback_number AS i ON q.callback_start_event_id = i.start_event_id

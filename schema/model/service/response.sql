@@ -1,7 +1,7 @@
 -- name: staging.response
 -- description: Responses; a side that was not traced is NULL.
 -- grain: one row per response
--- needs: staging.response_origin, staging.client, staging.service, staging.callback_instance
+-- needs: staging.response_origin, staging.client, staging.service, staging.callback_number
 SELECT
     r.response_id,
     c.client_id,
@@ -16,4 +16,4 @@ SELECT
 FROM staging.response_origin AS r
 LEFT JOIN staging.client AS c ON r.client_event_id = c.event_id
 LEFT JOIN staging.service AS s ON r.service_event_id = s.event_id
-LEFT JOIN staging.callback_instance AS i ON r.callback_start_event_id = i.start_event_id
+LEFT JOIN staging.callback_number AS i ON r.callback_start_event_id = i.start_event_id

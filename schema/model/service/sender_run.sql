@@ -2,17 +2,21 @@
 -- description: Callback instances that requests and responses were sent in: the innermost on the
 --     thread that had begun and was not over.
 -- grain: one row per request or response sent inside a callback instance
--- needs: staging.client_event, staging.service_event, staging.callback_instance
+-- needs: staging.client_event, staging.service_event, staging.callback_run,
+--     staging.callback_number, staging.callback_parent
 WITH send AS (
     SELECT event_id, thread_id FROM staging.client_event WHERE is_request
     UNION ALL
     SELECT event_id, thread_id FROM staging.service_event WHERE NOT is_request
 ),
 run AS (
-    SELECT i.callback_instance_id, i.parent_id, i.thread_id, i.depth, i.start_event_id,
-        i.effective_end_event_id
-    FROM staging.callback_instance AS i
-    SEMI JOIN send AS s ON i.thread_id = s.thread_id
+    SELECT
+        n.callback_instance_id, p.parent_id, r.thread_id, r.depth, r.start_event_id,
+        r.effective_end_event_id
+    FROM staging.callback_run AS r
+    SEMI JOIN send AS s ON r.thread_id = s.thread_id
+    JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
+    LEFT JOIN staging.callback_parent AS p ON r.start_event_id = p.start_event_id
 ),
 nesting AS (
     SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL
