@@ -4,8 +4,9 @@
 --     when states look it up.
 -- grain: one row per executor event that a callback directly followed
 -- needs: staging.callback_pair, staging.callback_number
-SELECT p.executor_event_id, min(n.callback_instance_id) AS callback_instance_id
+
+-- Of those behind one event, only the first has no other callback before it.
+SELECT p.executor_event_id, n.callback_instance_id
 FROM staging.callback_pair AS p
 JOIN staging.callback_number AS n ON p.start_event_id = n.start_event_id
 WHERE coalesce(p.previous_callback_event_id < p.executor_event_id, p.executor_event_id IS NOT NULL)
-GROUP BY p.executor_event_id
