@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -46,6 +47,29 @@ def test_a_loss_of_the_cpu_that_was_left(system: RosSystem, analyse: Analyse) ->
     start = system.start(HERE, 0xC1)
     system.add("ros2:callback_end", THERE, ts=start + 100, callback=0xC1)
     packets(system, (start + 50, start + 60), cpu=0)
+    assert analyse(system).rows(RUNS) == [(start, None, True)]
+
+
+@pytest.mark.parametrize(
+    ("before", "loss", "after"),
+    [
+        (9, (100, 101), 209),
+        (19, (25, 26), 41),
+        (9, (11, 12), 29),
+        (9, (25, 26), 29),
+        (9, (11, 75), 89),
+    ],
+    ids=["far from both", "next to both", "near the first", "near the second", "long"],
+)
+def test_a_gap_is_found_wherever_it_lies_between_two_events(
+    system: RosSystem, analyse: Analyse, before: int, loss: tuple[int, int], after: int
+) -> None:
+    """In milliseconds: gaps are looked for in stretches of 20."""
+    ms = 1_000_000
+    start = system.add("ros2:callback_start", HERE, ts=before * ms, callback=0xC1)
+    system.add("ros2:callback_end", HERE, ts=after * ms, callback=0xC1)
+    system.add_packet(0, loss[1] * ms, last_event=loss[0] * ms, discarded=3)
+    system.add_packet(loss[1] * ms, 300 * ms)
     assert analyse(system).rows(RUNS) == [(start, None, True)]
 
 

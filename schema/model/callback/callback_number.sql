@@ -29,3 +29,4 @@ numbered AS (
 SELECT r.start_event_id, r.callback_instance_id, r.callback_id, t.take_id
 FROM numbered AS r
 LEFT JOIN staging.take_number AS t ON r.start_event_id = t.callback_start_event_id
+WHERE r.callback_id IS NOT NULL
