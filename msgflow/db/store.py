@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 
 # Joins of more rows than fit into memory give them in any order, in which ids and times take far
-# more room. To put fewer rows in order costs more than it saves: what counts are those of the
-# largest table that is staged.
+# more room. To put fewer rows in order costs more than it saves. Of a view it is not known how many
+# it has: where one table is large, everything is put in order.
 _ROWS_WORTH_ORDERING = 1_000_000
 
 

@@ -8,21 +8,22 @@ call, and `raw.<table>` is a view of all.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, load
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import duckdb
-
     from msgflow.ingest.catalogue import Tracepoint
 
 TAKEN_APART = "staging.taken_apart"
-"""The object of the model that lists the calls that have to be taken apart again."""
+"""The object of the model that tells which calls have to be taken apart again."""
 
 _CONTEXT = tuple(name for name, _ in COMMON_COLUMNS[2:])
 
@@ -154,17 +155,23 @@ def statements() -> tuple[str, ...]:
     return (*map(_table, CALLS), *map(_view, layers()))
 
 
-def take_apart(con: duckdb.DuckDBPyConnection) -> None:
-    """Move the events of the calls in `staging.taken_apart` to those that are in no whole call."""
-    for call in CALLS:
-        last = call.column_of(len(call.layers) - 1, "event_id")
-        chosen = (
-            f"FROM raw.{call.table} WHERE {last} IN "
-            f"(SELECT event_id FROM {TAKEN_APART} WHERE call = '{call.name}')"
-        )
+def take_apart(con: duckdb.DuckDBPyConnection, call: Call) -> None:
+    """Move the events of those calls that `staging.taken_apart` tells of, all of them or none."""
+    last = call.column_of(len(call.layers) - 1, "event_id")
+    chosen = (
+        f"FROM raw.{call.table} WHERE {last} IN (SELECT event_id FROM {TAKEN_APART}) "
+        f"OR thread_index IN (SELECT thread_index FROM {TAKEN_APART})"
+    )
+    con.begin()
+    try:
         for place, layer in enumerate(call.layers):
             con.execute(f"INSERT INTO raw.{apart(layer)} SELECT {_columns(call, place)} {chosen}")
         con.execute(f"DELETE {chosen}")
+        con.commit()
+    except BaseException:
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
+        raise
 
 
 def _columns(call: Call, place: int) -> str:

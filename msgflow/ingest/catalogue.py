@@ -155,18 +155,16 @@ class Tracepoint:
             *((field.name, field.type) for field in self.fields),
         )
 
-    def create_table_sql(
-        self, catalog: str, labels: Iterable[str], table: str | None = None
-    ) -> str:
+    def create_table_sql(self, catalog: str, labels: Iterable[str], name: str | None = None) -> str:
         """Return the statement that creates the staging table in this catalog or schema.
 
         Args:
             catalog: where it is made.
             labels: all that successors call events.
-            table: its name, unless that is `table`.
+            name: of the table; None: its usual one.
         """
-        body = ",\n".join(f'    "{name}" {sql_type}' for name, sql_type in self.columns(labels))
-        return f'CREATE TABLE "{catalog}"."{table or self.table}" (\n{body}\n)'
+        body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in self.columns(labels))
+        return f'CREATE TABLE "{catalog}"."{name or self.table}" (\n{body}\n)'
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Inserts batches in a thread of its own, while the next ones are read."""
+"""Inserts what was read in a thread of its own, while the next is read."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ if TYPE_CHECKING:
 
 _Item = TypeVar("_Item")
 
+# All events of a round are one item.
 _WAITING = 1
 _SECONDS_BETWEEN_LOOKS = 0.1
 
 
 class Inserter(Generic[_Item]):
-    """A context manager that hands batches to `insert`, one after the other, in order.
+    """A context manager that hands items to `insert`, one after the other, in order.
 
     Leaving it waits until all are inserted, or drops them when it is left by an exception. What
     `insert` raises is raised by the next `put`, or on leaving.
@@ -30,17 +31,17 @@ class Inserter(Generic[_Item]):
         self._is_dropping = False
         self._thread = threading.Thread(target=self._work, name="insert batches")
 
-    def put(self, batch: _Item) -> None:
-        """Hand over a batch; waits while too many are waiting.
+    def put(self, item: _Item) -> None:
+        """Hand over an item; waits while too many are waiting.
 
         Raises:
-            BaseException: whatever inserting an earlier batch raised.
+            BaseException: whatever inserting an earlier one raised.
         """
         while True:
             if self._error is not None:
                 raise self._error
             try:
-                return self._waiting.put(batch, timeout=_SECONDS_BETWEEN_LOOKS)
+                return self._waiting.put(item, timeout=_SECONDS_BETWEEN_LOOKS)
             except queue.Full:
                 continue
 
@@ -61,10 +62,10 @@ class Inserter(Generic[_Item]):
             raise self._error
 
     def _work(self) -> None:
-        while (batch := self._waiting.get()) is not None:
+        while (item := self._waiting.get()) is not None:
             if self._is_dropping or self._error is not None:
                 continue
             try:
-                self._insert(batch)
+                self._insert(item)
             except BaseException as error:  # for the thread that reads
                 self._error = error

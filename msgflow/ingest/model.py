@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Header
 
 
-# Views of all tables of `raw`.
-_WHOLE_RAW = {"staging.event", "staging.predecessor"}
-
-
 def build(
     con: duckdb.DuckDBPyConnection,
     memory: Memory,
@@ -47,11 +43,11 @@ def build(
     """
     restore(con)
     headers = objects.load("model")
-    growing = Growing(con)
+    growing = Growing(con, memory.run)
     staging.narrow(con, growing.empty)
     dropped: set[str] = set()
     for position, header in enumerate(headers):
-        memory.run(functools.partial(growing.add, header))
+        growing.add(header)
         if not keep:
             # A table without rows is no burden.
             for name in _finished(headers, position) - dropped - growing.empty:
@@ -68,8 +64,19 @@ class Growing:
         empty: the tables of `raw` and `staging` without a row, as far as they are built.
     """
 
-    def __init__(self, con: duckdb.DuckDBPyConnection) -> None:
+    def __init__(
+        self,
+        con: duckdb.DuckDBPyConnection,
+        run: Callable[[Callable[[], None]], None] = lambda work: work(),
+    ) -> None:
+        """Start with what was read.
+
+        Args:
+            con: connection with `raw` and `staging` attached and filled.
+            run: runs work that leaves nothing behind when it fails, again where memory was short.
+        """
         self._con = con
+        self._run = run
         of_diagnostics = conditions_of_diagnostics()
         self._conditions = {**conditions_of_model(), **of_diagnostics}
         self._conditions[STAGED] = ["all", *(of_diagnostics.get(d.name, NEVER) for d in of_model())]
@@ -88,6 +95,13 @@ class Growing:
 
     def add(self, header: Header) -> None:
         """Create an object of the model, after all that it needs."""
+        self._run(functools.partial(self._create, header))
+        if header.name == calls.TAKEN_APART and header.name not in self.empty:
+            for call in calls.CALLS:
+                self._run(functools.partial(calls.take_apart, self._con, call))
+            self.empty -= {f"raw.{calls.apart(layer)}" for layer in calls.layers()}
+
+    def _create(self, header: Header) -> None:
         if header.kind != "view":
             self._con.execute(parsed(self._con, creating(header)))
             return
@@ -100,10 +114,6 @@ class Growing:
         ((count,),) = self._con.execute(parsed(self._con, creating(header))).fetchall()
         if not count:
             self.empty.add(header.name)
-        elif header.name == calls.TAKEN_APART:
-            calls.take_apart(self._con)
-            self.empty -= {f"raw.{calls.apart(layer)}" for layer in calls.layers()}
-            self.empty -= {f"raw.{view}" for view in calls.parts()}
 
     def is_empty(self, name: str) -> bool:
         """Tell whether an object has no row for certain, by what is built."""
@@ -135,7 +145,7 @@ def _unfold(names: set[str], unfolded: Mapping[str, Header]) -> None:
 @functools.cache
 def _needs(header: Header) -> frozenset[str]:
     """Return what an object needs, with the tables of `raw` one by one."""
-    if _WHOLE_RAW & set(header.needs):
+    if staging.OF_ALL_EVENTS & set(header.needs):
         return frozenset(header.needs) | _raw_tables()
     words = set(re.findall(r"\w+", header.body))
     tables = {table for word in words for table in calls.parts().get(word, (word,))}

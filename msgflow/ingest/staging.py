@@ -93,8 +93,8 @@ CREATE TABLE staging.damage (
 )
 """
 
-# Views that say of all events what the tables of each tracepoint say.
-_OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
+OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
+"""The views that say of all events what the tables of each tracepoint say."""
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
@@ -225,7 +225,7 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     ).fetchall()
     parts = {f"raw.{table}" for tables in calls.parts().values() for table in tables}
     for (name,) in names:
-        is_told = name in parts or name in _OF_ALL_EVENTS
+        is_told = name in parts or name in OF_ALL_EVENTS
         if not is_told and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
             target = _quoted(directory / f"{name}.parquet")
             con.execute(f"COPY {name} TO '{target}' (FORMAT parquet)")

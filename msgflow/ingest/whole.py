@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _NONE = -1
-_NOT_AFTER = {call.not_after for call in CALLS} - {layer.name for layer in layers()}
+_NOT_AFTER = {call.not_after for call in CALLS if call.not_after}
 
 
 def staged(batches: Sequence[tuple[str, pa.RecordBatch]]) -> Iterator[tuple[str, pa.RecordBatch]]:
@@ -43,7 +43,11 @@ def staged(batches: Sequence[tuple[str, pa.RecordBatch]]) -> Iterator[tuple[str,
     }
     if not given:
         return
-    others = [(name, to_numpy(rows["event_id"])) for name, rows in batches if name in _NOT_AFTER]
+    others = [
+        (name, to_numpy(rows["event_id"]))
+        for name, rows in batches
+        if name in _NOT_AFTER and name not in given
+    ]
     places = _Places([*((name, layer.ids) for name, layer in given.items()), *others])
     for call in CALLS:
         if all(name in given for name in call.names):

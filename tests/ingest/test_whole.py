@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import duckdb
 import pyarrow as pa
@@ -99,17 +99,24 @@ def test_every_event_is_there_once(
             rows = [dict(zip(relation.columns, row, strict=True)) for row in relation.fetchall()]
             expected.sort(key=lambda event: int(event["event_id"]))
             assert rows == [{name: event[name] for name in relation.columns} for event in expected]
-    assert [con.sql(f"FROM raw.{call.table}").fetchall() for call in calls.CALLS] == [[]] * 4
+    assert [con.sql(f"FROM raw.{call.table}").fetchall() for call in calls.CALLS] == [[]] * len(
+        calls.CALLS
+    )
 
 
 def take_everything_apart(con: duckdb.DuckDBPyConnection) -> None:
-    con.execute("CREATE OR REPLACE TABLE staging.taken_apart (call VARCHAR, event_id BIGINT)")
+    """Half of the calls by their last event, the others by their thread."""
+    con.execute(
+        "CREATE OR REPLACE TABLE staging.taken_apart (thread_index INTEGER, event_id BIGINT)"
+    )
     for call in calls.CALLS:
         last = call.column_of(len(call.names) - 1, "event_id")
         con.execute(
-            f"INSERT INTO staging.taken_apart SELECT '{call.name}', {last} FROM raw.{call.table}"
+            f"INSERT INTO staging.taken_apart SELECT NULL, {last} FROM raw.{call.table} "
+            f"WHERE {last} % 2 = 0 UNION ALL SELECT thread_index, NULL FROM raw.{call.table} "
+            f"WHERE {last} % 2 = 1"
         )
-    calls.take_apart(con)
+        calls.take_apart(con, call)
 
 
 @settings(deadline=None)
@@ -178,3 +185,45 @@ def test_columns_that_all_layers_share_are_there_once() -> None:
         "rmw_publish_timestamp",
     ]
     assert "callback_end_previous_call_event_id" in by_name["callback"].columns
+
+
+def test_taking_apart_leaves_nothing_behind_when_it_fails(
+    con: duckdb.DuckDBPyConnection,
+) -> None:
+    """It is done again with more memory."""
+    names = [{"name": name} for call in calls.CALLS for name in call.names]
+    detail = {"trace_index": 0, "cpu_id": 0, "vtid": 1, "value": 7}
+    read(con, [[event | detail for event in names]])
+    layers = [f"raw.{layer.table}" for layer in calls.layers()]
+
+    def events() -> list[list[Any]]:
+        return [con.sql(f"FROM {layer} ORDER BY event_id").fetchall() for layer in layers]
+
+    class Failing:
+        """A connection whose memory is too short for some statements."""
+
+        def __init__(self, word: str) -> None:
+            self._word = word
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(con, name)
+
+        def execute(self, statement: str) -> Any:
+            if statement.startswith(self._word):
+                raise duckdb.OutOfMemoryException("too little")
+            return con.execute(statement)
+
+    before = events()
+    con.execute(
+        "CREATE OR REPLACE TABLE staging.taken_apart AS SELECT 0 AS thread_index, 1 AS event_id"
+    )
+    publication = calls.CALLS[0]
+    assert con.sql(f"FROM raw.{publication.table}").fetchall()
+    for word in ("INSERT INTO raw.ros2_rmw_publish", "DELETE"):
+        with pytest.raises(duckdb.OutOfMemoryException):
+            calls.take_apart(cast("duckdb.DuckDBPyConnection", Failing(word)), publication)
+        assert events() == before
+        assert con.sql(f"FROM raw.{publication.table}").fetchall()
+    calls.take_apart(con, publication)
+    assert events() == before
+    assert not con.sql(f"FROM raw.{publication.table}").fetchall()

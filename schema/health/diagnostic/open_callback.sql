@@ -7,12 +7,13 @@
 -- grain: one row per trace
 -- severity: info
 -- phase: model
--- needs: staging.callback_pair
+-- needs: staging.callback_pair, staging.callback_number
 SELECT
     trace_index + 1 AS trace_id,
     count(*) AS count,
     'callback instances without an end: the trace or the process ended, a callback threw, or '
     || 'events were lost' AS detail
 FROM staging.callback_pair
+SEMI JOIN staging.callback_number USING (start_event_id)
 WHERE end_ns IS NULL
 GROUP BY trace_index

@@ -114,7 +114,7 @@ intra AS (
     FROM staging.call('ros2_rclcpp_intra_publish') AS i
     LEFT JOIN enqueued AS e ON i.event_id = e.previous_event_id
 ),
-whole AS (
+complete AS (
     SELECT
         coalesce(i.start_event_id, x.start_event_id) AS start_event_id,
         coalesce(x.end_event_id, i.end_event_id) AS end_event_id,
@@ -148,7 +148,7 @@ SELECT
     w.writer,
     w.stamp AS source_timestamp_ns,
     w.callback_event_id
-FROM whole AS w
+FROM complete AS w
 JOIN staging.context AS c
     ON w.thread_index = c.thread_index
     AND w.start_event_id >= c.from_event_id

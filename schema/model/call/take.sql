@@ -3,7 +3,7 @@
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
 -- needs: staging.take_chain, staging.take_number, staging.callback_pair, staging.beside_gap,
---     staging.callback_gap, staging.predecessor, raw
+--     staging.callback_gap, staging.take_remnant
 WITH every_take AS NOT MATERIALIZED (
     SELECT
         n.take_id, c.trace_index, n.subscription_id, c.process_id, c.thread_id, c.taken_ns,
@@ -33,14 +33,6 @@ interrupted AS (
         ON o.thread_id = g.thread_id
         AND coalesce(o.callback_start_event_id, o.end_event_id) >= g.event_id
     WHERE g.event_id > o.start_event_id
-),
--- Callbacks right behind the last layer of a take whose others are in a gap.
-remnant AS (
-    SELECT p.event_id
-    FROM staging.predecessor AS p
-    JOIN staging.beside_gap AS g ON p.previous_event_id = g.event_id AND g.is_behind
-    JOIN raw.ros2_rclcpp_take AS u ON p.previous_event_id = u.event_id
-    WHERE p.sequence = 'call'
 )
 SELECT
     o.take_id,
@@ -57,7 +49,10 @@ SELECT
     behind.event_id IS NOT NULL
     OR before.event_id IS NOT NULL
     OR inside.start_event_id IS NOT NULL
-    OR (o.method = 'callback_only' AND o.start_event_id IN (SELECT event_id FROM remnant))
+    OR (
+        o.method = 'callback_only'
+        AND o.start_event_id IN (SELECT event_id FROM staging.take_remnant)
+    )
         AS is_loss_affected
 FROM every_take AS o
 LEFT JOIN (SELECT event_id FROM staging.beside_gap WHERE is_behind) AS behind

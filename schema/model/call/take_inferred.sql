@@ -11,7 +11,7 @@ WITH dequeue AS (
     JOIN staging.buffer_owner AS o
         ON t.process_id = o.process_id AND t.buffer_handle = o.buffer_handle
     WHERE t.method = 'ring_buffer'
-        AND t.subscription_event_id IS NULL
+        AND NOT t.is_known
         AND o.subscription_event_id IS NOT NULL
 ),
 lonely AS (

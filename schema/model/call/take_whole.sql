@@ -1,6 +1,7 @@
 -- name: staging.take_whole
 -- kind: inline
--- description: Takes of which all layers are there, as they were put together while they were read.
+-- description: Successful takes of which all layers are there, as they were put together while they
+--     were read.
 -- grain: one row per such take
 -- needs: staging.taken_apart, staging.context, raw
 SELECT

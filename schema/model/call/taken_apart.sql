@@ -1,24 +1,11 @@
 -- name: staging.taken_apart
--- description: Calls that were put together while they were read, and have to be taken apart again:
---     those of threads with gaps or several lives, as what follows on what is for a gap to decide;
---     those that something else seems to belong to, before the first layer or behind the last.
---     Their events are moved to those of no whole call right after this.
--- grain: one row per call, by the event of its last layer
+-- description: Which calls that were put together while they were read are taken apart again, right
+--     after this (`msgflow/ingest/calls.py`): those of threads with gaps or several lives, where a
+--     gap or the end of a life decides what belongs together; and those next to an event that may
+--     be one more layer, behind the last or before the first.
+-- grain: one row per thread, or per event that such a call ends with
 -- needs: staging.interrupted_thread, raw
-WITH whole AS (
-    SELECT
-        'publication' AS call, rmw_publish_event_id AS event_id, thread_index,
-        rclcpp_publish_previous_call_event_id AS previous_event_id
-    FROM raw.whole_publication
-    UNION ALL
-    SELECT 'rcl_publication', rmw_publish_event_id, thread_index, NULL
-    FROM raw.whole_rcl_publication
-    UNION ALL
-    SELECT 'take', rclcpp_take_event_id, thread_index, NULL FROM raw.whole_take
-    UNION ALL
-    SELECT 'callback', callback_end_event_id, thread_index, NULL FROM raw.whole_callback
-),
-behind AS (
+WITH behind AS (
     SELECT previous_call_event_id AS event_id FROM raw.dds_write_pre
     UNION ALL
     SELECT previous_call_event_id FROM raw.dds_write
@@ -29,14 +16,14 @@ behind AS (
     UNION ALL
     SELECT previous_call_event_id FROM raw.ros2_dispatch_subscription_callback
 )
-SELECT call, event_id
-FROM whole
-WHERE thread_index IN (SELECT thread_index FROM staging.interrupted_thread)
-UNION
-SELECT call, event_id
-FROM whole
-WHERE call <> 'callback' AND event_id IN (SELECT event_id FROM behind)
-UNION
-SELECT call, event_id
-FROM whole
-WHERE previous_event_id IN (SELECT event_id FROM raw.ros2_rclcpp_intra_publish)
+SELECT thread_index, NULL::BIGINT AS event_id
+FROM staging.interrupted_thread
+UNION ALL
+SELECT NULL, event_id
+FROM behind
+WHERE event_id IS NOT NULL
+UNION ALL
+SELECT NULL, p.rmw_publish_event_id
+FROM raw.whole_publication AS p
+JOIN raw.ros2_rclcpp_intra_publish AS i
+    ON p.rclcpp_publish_previous_call_event_id = i.event_id

@@ -2,20 +2,15 @@
 -- description: Callback instances that are nested in another one.
 -- grain: one row per such callback instance
 -- needs: staging.callback_run, staging.callback_number
-WITH inner_run AS (
-    SELECT start_event_id, thread_id, depth FROM staging.callback_run WHERE depth > 1
-),
-outer_run AS (
-    SELECT start_event_id, thread_id, depth FROM staging.callback_run WHERE NOT is_plain
-),
-nested AS (
-    SELECT n.start_event_id, p.start_event_id AS parent_event_id
-    FROM inner_run AS n
-    ASOF JOIN outer_run AS p
-        ON n.thread_id = p.thread_id
-        AND n.depth - 1 = p.depth
-        AND n.start_event_id > p.start_event_id
+WITH outer_run AS (
+    SELECT n.callback_instance_id, r.start_event_id, r.thread_id, r.depth
+    FROM staging.callback_run AS r
+    JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
+    WHERE NOT r.is_plain
 )
-SELECT n.start_event_id, c.callback_instance_id AS parent_id
-FROM nested AS n
-JOIN staging.callback_number AS c ON n.parent_event_id = c.start_event_id
+SELECT r.start_event_id, o.callback_instance_id AS parent_id
+FROM (SELECT * FROM staging.callback_run WHERE depth > 1) AS r
+ASOF JOIN outer_run AS o
+    ON r.thread_id = o.thread_id
+    AND r.depth - 1 = o.depth
+    AND r.start_event_id > o.start_event_id

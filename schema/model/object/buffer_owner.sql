@@ -8,7 +8,7 @@
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, t.buffer_handle
     FROM staging.take_subscription AS t
-    WHERE t.method = 'ring_buffer' AND t.subscription_event_id IS NULL
+    WHERE t.method = 'ring_buffer' AND NOT t.is_known
 ),
 used AS (
     SELECT DISTINCT
