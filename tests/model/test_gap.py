@@ -58,8 +58,9 @@ def test_a_loss_of_the_cpu_that_was_left(system: RosSystem, analyse: Analyse) ->
         (9, (11, 12), 29),
         (9, (25, 26), 29),
         (9, (11, 75), 89),
+        (101, (110, 70), 119),
     ],
-    ids=["far from both", "next to both", "near the first", "near the second", "long"],
+    ids=["far from both", "next to both", "near the first", "near the second", "long", "damaged"],
 )
 def test_a_gap_is_found_wherever_it_lies_between_two_events(
     system: RosSystem, analyse: Analyse, before: int, loss: tuple[int, int], after: int

@@ -23,7 +23,7 @@ WITH exposed AS (
 ),
 -- Few events are near a gap, and to order all of them would take longer than all else. So time is
 -- cut into stretches: a gap between two events is in the stretch of one of them, or in one between.
--- The length of a stretch decides nothing else; there are 100,000 with gaps, and some more.
+-- The length of a stretch decides nothing else; 100,000 at most have gaps, and two more per gap.
 stretch AS (
     SELECT greatest(20_000_000, sum(end_ns - start_ns) // 100_000)::BIGINT AS length_ns
     FROM staging.gap
@@ -31,7 +31,10 @@ stretch AS (
 gap_stretch AS (
     SELECT DISTINCT
         r.recording_index,
-        unnest(range(g.start_ns // s.length_ns, g.end_ns // s.length_ns + 1)) AS number
+        -- In damaged traces, a gap may end before it starts.
+        unnest(
+            range(g.start_ns // s.length_ns, greatest(g.start_ns, g.end_ns) // s.length_ns + 1)
+        ) AS number
     FROM staging.gap AS g
     JOIN staging.recording AS r ON g.trace_id - 1 = r.trace_index
     CROSS JOIN stretch AS s
