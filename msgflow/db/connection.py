@@ -59,7 +59,8 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
     quoted = str(path).replace("'", "''")
     require_file(path)
     with opening(path):
-        con.execute(f"ATTACH '{quoted}' AS target")
+        mode = " (RECOVERY_MODE no_wal_writes)" if is_new else ""
+        con.execute(f"ATTACH '{quoted}' AS target{mode}")
     con.execute("USE target")
     if is_new:
         remember(con)

@@ -12,7 +12,7 @@
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 -- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap, store.publisher,
 --     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state,
---     derive.delivery_limit
+--     derive.delivery_limit, derive.stretch
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
@@ -29,10 +29,9 @@ life AS MATERIALIZED (
     WHERE run_id = only_run AND topic_name IS NOT NULL
 ),
 link AS (
-    SELECT publication_id, publisher_id, subscription_id, min(take_id) AS take_id
+    SELECT publication_id, publisher_id, subscription_id, take_id
     FROM store.link_transport
     WHERE run_id = only_run AND subscription_id IS NOT NULL AND is_copy IS NOT TRUE
-    GROUP BY publication_id, publisher_id, subscription_id
 ),
 missing AS MATERIALIZED (
     SELECT
@@ -50,23 +49,18 @@ gap AS MATERIALIZED (
     FROM derive.process_gap(only_run)
     WHERE EXISTS (SELECT 1 FROM missing)
 ),
--- The order of messages, where any is missing.
-ordered AS MATERIALIZED (
-    SELECT
-        publication_id, topic_name, clock_id, arrival_ns,
-        row_number() OVER (
-            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
-        ) AS position
-    FROM arrival
-    WHERE (topic_name, clock_id) IN (SELECT (topic_name, clock_id) FROM missing)
-),
 delivered AS MATERIALIZED (
-    SELECT l.subscription_id, l.publisher_id, a.arrival_ns, t.taken_ns
-    FROM link AS l
+    SELECT l.subscription_id, l.publisher_id, l.publication_id, a.arrival_ns, t.taken_ns
+    FROM (
+        SELECT publication_id, publisher_id, subscription_id, min(take_id) AS take_id
+        FROM link
+        WHERE subscription_id IN (SELECT subscription_id FROM missing)
+        GROUP BY publication_id, publisher_id, subscription_id
+    ) AS l
     JOIN life AS s ON l.subscription_id = s.subscription_id
     JOIN arrival AS a ON l.publication_id = a.publication_id AND s.clock_id = a.clock_id
     JOIN store.take AS t ON l.take_id = t.take_id
-    WHERE l.subscription_id IN (SELECT subscription_id FROM missing) AND a.arrival_ns IS NOT NULL
+    WHERE a.arrival_ns IS NOT NULL
 ),
 pace AS (
     SELECT
@@ -80,6 +74,22 @@ pace AS (
     FROM delivered
     GROUP BY subscription_id
 ),
+-- In most recordings few messages are missing, and to order all others would take longer than all
+-- else. One row tells all of a stretch of time in which none is missing.
+missing_stretch AS (
+    SELECT DISTINCT subscription_id, derive.stretch(arrival_ns) AS stretch FROM missing
+),
+told AS MATERIALIZED (
+    SELECT
+        d.subscription_id, d.publisher_id, min(d.arrival_ns) AS arrival_ns,
+        min(d.taken_ns) AS taken_ns
+    FROM delivered AS d
+    LEFT JOIN missing_stretch AS m
+        ON d.subscription_id = m.subscription_id AND derive.stretch(d.arrival_ns) = m.stretch
+    GROUP BY
+        d.subscription_id, d.publisher_id, derive.stretch(d.arrival_ns),
+        CASE WHEN m.stretch IS NOT NULL THEN d.publication_id END
+),
 -- The first take of anything that came later, of the same publisher and of any.
 later_of_publisher AS (
     SELECT
@@ -88,7 +98,7 @@ later_of_publisher AS (
             PARTITION BY subscription_id, publisher_id ORDER BY arrival_ns DESC
             ROWS UNBOUNDED PRECEDING
         ) AS taken_ns
-    FROM delivered
+    FROM told
 ),
 later_of_any AS (
     SELECT
@@ -96,11 +106,11 @@ later_of_any AS (
         min(taken_ns) OVER (
             PARTITION BY subscription_id ORDER BY arrival_ns DESC ROWS UNBOUNDED PRECEDING
         ) AS taken_ns
-    FROM delivered
+    FROM told
 ),
 earliest AS (
     SELECT subscription_id, publisher_id, min(arrival_ns) AS arrival_ns
-    FROM delivered
+    FROM told
     GROUP BY subscription_id, publisher_id
 ),
 -- Takes that could be any message, and those that could be one without a stamp.
@@ -155,6 +165,25 @@ known AS (
 -- message had arrived, and before the next message that was taken arrived. That tells nothing if
 -- the reader may have been kept from the CPU: if it took that next message late, or if as many
 -- messages are missing in a row as its queue holds.
+due AS MATERIALIZED (
+    SELECT
+        *,
+        arrival_ns + patience_ns AS due_ns,
+        count(*) OVER (PARTITION BY subscription_id, next_arrival_ns) AS row_length
+    FROM known
+),
+due_stretch AS (
+    SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due
+),
+told_wait AS (
+    SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
+    FROM long_wait AS w
+    LEFT JOIN due_stretch AS d
+        ON w.subscription_id = d.subscription_id AND derive.stretch(w.end_ns) = d.stretch
+    GROUP BY
+        w.subscription_id, derive.stretch(w.end_ns),
+        CASE WHEN d.stretch IS NOT NULL THEN w.end_ns END
+),
 waiting AS (
     SELECT
         k.*,
@@ -169,14 +198,8 @@ waiting AS (
             > derive.delivery_limit().patience_factor * k.usual_ns
             OR k.row_length >= greatest(k.queue_depth, derive.delivery_limit().least_row)
         ) AS is_starved
-    FROM (
-        SELECT
-            *,
-            arrival_ns + patience_ns AS due_ns,
-            count(*) OVER (PARTITION BY subscription_id, next_arrival_ns) AS row_length
-        FROM known
-    ) AS k
-    ASOF LEFT JOIN long_wait AS w
+    FROM due AS k
+    ASOF LEFT JOIN told_wait AS w
         ON k.subscription_id = w.subscription_id AND k.due_ns <= w.end_ns
 ),
 decided AS (
@@ -186,7 +209,7 @@ decided AS (
             AS waited_ns
     FROM waiting
 ),
-bounded AS (
+bounded AS MATERIALIZED (
     SELECT
         *,
         coalesce(
@@ -201,6 +224,35 @@ bounded AS (
             PARTITION BY subscription_id
         ) AS first_unseen_ns
     FROM decided
+),
+-- The place of each missing message among those of its topic, and of the last one before it was
+-- gone; the order of others is told by their number in each stretch of time.
+wanted_stretch AS (
+    SELECT DISTINCT
+        topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
+    FROM bounded
+),
+ordered AS MATERIALIZED (
+    SELECT
+        topic_name, clock_id, publication_id, arrival_ns,
+        sum(message_count) OVER (
+            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
+            ROWS UNBOUNDED PRECEDING
+        ) AS position
+    FROM (
+        SELECT
+            a.topic_name, a.clock_id,
+            CASE WHEN w.topic_name IS NOT NULL THEN a.publication_id END AS publication_id,
+            max(a.arrival_ns) AS arrival_ns,
+            count(*) AS message_count
+        FROM arrival AS a
+        LEFT JOIN wanted_stretch AS w
+            ON a.topic_name = w.topic_name
+            AND a.clock_id = w.clock_id
+            AND derive.stretch(a.arrival_ns) IS NOT DISTINCT FROM w.stretch
+        WHERE (a.topic_name, a.clock_id) IN (SELECT (topic_name, clock_id) FROM missing)
+        GROUP BY a.topic_name, a.clock_id, 3, derive.stretch(a.arrival_ns)
+    )
 ),
 facts AS (
     SELECT

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Iterator
 
 import duckdb
@@ -36,7 +37,7 @@ CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEF
     state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
 INSERT INTO store.publisher VALUES (1, 0), (2, 0);
 """
-RULES = ("delivery_limit", "undelivered")
+RULES = ("delivery_limit", "stretch", "undelivered")
 
 
 class Delivery:
@@ -537,3 +538,94 @@ def test_what_was_lost_is_not_told_without_a_depth(delivery: Delivery) -> None:
     missing = delivery.publish(300 * MS)
     delivery.publish(301 * MS, 302 * MS)
     assert delivery.reason(missing) == "unknown"
+
+
+def test_nothing_is_known_of_a_message_without_a_time_of_arrival(delivery: Delivery) -> None:
+    delivery.lives()
+    missing = delivery.publish(300 * MS)
+    delivery.publish(305 * MS, 306 * MS)
+    delivery.con.execute(
+        "UPDATE derive.expected_arrival SET arrival_ns = NULL WHERE publication_id = 1"
+    )
+    assert delivery.reason(missing) == "unknown"
+
+
+# Moments of one stretch are looked at one by one: with the first length, all of them.
+@pytest.mark.parametrize("seed", range(6))
+def test_the_length_of_a_stretch_decides_nothing(delivery: Delivery, seed: int) -> None:
+    fill(delivery.con, random.Random(seed))
+    found = []
+    for length in (1 << 62, 100 * MS, 30 * MS, 7 * MS):
+        delivery.con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
+        rows = delivery.con.execute("FROM derive.undelivered(1) ORDER BY ALL").fetchall()
+        found.append(rows)
+    assert len({row[-1] for row in found[0]}) > 3
+    assert found[1:] == found[:1] * 3
+
+
+def fill(con: duckdb.DuckDBPyConnection, chance: random.Random) -> None:
+    """Four subscriptions of three publishers, with all that can keep a message from them."""
+    moments = chance.sample(range(2_000 * MS), 400)
+    for number in range(4):
+        last = chance.randrange(1_500 * MS, 2_100 * MS)
+        con.execute(
+            "INSERT INTO derive.subscription_life (subscription_id, topic_name, process_id, "
+            "queue_depth, created_ns, last_seen_ns, replaced_ns, host_end_ns, only_thread_id) "
+            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            [
+                number,
+                "/b" if number == 3 else "/a",
+                number,
+                chance.choice([1, 3, None]),
+                chance.choice([0, 300 * MS]),
+                last,
+                chance.choice([None, last - 50 * MS]),
+                2_100 * MS,
+                chance.choice([number, None]),
+            ],
+        )
+        for start in chance.sample(moments, 2):
+            con.execute("INSERT INTO gap VALUES (?, ?, ?)", [number, start, start + 5 * MS])
+        for failed in chance.sample(moments, 3):
+            con.execute("INSERT INTO derive.vain_take VALUES (1, ?, ?)", [number, failed + 1])
+        start = 0
+        while start < 2_000 * MS:
+            end = start + chance.randrange(4 * MS, 30 * MS)
+            con.execute(
+                "INSERT INTO store.executor_state (thread_id, start_ns, end_ns) VALUES (?, ?, ?)",
+                [number, start, end],
+            )
+            start = end + chance.randrange(5 * MS)
+        # One that could not be identified.
+        con.execute(
+            "INSERT INTO store.take VALUES (1, ?, ?, ?, ?)",
+            [10_000 + number, number, chance.choice(moments), chance.choice([None, 1])],
+        )
+    con.execute("INSERT INTO store.publisher VALUES (3, 500_000_000)")
+    take = 0
+    for publication, arrival in enumerate(moments):
+        publisher = chance.choice([1, 2, 3])
+        con.execute(
+            "INSERT INTO derive.expected_arrival (publication_id, publisher_id, topic_name, "
+            "arrival_ns, source_timestamp_ns) VALUES (?, ?, ?, ?, ?)",
+            [
+                publication,
+                publisher,
+                "/b" if publisher == 3 else "/a",
+                None if publication == 200 else arrival,
+                chance.choice([1, 1, None]),
+            ],
+        )
+        for number in [3] if publisher == 3 else range(3):
+            is_bad_time = arrival // (250 * MS) % 3 == number % 3
+            if chance.random() < (0.3 if is_bad_time else 0.02):
+                continue
+            take += 1
+            needed = chance.choice([300_000, 400_000, 20 * MS])
+            con.execute(
+                "INSERT INTO store.take VALUES (1, ?, ?, ?, 1)", [take, number, arrival + needed]
+            )
+            con.execute(
+                "INSERT INTO store.link_transport VALUES (1, ?, ?, ?, ?, false)",
+                [publication, publisher, number, take],
+            )

@@ -26,11 +26,15 @@ subscribed AS (
     GROUP BY run_id, topic_name
 ),
 delivered AS (
-    SELECT s.run_id, s.topic_name, count(DISTINCT (l.publication_id, l.subscription_id)) AS number
-    FROM store.link_transport AS l
+    SELECT s.run_id, s.topic_name, count(*) AS number
+    FROM (
+        SELECT DISTINCT publication_id, publisher_id, subscription_id
+        FROM store.link_transport
+        WHERE is_copy IS NOT TRUE
+    ) AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     JOIN subscription AS s ON l.subscription_id = s.subscription_id
-    WHERE p.topic_name = s.topic_name AND l.is_copy IS NOT TRUE
+    WHERE p.topic_name = s.topic_name
     GROUP BY s.run_id, s.topic_name
 ),
 not_judged AS (

@@ -10,21 +10,25 @@
 -- needs: store.publication, store.callback_instance
 CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE
 WITH RECURSIVE around AS (
-    SELECT b.run_id, b.publication_id, b.start_event_id AS event_id, i.parent_id
+    SELECT
+        b.run_id, b.publication_id, b.publisher_id, b.is_loss_affected,
+        b.start_event_id AS event_id, i.parent_id
     FROM store.publication AS b
-    JOIN store.callback_instance AS i
-        ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
+    JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
     WHERE b.run_id = only_run
+        AND i.run_id = only_run
         AND i.parent_id IS NOT NULL
         AND b.start_event_id >= i.effective_end_event_id
     UNION ALL
-    SELECT b.run_id, b.publication_id, b.start_event_id, i.parent_id
+    SELECT
+        b.run_id, b.publication_id, b.publisher_id, b.is_loss_affected, b.start_event_id,
+        i.parent_id
     FROM store.publication AS b
-    JOIN store.callback_instance AS i
-        ON b.run_id = i.run_id AND b.callback_event_id = i.end_event_id
-    WHERE b.run_id = only_run AND i.parent_id IS NOT NULL
+    JOIN store.callback_instance AS i ON b.callback_event_id = i.end_event_id
+    WHERE b.run_id = only_run AND i.run_id = only_run AND i.parent_id IS NOT NULL
     UNION ALL
-    SELECT a.run_id, a.publication_id, a.event_id, i.parent_id
+    SELECT
+        a.run_id, a.publication_id, a.publisher_id, a.is_loss_affected, a.event_id, i.parent_id
     FROM around AS a
     JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
     WHERE i.parent_id IS NOT NULL AND a.event_id >= i.effective_end_event_id
@@ -33,14 +37,14 @@ SELECT
     b.run_id, i.callback_instance_id, b.publication_id, i.take_id, b.publisher_id,
     i.is_loss_affected OR b.is_loss_affected AS is_loss_affected
 FROM store.publication AS b
-JOIN store.callback_instance AS i
-    ON b.run_id = i.run_id AND b.callback_event_id = i.start_event_id
-WHERE b.run_id = only_run AND b.start_event_id < i.effective_end_event_id
+JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
+WHERE b.run_id = only_run
+    AND i.run_id = only_run
+    AND b.start_event_id < i.effective_end_event_id
 UNION ALL
 SELECT
-    a.run_id, i.callback_instance_id, a.publication_id, i.take_id, b.publisher_id,
-    i.is_loss_affected OR b.is_loss_affected
+    a.run_id, i.callback_instance_id, a.publication_id, i.take_id, a.publisher_id,
+    i.is_loss_affected OR a.is_loss_affected
 FROM around AS a
 JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
-JOIN store.publication AS b ON a.publication_id = b.publication_id
 WHERE a.event_id < i.effective_end_event_id

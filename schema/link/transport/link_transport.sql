@@ -32,6 +32,11 @@ WITH link AS (
         is_loss_affected
     FROM derive.link_transport_ring_buffer(only_run)
 ),
+doubtful AS MATERIALIZED (
+    SELECT run_id, publication_id, take_id
+    FROM link
+    WHERE method <> 'exact' OR candidate_count > 1
+),
 guess AS (
     SELECT
         l.run_id, l.take_id, b.trace_id AS sender_trace_id, t.trace_id AS receiver_trace_id,
@@ -41,16 +46,19 @@ guess AS (
         CASE WHEN bh.clock_id = th.clock_id THEN least(b.start_ns, t.taken_ns) ELSE t.taken_ns END
             AS received_from_ns,
         t.taken_ns
-    FROM link AS l
-    JOIN store.publication AS b ON l.publication_id = b.publication_id
+    FROM doubtful AS l
+    JOIN (
+        SELECT * FROM store.publication
+        WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
+    ) AS b ON l.publication_id = b.publication_id
     JOIN store.process AS bp ON b.process_id = bp.process_id
     JOIN store.host AS bh ON bp.host_id = bh.host_id
-    JOIN store.take AS t ON l.take_id = t.take_id
+    JOIN (
+        SELECT * FROM store.take
+        WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
+    ) AS t ON l.take_id = t.take_id
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id
-    WHERE (l.method <> 'exact' OR l.candidate_count > 1)
-        AND b.run_id = only_run
-        AND t.run_id = only_run
 ),
 exposed AS (
     SELECT u.run_id, u.take_id

@@ -12,7 +12,7 @@
 -- needs: derive.topic_group, store.publication, store.publisher, store.take, store.subscription
 CREATE OR REPLACE MACRO derive.link_transport_exact(only_run) AS TABLE
 WITH unnamed AS (
-    SELECT run_id, kind, id, 'group ' || group_id AS topic_name
+    SELECT kind, id, 'group ' || group_id AS topic_name
     FROM derive.topic_group(only_run)
     WHERE topic_name IS NULL
 ),
@@ -22,10 +22,8 @@ published AS (
         coalesce(p.topic_name, g.topic_name) AS topic_name,
         p.topic_name IS NOT NULL AND NOT coalesce(p.is_topic_learned, false) AS is_own_topic
     FROM store.publication AS b
-    LEFT JOIN store.publisher AS p
-        ON b.publisher_id = p.publisher_id AND b.run_id = p.run_id
-    LEFT JOIN unnamed AS g
-        ON b.publisher_id = g.id AND b.run_id = g.run_id AND g.kind = 'publisher'
+    LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    LEFT JOIN unnamed AS g ON b.publisher_id = g.id AND g.kind = 'publisher'
     WHERE b.run_id = only_run AND b.source_timestamp_ns <> 0
 ),
 received AS (
@@ -34,22 +32,22 @@ received AS (
         coalesce(s.topic_name, g.topic_name) AS topic_name,
         s.topic_name IS NOT NULL AND NOT coalesce(s.is_topic_learned, false) AS is_own_topic
     FROM store.take AS t
-    LEFT JOIN store.subscription AS s
-        ON t.subscription_id = s.subscription_id AND t.run_id = s.run_id
-    LEFT JOIN unnamed AS g
-        ON t.subscription_id = g.id AND t.run_id = g.run_id AND g.kind = 'subscription'
+    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
+    LEFT JOIN unnamed AS g ON t.subscription_id = g.id AND g.kind = 'subscription'
     WHERE t.run_id = only_run AND t.source_timestamp_ns <> 0
 ),
 repeated_publication AS (
-    SELECT run_id, source_timestamp_ns
-    FROM published
-    GROUP BY run_id, source_timestamp_ns
+    SELECT source_timestamp_ns
+    FROM store.publication
+    WHERE run_id = only_run AND source_timestamp_ns <> 0
+    GROUP BY source_timestamp_ns
     HAVING count(*) > 1
 ),
 repeated_take AS (
-    SELECT run_id, subscription_id, source_timestamp_ns
-    FROM received
-    GROUP BY run_id, subscription_id, source_timestamp_ns
+    SELECT subscription_id, source_timestamp_ns
+    FROM store.take
+    WHERE run_id = only_run AND source_timestamp_ns <> 0
+    GROUP BY subscription_id, source_timestamp_ns
     HAVING count(*) > 1
 ),
 candidate AS (
@@ -65,17 +63,14 @@ candidate AS (
         r.topic_name AS take_topic,
         coalesce(r.topic_name = p.topic_name, false) AS is_topic_known,
         CASE WHEN r.is_own_topic AND p.is_own_topic THEN 'exact' ELSE 'exact_stamp' END AS method,
-        q.run_id IS NOT NULL OR u.run_id IS NOT NULL AS is_repeated
+        q.source_timestamp_ns IS NOT NULL OR u.source_timestamp_ns IS NOT NULL AS is_repeated
     FROM received AS r
     JOIN published AS p
-        ON r.run_id = p.run_id
-        AND r.source_timestamp_ns = p.source_timestamp_ns
+        ON r.source_timestamp_ns = p.source_timestamp_ns
         AND coalesce(r.topic_name = p.topic_name, true)
-    LEFT JOIN repeated_publication AS q
-        ON r.run_id = q.run_id AND r.source_timestamp_ns = q.source_timestamp_ns
+    LEFT JOIN repeated_publication AS q ON r.source_timestamp_ns = q.source_timestamp_ns
     LEFT JOIN repeated_take AS u
-        ON r.run_id = u.run_id
-        AND r.subscription_id IS NOT DISTINCT FROM u.subscription_id
+        ON r.subscription_id IS NOT DISTINCT FROM u.subscription_id
         AND r.source_timestamp_ns = u.source_timestamp_ns
 ),
 -- Nearly all messages are plain: only the others are worth counting and ordering.

@@ -1,0 +1,59 @@
+"""Attempts to take that found nothing, outside of callbacks."""
+
+from __future__ import annotations
+
+import random
+
+import duckdb
+import pytest
+from rules import derived
+
+STAGE = """
+CREATE SCHEMA derive;
+CREATE SCHEMA store;
+CREATE TABLE store.failed_take (run_id BIGINT, subscription_id BIGINT, thread_id BIGINT,
+    failed_ns BIGINT);
+CREATE TABLE store.callback_instance (run_id BIGINT, callback_instance_id BIGINT,
+    thread_id BIGINT, start_ns BIGINT, end_ns BIGINT);
+"""
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("length", [1 << 62, 100, 7, 1])
+def test_the_length_of_a_stretch_decides_nothing(seed: int, length: int) -> None:
+    """Whatever it is, the callback that began last before the attempt counts."""
+    chance = random.Random(seed)
+    with derived(STAGE, ("stretch", "vain_take")) as con:
+        con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
+        callbacks = [
+            (thread, start, None if chance.random() < 0.3 else start + chance.randrange(5))
+            for thread in (1, 2)
+            for start in chance.sample(range(500), 150)
+        ]
+        attempts = [(chance.choice([1, 2, 3]), at) for at in chance.sample(range(510), 50)]
+        fill(con, callbacks, attempts)
+        found = con.execute(
+            "SELECT thread_id, failed_ns FROM derive.vain_take ORDER BY ALL"
+        ).fetchall()
+    assert 15 < len(found) < 45
+    assert found == sorted(each for each in attempts if is_outside(callbacks, *each))
+
+
+def fill(
+    con: duckdb.DuckDBPyConnection,
+    callbacks: list[tuple[int, int, int | None]],
+    attempts: list[tuple[int, int]],
+) -> None:
+    con.executemany("INSERT INTO store.failed_take VALUES (1, 1, ?, ?)", attempts)
+    con.executemany(
+        "INSERT INTO store.callback_instance VALUES (1, ?, ?, ?, ?)",
+        [(number, *callback) for number, callback in enumerate(callbacks)],
+    )
+
+
+def is_outside(callbacks: list[tuple[int, int, int | None]], thread: int, at: int) -> bool:
+    before = [(start, end) for of, start, end in callbacks if of == thread and start <= at]
+    if not before:
+        return True
+    _, end = max(before)
+    return end is not None and end < at
