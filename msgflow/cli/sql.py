@@ -49,10 +49,12 @@ def command(
 
     `msgflow db schema` lists the views.
     """
+    from msgflow.cli.meanwhile import ARROW, import_meanwhile
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     statements = statements_of(text, file, 'msgflow sql "SELECT * FROM run"')
+    import_meanwhile(ARROW)
     with Database(database, memory_limit=memory_limit) as opened:
         result = opened.sql(statements, limit=limit or None)
     print_result(result, form, output, wide=wide)
