@@ -1,4 +1,4 @@
-"""Imports that take long and are needed late: another thread can do them while DuckDB is at work."""
+"""Imports that take long and are needed late, done while DuckDB is at work."""
 
 from __future__ import annotations
 

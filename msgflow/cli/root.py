@@ -16,6 +16,7 @@ from typer.core import TyperGroup
 
 from msgflow.cli import words
 from msgflow.cli.completion import is_completing
+from msgflow.cli.outline import OUTLINES
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.stop import STOP
 from msgflow.cli.tilde import with_home
@@ -34,11 +35,6 @@ _LEAKED = (
     ("Input should be a valid number, unable to parse string as a number", "no number"),
     ("Input should be ", "it has to be "),
 )
-COMMANDS = (
-    "ingest", "query", "flow", "graph", "ui", "report", "compare", "verify", "sql", "info", "check",
-    "events", "targets", "runs", "links", "paths", "clocks", "export", "db", "fleet", "mcp",
-    "simulate",
-)  # fmt: skip
 
 
 class _Commands(Mapping[str, Any]):
@@ -49,15 +45,15 @@ class _Commands(Mapping[str, Any]):
     """
 
     def __getitem__(self, name: str) -> Any:
-        if name not in COMMANDS:
+        if name not in OUTLINES:
             raise KeyError(name)
         return _built(name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
+        return iter(OUTLINES)
 
     def __len__(self) -> int:
-        return len(COMMANDS)
+        return len(OUTLINES)
 
 
 @cache
@@ -116,11 +112,20 @@ class RootGroup(TyperGroup):
                 return ExitCode.OK
             return _code_with_words(error)
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help; a line about a command takes no import of it."""
+        commands = self.commands
+        self.commands = OUTLINES  # type: ignore[assignment]
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self.commands = commands
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that is named; a query is none, but what was meant is clear."""
         from msgflow.query.catalogue import query_names
 
-        if args[0] not in COMMANDS and args[0] in query_names():
+        if args[0] not in OUTLINES and args[0] in query_names():
             raise UsageError(f"there is no such command — {args[0]}", f"msgflow query {args[0]}")
         return super().resolve_command(ctx, args)
 

@@ -14,11 +14,11 @@ def test_a_module_is_imported_in_another_thread(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name = "imported_by_a_thread"
-    body = "import threading\nTHREAD = threading.current_thread().name\n"
+    body = "import threading\nthread = threading.current_thread().name\n"
     (tmp_path / f"{name}.py").write_text(body, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     thread = import_meanwhile(name)
     assert thread is not None
     thread.join()
-    assert sys.modules[name].THREAD == f"import {name}"
+    assert sys.modules[name].thread == f"import {name}"
     assert import_meanwhile(name) is None

@@ -16,7 +16,7 @@ import typer.main
 
 from msgflow.cli import words
 from msgflow.cli.app import app
-from msgflow.cli.root import COMMANDS
+from msgflow.cli.outline import SUMMARIES
 
 TYPED = (
     "",
@@ -84,7 +84,7 @@ def test_as_typer_makes_them() -> None:
     command = typer.main.get_command(app)
     every = {
         name: parameter
-        for one in COMMANDS
+        for one in SUMMARIES
         for name, parameter in parameters(command.commands[one], one)
     }
     found = {kind(parameter): (name, parameter) for name, parameter in every.items()}
