@@ -49,7 +49,9 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
     Args:
         con: a connection to another database.
         path: the file.
-        is_new: this process has just created it: nobody else can have put anything into it.
+        is_new: this process has just created it: nobody else can have put anything into it. It
+            has no log, as it takes its place only when it is whole: what is committed lasts only
+            after a CHECKPOINT.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.

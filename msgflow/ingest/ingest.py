@@ -224,7 +224,7 @@ def ingest(
 
 
 def _finished(con: duckdb.DuckDBPyConnection, database: Path, target: _Target) -> tuple[str, ...]:
-    """Move what the log of the database holds into the file, and return what went wrong there."""
+    """Put all that was committed into the file, and return what went wrong there."""
     try:
         con.execute("CHECKPOINT")
     except duckdb.Error as error:

@@ -75,7 +75,7 @@ pace AS (
     GROUP BY subscription_id
 ),
 -- In most recordings few messages are missing, and to order all others would take longer than all
--- else. One row tells all of a stretch of time in which none is missing.
+-- else. Of a stretch of time in which none is missing, the first arrival and the first take count.
 missing_stretch AS (
     SELECT DISTINCT subscription_id, derive.stretch(arrival_ns) AS stretch FROM missing
 ),
@@ -90,22 +90,20 @@ told AS MATERIALIZED (
         d.subscription_id, d.publisher_id, derive.stretch(d.arrival_ns),
         CASE WHEN m.stretch IS NOT NULL THEN d.publication_id END
 ),
--- The first take of anything that came later, of the same publisher and of any.
+-- The first take of anything that came later, of the same publisher and of any; what came at the
+-- same moment counts with it.
 later_of_publisher AS (
     SELECT
         subscription_id, publisher_id, arrival_ns,
         min(taken_ns) OVER (
             PARTITION BY subscription_id, publisher_id ORDER BY arrival_ns DESC
-            ROWS UNBOUNDED PRECEDING
         ) AS taken_ns
     FROM told
 ),
 later_of_any AS (
     SELECT
         subscription_id, arrival_ns,
-        min(taken_ns) OVER (
-            PARTITION BY subscription_id ORDER BY arrival_ns DESC ROWS UNBOUNDED PRECEDING
-        ) AS taken_ns
+        min(taken_ns) OVER (PARTITION BY subscription_id ORDER BY arrival_ns DESC) AS taken_ns
     FROM told
 ),
 earliest AS (
@@ -175,6 +173,7 @@ due AS MATERIALIZED (
 due_stretch AS (
     SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due
 ),
+-- Of a stretch in which no message is due, only the first wait can be the next one after any.
 told_wait AS (
     SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
     FROM long_wait AS w
@@ -226,7 +225,7 @@ bounded AS MATERIALIZED (
     FROM decided
 ),
 -- The place of each missing message among those of its topic, and of the last one before it was
--- gone; the order of others is told by their number in each stretch of time.
+-- gone. Of any other stretch of time the number of messages is enough.
 wanted_stretch AS (
     SELECT DISTINCT
         topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
@@ -238,7 +237,10 @@ ordered AS MATERIALIZED (
         sum(message_count) OVER (
             PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
             ROWS UNBOUNDED PRECEDING
-        ) AS position
+        ) AS position,
+        sum(message_count) OVER (
+            PARTITION BY topic_name, clock_id ORDER BY arrival_ns
+        ) AS count_so_far
     FROM (
         SELECT
             a.topic_name, a.clock_id,
@@ -251,7 +253,9 @@ ordered AS MATERIALIZED (
             AND a.clock_id = w.clock_id
             AND derive.stretch(a.arrival_ns) IS NOT DISTINCT FROM w.stretch
         WHERE (a.topic_name, a.clock_id) IN (SELECT (topic_name, clock_id) FROM missing)
-        GROUP BY a.topic_name, a.clock_id, 3, derive.stretch(a.arrival_ns)
+        GROUP BY
+            a.topic_name, a.clock_id, derive.stretch(a.arrival_ns),
+            CASE WHEN w.topic_name IS NOT NULL THEN a.publication_id END
     )
 ),
 facts AS (
@@ -261,7 +265,7 @@ facts AS (
         i.covered_until_ns >= b.introduced_ns AS has_earlier_gap,
         f.failed_ns <= b.until_ns AS has_failed_take,
         u.taken_ns <= coalesce(b.waited_ns, b.gone_ns) AS has_unidentified_take,
-        q.position - o.position AS newer_count
+        q.count_so_far - o.position AS newer_count
     FROM bounded AS b
     JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id
     ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id

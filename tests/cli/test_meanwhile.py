@@ -22,3 +22,13 @@ def test_a_module_is_imported_in_another_thread(
     thread.join()
     assert sys.modules[name].thread == f"import {name}"
     assert import_meanwhile(name) is None
+    del sys.modules[name]
+
+
+def test_what_cannot_be_imported_is_told_by_whoever_needs_it(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    thread = import_meanwhile("no_module_of_this_name")
+    assert thread is not None
+    thread.join()
+    assert capfd.readouterr() == ("", "")

@@ -7,7 +7,9 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from msgflow.db.opening import open_file
+from msgflow.db.connection import attach
+from msgflow.db.create import write_new
+from msgflow.db.opening import open_file, open_memory
 
 
 def test_asof_joins_compare_in_order_however_few_rows_are_expected(tmp_path: Path) -> None:
@@ -44,3 +46,17 @@ def test_a_file_may_be_open_twice_in_a_process(tmp_path: Path) -> None:
             con.execute(f"FROM '{elsewhere}'")
     first.close()
     second.close()
+
+
+def test_a_new_database_has_no_log_and_is_whole_after_a_checkpoint(tmp_path: Path) -> None:
+    path = tmp_path / "new.duckdb"
+    write_new(path)
+    with open_memory() as con:
+        attach(con, path, is_new=True)
+        con.execute("UPDATE store.alembic_version SET version_num = 'x'")
+        assert [each.name for each in tmp_path.iterdir()] == [path.name]
+        con.execute("CHECKPOINT")
+        copy = path.with_name("copy.duckdb")
+        copy.write_bytes(path.read_bytes())
+    with duckdb.connect(str(copy), read_only=True) as con:
+        assert con.execute("SELECT version_num FROM store.alembic_version").fetchall() == [("x",)]

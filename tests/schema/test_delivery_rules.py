@@ -550,10 +550,53 @@ def test_nothing_is_known_of_a_message_without_a_time_of_arrival(delivery: Deliv
     assert delivery.reason(missing) == "unknown"
 
 
+@pytest.mark.parametrize("publishers", [(1, 2), (2, 1)])
+def test_messages_that_arrive_at_the_same_moment_come_later_alike(
+    delivery: Delivery, publishers: tuple[int, int]
+) -> None:
+    """The first of all was taken when only four of those that were sent later had arrived."""
+    delivery.lives(queue_depth=5)
+    one, other = publishers
+    delivery.publish(10 * MS, 11 * MS, one)
+    delivery.publish(12 * MS, 13 * MS, other)
+    missing = delivery.publish(50 * MS)
+    delivery.publish(200 * MS, 290 * MS, one)
+    delivery.publish(200 * MS, 280 * MS, other)
+    delivery.publish(210 * MS, 211 * MS, other)
+    for more in range(3):
+        delivery.publish((220 + more) * MS, (295 + more) * MS, one)
+    assert delivery.reason(missing) == "lost_in_transport"
+
+
+@pytest.mark.parametrize("taken", [(320 * MS, 330 * MS), (330 * MS, 320 * MS)])
+def test_of_messages_of_a_publisher_at_the_same_moment_the_first_take_counts(
+    delivery: Delivery, taken: tuple[int, int]
+) -> None:
+    """An attempt that failed after that was none for the missing message."""
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    for at in taken:
+        delivery.publish(310 * MS, at)
+    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [325 * MS])
+    assert delivery.reason(missing) == "lost_in_transport"
+
+
+def test_messages_that_arrive_at_the_same_moment_are_newer_alike(delivery: Delivery) -> None:
+    delivery.lives(queue_depth=3)
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    for _ in range(3):
+        delivery.publish(310 * MS, 310 * MS)
+    assert delivery.reason(missing) == "overwritten"
+
+
 # Moments of one stretch are looked at one by one: with the first length, all of them.
-@pytest.mark.parametrize("seed", range(6))
-def test_the_length_of_a_stretch_decides_nothing(delivery: Delivery, seed: int) -> None:
-    fill(delivery.con, random.Random(seed))
+@pytest.mark.parametrize("grid", [1, 5 * MS])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_length_of_a_stretch_decides_nothing(delivery: Delivery, seed: int, grid: int) -> None:
+    """Nor where messages arrive at the same moment, or before time begins."""
+    fill(delivery.con, random.Random(seed), grid, begin=-300 * MS if grid > 1 else 0)
     found = []
     for length in (1 << 62, 100 * MS, 30 * MS, 7 * MS):
         delivery.con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
@@ -563,9 +606,10 @@ def test_the_length_of_a_stretch_decides_nothing(delivery: Delivery, seed: int) 
     assert found[1:] == found[:1] * 3
 
 
-def fill(con: duckdb.DuckDBPyConnection, chance: random.Random) -> None:
+def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin: int) -> None:
     """Four subscriptions of three publishers, with all that can keep a message from them."""
-    moments = chance.sample(range(2_000 * MS), 400)
+    sampled = chance.sample(range(2_000 * MS), 400)
+    moments = [begin + moment // grid * grid for moment in sampled]
     for number in range(4):
         last = chance.randrange(1_500 * MS, 2_100 * MS)
         con.execute(
@@ -588,7 +632,7 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random) -> None:
             con.execute("INSERT INTO gap VALUES (?, ?, ?)", [number, start, start + 5 * MS])
         for failed in chance.sample(moments, 3):
             con.execute("INSERT INTO derive.vain_take VALUES (1, ?, ?)", [number, failed + 1])
-        start = 0
+        start = begin
         while start < 2_000 * MS:
             end = start + chance.randrange(4 * MS, 30 * MS)
             con.execute(
