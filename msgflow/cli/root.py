@@ -7,6 +7,7 @@ import os
 import sys
 import traceback
 from collections.abc import Mapping
+from copy import copy
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -114,12 +115,9 @@ class RootGroup(TyperGroup):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help; a line about a command takes no import of it."""
-        commands = self.commands
-        self.commands = OUTLINES  # type: ignore[assignment]
-        try:
-            super().format_help(ctx, formatter)
-        finally:
-            self.commands = commands
+        outlined = copy(self)
+        outlined.commands = OUTLINES  # type: ignore[assignment]
+        super(RootGroup, outlined).format_help(ctx, formatter)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that is named; a query is none, but what was meant is clear."""

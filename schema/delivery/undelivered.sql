@@ -74,8 +74,8 @@ pace AS (
     FROM delivered
     GROUP BY subscription_id
 ),
--- In most recordings few messages are missing, and to order all others would take longer than all
--- else. Of a stretch of time in which none is missing, the first arrival and the first take count.
+-- In most recordings few messages are missing, and to order all others would be most of the work.
+-- Of a stretch of time in which none is missing, the first arrival and the first take count.
 missing_stretch AS (
     SELECT DISTINCT subscription_id, derive.stretch(arrival_ns) AS stretch FROM missing
 ),
@@ -159,10 +159,6 @@ known AS (
     ASOF LEFT JOIN later_of_any AS n
         ON m.subscription_id = n.subscription_id AND m.arrival_ns < n.arrival_ns
 ),
--- When it was certain that the message is not in the queue: the reader waited for long, after the
--- message had arrived, and before the next message that was taken arrived. That tells nothing if
--- the reader may have been kept from the CPU: if it took that next message late, or if as many
--- messages are missing in a row as its queue holds.
 due AS MATERIALIZED (
     SELECT
         *,
@@ -183,6 +179,10 @@ told_wait AS (
         w.subscription_id, derive.stretch(w.end_ns),
         CASE WHEN d.stretch IS NOT NULL THEN w.end_ns END
 ),
+-- When it was certain that the message is not in the queue: the reader waited for long, after the
+-- message had arrived, and before the next message that was taken arrived. That tells nothing if
+-- the reader may have been kept from the CPU: if it took that next message late, or if as many
+-- messages are missing in a row as its queue holds.
 waiting AS (
     SELECT
         k.*,

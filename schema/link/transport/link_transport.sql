@@ -32,6 +32,7 @@ WITH link AS (
         is_loss_affected
     FROM derive.link_transport_ring_buffer(only_run)
 ),
+-- Most runs have none: then no publication or take need be looked up.
 doubtful AS MATERIALIZED (
     SELECT run_id, publication_id, take_id
     FROM link

@@ -18,7 +18,7 @@ WITH unnamed AS (
 ),
 published AS (
     SELECT
-        b.run_id, b.publication_id, b.publisher_id, b.source_timestamp_ns, b.start_event_id,
+        b.publication_id, b.publisher_id, b.source_timestamp_ns, b.start_event_id,
         coalesce(p.topic_name, g.topic_name) AS topic_name,
         p.topic_name IS NOT NULL AND NOT coalesce(p.is_topic_learned, false) AS is_own_topic
     FROM store.publication AS b
