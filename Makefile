@@ -19,7 +19,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test test-all bench truth fuzz sanitize mutants babeltrace chromium compiler clean
+.PHONY: help demo test test-all bench truth fuzz sanitize mutants wheels babeltrace chromium compiler clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
@@ -30,6 +30,7 @@ help:
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make sanitize damaged traces through the compiled kernel, with sanitizers'
 	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
+	@echo 'make wheels  wheels for Linux on x86-64 and ARM64, in dist/'
 	@echo 'make clean   remove what these made'
 
 demo: $(VENV)/.installed
@@ -71,6 +72,21 @@ sanitize: $(VENV)/.developed
 
 mutants: $(VENV)/.developed
 	$(BIN)/python benchmarks/mutants.py
+
+# Zig compiles C for any glibc, of any architecture: one machine makes all wheels. As the kernel is
+# called by ctypes, one of each fits every Python. auditwheel refuses a wheel without a kernel, and
+# names each after the oldest glibc that has what it needs.
+wheels: $(VENV)/.developed
+	$(BIN)/python -m pip install --quiet --group wheels
+	rm -rf dist
+	@set -e; PATH="$(CURDIR)/$(BIN):$$PATH"; zig=$$(python -c 'import ziglang; print(ziglang.__path__[0])')/zig; \
+	for machine in x86_64 aarch64; do \
+		CC="'$$zig' cc -s -target $$machine-linux-gnu.2.17" _PYTHON_HOST_PLATFORM=linux-$$machine \
+			python -m pip wheel --quiet --no-deps --wheel-dir dist/compiled .; \
+		auditwheel repair --wheel-dir dist dist/compiled/*_$$machine.whl; \
+		ls dist/*manylinux_2_17_$$machine.whl; \
+	done
+	@rm -r dist/compiled
 
 $(VENV)/.made:
 	@! command -v $(PYTHON) >/dev/null 2>&1 \

@@ -8,7 +8,9 @@ packets of 8 MB, as those have who give LTTng large sub-buffers. Then measures i
 own: our reader alone (all the columns of the catalogue, nothing kept), the whole ingest by stage,
 the query e2e-latency on the result, and `babeltrace2 -o dummy`, which decodes and does nothing.
 `--bt2` adds Babeltrace's Python bindings. They take turns, so that other work on the machine slows
-all of them alike. Seconds of different machines and days cannot be compared, ratios of one run can.
+all of them alike. Seconds of different machines and days cannot be compared, ratios of one run can,
+but not those of the first run on a virtual machine just started: memory that was never used there
+takes several times as long to write, which Babeltrace hardly does.
 """
 
 from __future__ import annotations
@@ -166,6 +168,8 @@ def main() -> None:
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
     parser.add_argument("--markdown", type=Path, help="append the tables to this file")
     arguments = parser.parse_args()
+    # Users have byte code: pip writes it, or the first call.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for packet_bytes in [0] if arguments.trace else arguments.packet_bytes:
         with tempfile.TemporaryDirectory() as directory:
             trace, what = arguments.trace, ""

@@ -46,6 +46,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=15)
     runs = parser.parse_args().runs
+    # Users have byte code: pip writes it, or the first call.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     msgflow = [sys.executable, "-m", "msgflow"]
     with tempfile.TemporaryDirectory() as directory:
         trace, database = Path(directory) / "trace", Path(directory) / "bench.duckdb"

@@ -1,7 +1,11 @@
 """`msgflow` and `python -m msgflow`."""
 
+import gc
 import os
 import signal
+
+# Imports make hundreds of thousands of objects, and no garbage.
+_OBJECTS_BETWEEN_COLLECTIONS = 100_000
 
 
 def main() -> None:
@@ -9,6 +13,7 @@ def main() -> None:
     # Of Ctrl-C in the imports Python would print a traceback.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
     # numpy's algebra, of which nothing is used, starts a thread per core and keeps it awake.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from msgflow.cli.stop import STOP

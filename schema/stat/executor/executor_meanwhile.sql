@@ -25,16 +25,24 @@ run AS (
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
--- What a thread runs is in order, so the instances that overlap a wait are neighbours: from the one
--- that was under way when the wait began to the last one that began before the wait ended.
+-- What a thread runs is in order, so the instances that overlap a wait are neighbours. Where the last
+-- one that began before the wait ended was over when it began, there are none: as a rule.
+busy AS (
+    SELECT
+        w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,
+        w.thread_id, l.position AS last_position
+    FROM waiting AS w
+    ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
+    WHERE l.end_ns > w.from_ns
+),
+-- The first is the one that was under way when the wait began, or the next one.
 bounded AS (
     SELECT
         w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,
-        w.thread_id, l.position AS last_position,
+        w.thread_id, w.last_position,
         CASE WHEN f.end_ns > w.from_ns THEN f.position ELSE coalesce(f.position, 0) + 1 END
             AS first_position
-    FROM waiting AS w
-    ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
+    FROM busy AS w
     ASOF LEFT JOIN run AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
 ),
 pair AS (
