@@ -88,7 +88,7 @@ def test_too_little_to_read() -> None:
     with duckdb.connect() as con:
         usual = Memory(con, None)
         before = limit_of(con)
-        with pytest.raises(DatabaseError, match="need more memory than 230MB"), usual.loading():
+        with pytest.raises(DatabaseError, match="need more memory than 220MB"), usual.loading():
             con.execute(HUNGRY)
         assert limit_of(con) == before
 

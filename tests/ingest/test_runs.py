@@ -129,6 +129,28 @@ def test_a_file_is_tidied_up_where_rows_were_deleted(
     assert [number > 0 for number in tasks] == [replace]
 
 
+def test_little_of_freed_memory_is_kept(
+    tmp_path: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """DuckDB would keep up to half a gigabyte beside its limit."""
+    module = sys.modules[ingest.__module__]
+    finished = vars(module)["_finished"]
+    kept: list[tuple[str, str]] = []
+
+    def noted(connection: duckdb.DuckDBPyConnection, *others: Any) -> Any:
+        kept.extend(
+            connection.execute(
+                "SELECT current_setting('block_allocator_memory'), "
+                "current_setting('allocator_bulk_deallocation_flush_threshold')"
+            ).fetchall()
+        )
+        return finished(connection, *others)
+
+    monkeypatch.setattr(module, "_finished", noted)
+    ingest([trace], tmp_path / "new.duckdb")
+    assert kept == [("45.7 MiB", "7.6 MiB")]
+
+
 def test_one_ingest_may_replace_several_runs(both: Path, trace: Path, other_trace: Path) -> None:
     ingest([trace, other_trace], both, replace=True, name="both")
     assert rows(both, RUNS) == [(3, "both")]
