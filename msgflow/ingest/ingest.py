@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
 _KEPT_BLOCKS = "48MB"
-# Where more is freed at once, as by a join that has ended, all that is free goes back to the system.
+# Where more is freed at once, as by a join that ended, all that is free goes back to the system.
 # By default that is half a gigabyte, more than all that is taken.
 _MOST_FREED_AT_ONCE = "8MB"
 
