@@ -74,19 +74,19 @@ mutants: $(VENV)/.developed
 	$(BIN)/python benchmarks/mutants.py
 
 # Zig compiles C for any glibc, of any architecture: one machine makes all wheels. As the kernel is
-# called by ctypes, one of each fits every Python. auditwheel refuses a wheel without a kernel, and
-# names each after the oldest glibc that has what it needs.
+# called by ctypes, one of each fits every Python. auditwheel names them after the oldest glibc that
+# has what they need. A wheel without a kernel has another name, and is not found.
 wheels: $(VENV)/.developed
 	$(BIN)/python -m pip install --quiet --group wheels
-	rm -rf dist
-	@set -e; PATH="$(CURDIR)/$(BIN):$$PATH"; zig=$$(python -c 'import ziglang; print(ziglang.__path__[0])')/zig; \
+	@set -e; PATH="$(CURDIR)/$(BIN):$$PATH"; made=$$(mktemp -d); trap 'rm -rf "$$made"' EXIT; \
+	zig=$$(python -c 'import ziglang; print(ziglang.__path__[0])')/zig; \
 	for machine in x86_64 aarch64; do \
 		CC="'$$zig' cc -s -target $$machine-linux-gnu.2.17" _PYTHON_HOST_PLATFORM=linux-$$machine \
-			python -m pip wheel --quiet --no-deps --wheel-dir dist/compiled .; \
-		auditwheel repair --wheel-dir dist dist/compiled/*_$$machine.whl; \
-		ls dist/*manylinux_2_17_$$machine.whl; \
-	done
-	@rm -r dist/compiled
+			python -m hatchling build -t wheel -d "$$made" >/dev/null; \
+		auditwheel repair --wheel-dir "$$made/repaired" "$$made"/*_$$machine.whl; \
+		ls "$$made"/repaired/*manylinux_2_17_$$machine.whl >/dev/null; \
+	done; \
+	mkdir -p dist; mv "$$made"/repaired/*.whl dist; ls dist/*.whl
 
 $(VENV)/.made:
 	@! command -v $(PYTHON) >/dev/null 2>&1 \
@@ -124,4 +124,4 @@ compiler:
 		|| echo "note: no C compiler: the tests of the compiled kernel are skipped" >&2
 
 clean:
-	rm -rf $(VENV) $(DEMO)
+	rm -rf $(VENV) $(DEMO) dist

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -21,6 +22,8 @@ DIRECTORY = Path("msgflow", "kernel")
 class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
     """Puts the compiled kernel into a wheel, or beside its source if that is installed editable."""
 
+    _directory: str | None = None
+
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile it, and say so where that does not work."""
         if self.target_name != "wheel":
@@ -29,12 +32,18 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
         if version == "editable":
             compile_kernel(source, source.with_name("kernel.so"))
             return
-        library = Path(tempfile.mkdtemp(), "kernel.so")
+        self._directory = tempfile.mkdtemp()
+        library = Path(self._directory, "kernel.so")
         if compile_kernel(source, library):
             build_data["force_include"][str(library)] = str(DIRECTORY / "kernel.so")
             build_data["pure_python"] = False
             platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
             build_data["tag"] = f"py3-none-{platform}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove what is in the wheel now."""
+        if self._directory is not None:
+            shutil.rmtree(self._directory)
 
 
 def compile_kernel(source: Path, library: Path, *flags: str) -> bool:

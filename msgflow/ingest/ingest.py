@@ -45,9 +45,9 @@ if TYPE_CHECKING:
 
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
 _KEPT_BLOCKS = "48MB"
-# Where more is freed at once, as by a join that ended, all that is free goes back to the system.
-# By default that is half a gigabyte, more than all that is taken.
-_MOST_FREED_AT_ONCE = "8MB"
+# Where more is asked for at once, as for the table of a join, what statements before it freed goes
+# back to the system first. By default that is half a gigabyte, more than an ingest ever asks for.
+_MOST_BESIDE_FREED = "8MB"
 
 # As many events as another thread of the database is worth: below, statements take less time to run
 # than to be shared out.
@@ -177,7 +177,7 @@ def ingest(
                 memory = Memory(con, memory_limit)
                 con.execute("SET block_allocator_memory = ?", [_KEPT_BLOCKS])
                 con.execute(
-                    "SET allocator_bulk_deallocation_flush_threshold = ?", [_MOST_FREED_AT_ONCE]
+                    "SET allocator_bulk_deallocation_flush_threshold = ?", [_MOST_BESIDE_FREED]
                 )
                 con.execute("SET temp_directory = ?", [str(directory)])
                 con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(database)}B"])

@@ -129,10 +129,10 @@ def test_a_file_is_tidied_up_where_rows_were_deleted(
     assert [number > 0 for number in tasks] == [replace]
 
 
-def test_little_of_freed_memory_is_kept(
+def test_what_is_kept_of_freed_memory_is_bounded(
     tmp_path: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """DuckDB would keep up to half a gigabyte beside its limit."""
+    """What DuckDB keeps of it comes on top of its limit."""
     module = sys.modules[ingest.__module__]
     finished = vars(module)["_finished"]
     kept: list[tuple[str, str]] = []

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -88,3 +89,31 @@ def test_a_wheel_made_without_compiler_fits_any_machine(tmp_path: Path) -> None:
     )
     (wheel,) = tmp_path.glob("*.whl")
     assert wheel.name.endswith("-py3-none-any.whl")
+
+
+def test_a_wheel_for_another_machine_has_its_name_and_its_compiler(tmp_path: Path) -> None:
+    """The compiler may have options, and a space in its path."""
+    compiler = tmp_path / "a compiler"
+    compiler.write_text(
+        '#!/bin/sh\n[ "$1" = "-target" ] || exit 1\n'
+        'while [ "$1" != "-o" ]; do shift; done\necho other > "$2"\n'
+    )
+    compiler.chmod(0o755)
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        cwd=ROOT,
+        env={
+            **os.environ,
+            "CC": f"'{compiler}' -target other",
+            "TMPDIR": str(temporary),
+            "_PYTHON_HOST_PLATFORM": "linux-aarch64",
+        },
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    assert wheel.name.endswith("-py3-none-linux_aarch64.whl")
+    assert zipfile.ZipFile(wheel).read("msgflow/kernel/kernel.so") == b"other\n"
+    assert not [*temporary.iterdir()]

@@ -25,8 +25,8 @@ run AS (
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
--- What a thread runs is in order, so the instances that overlap a wait are neighbours. Where the last
--- one that began before the wait ended was over when it began, there are none: as a rule.
+-- What a thread runs is in order, so the instances that overlap a wait are neighbours. There are
+-- none, as a rule, where the last one that began before the wait ended was over when it began.
 busy AS (
     SELECT
         w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,
