@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 DEFAULT_LIMIT = "220MB"
-_LOADING_BYTES = 128_000_000
+_LOADING_BYTES = 64_000_000
 # With less, even opening fails.
 _LEAST_BYTES = 15_000_000
 _EXAMPLE = "--memory-limit 2GB"
