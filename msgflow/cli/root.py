@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.core import TyperGroup
 
-from msgflow.cli import words
+from msgflow.cli import unneeded, words
 from msgflow.cli.completion import is_completing
 from msgflow.cli.outline import OUTLINES
 from msgflow.cli.output import discard_stdout, print_error
@@ -97,6 +97,7 @@ class RootGroup(TyperGroup):
     def _run(self, args: Sequence[str] | None = None, **options: Any) -> ExitCode:
         options["standalone_mode"] = False
         (words.as_typed if is_completing() else words.plainly)()
+        unneeded.leave_out()
         try:
             line = with_home(sys.argv[1:] if args is None else args)
             return ExitCode(super().main(line, **options) or 0)
