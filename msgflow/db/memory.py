@@ -21,7 +21,11 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 DEFAULT_LIMIT = "220MB"
-_LOADING_BYTES = 64_000_000
+_LOADING_BYTES = 44_000_000
+# DuckDB keeps 0.8 bytes per event beside its limit: where each part of a table is. So its limit is
+# smaller for large recordings, but not so small that what joins look up no longer fits.
+_LESS_PER_EVENT = 0.48
+_LEAST_DEFAULT_BYTES = 172_000_000
 # With less, even opening fails.
 _LEAST_BYTES = 15_000_000
 _EXAMPLE = "--memory-limit 2GB"
@@ -62,6 +66,12 @@ class Memory:
             # A database that failed for good takes no setting either.
             with contextlib.suppress(duckdb.FatalException):
                 self._con.execute("SET memory_limit = ?", [self._limit])
+
+    def make_room(self, events: int) -> None:
+        """Take less for a recording of so many events; a limit that the user gave is kept."""
+        enough = max(_LEAST_DEFAULT_BYTES, self._bytes() - round(_LESS_PER_EVENT * events))
+        if not self._is_fixed and enough < self._bytes():
+            self._set(f"{enough}B")
 
     @contextlib.contextmanager
     def threads(self, count: int) -> Iterator[None]:

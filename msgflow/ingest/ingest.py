@@ -208,6 +208,7 @@ def ingest(
                 judge.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
                 events = sum(loaded.event_counts.values())
+                memory.make_room(events)
                 with memory.threads(1 + events // _EVENTS_PER_THREAD):
                     run = interruptible(
                         con,

@@ -10,24 +10,25 @@ WITH object AS (
     FROM query_table(objects)
     WHERE handle IS NOT NULL
 ),
-repeated AS (
-    SELECT process_id, handle
+known AS (
+    SELECT process_id, handle, min(event_id) AS first_event_id, count(*) > 1 AS is_repeated
     FROM object
     GROUP BY process_id, handle
-    HAVING count(*) > 1
 )
 -- Nearly every handle is used once: only the others need an order.
-SELECT u.*, o.event_id AS object_event_id
+SELECT
+    u.*,
+    CASE WHEN u.event_id >= k.first_event_id THEN k.first_event_id END AS object_event_id
 FROM query_table(uses) AS u
-LEFT JOIN object AS o
-    ON u.process_id = o.process_id AND u.handle = o.handle AND u.event_id >= o.event_id
-ANTI JOIN repeated AS r ON u.process_id = r.process_id AND u.handle = r.handle
+LEFT JOIN known AS k ON u.process_id = k.process_id AND u.handle = k.handle
+WHERE k.is_repeated IS DISTINCT FROM true
 UNION ALL
 SELECT u.*, o.event_id
 FROM (
     SELECT s.*
     FROM query_table(uses) AS s
-    SEMI JOIN repeated AS r ON s.process_id = r.process_id AND s.handle = r.handle
+    SEMI JOIN (FROM known WHERE is_repeated) AS r
+        ON s.process_id = r.process_id AND s.handle = r.handle
 ) AS u
 ASOF LEFT JOIN object AS o
     ON u.process_id = o.process_id AND u.handle = o.handle AND u.event_id >= o.event_id
