@@ -20,12 +20,17 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-DEFAULT_LIMIT = "220MB"
+DEFAULT_LIMIT = "195MB"
 _LOADING_BYTES = 44_000_000
 # DuckDB keeps 0.8 bytes per event beside its limit: where each part of a table is. So its limit is
 # smaller for large recordings, but not so small that what joins look up no longer fits.
 _LESS_PER_EVENT = 0.48
 _LEAST_DEFAULT_BYTES = 172_000_000
+# What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
+# As much as the limit saves a tenth of the processor time; some of it comes on top of the limit.
+_KEPT_BYTES = 192_000_000
+_LESS_KEPT_PER_EVENT = 1.44
+_LEAST_KEPT_BYTES = 96_000_000
 # With less, even opening fails.
 _LEAST_BYTES = 15_000_000
 _EXAMPLE = "--memory-limit 2GB"
@@ -43,6 +48,7 @@ class Memory:
         self._con = con
         self._is_fixed = limit is not None
         self._first = self._limit = limit or default
+        self._kept = 0
         self._set(self._limit)
 
     @contextlib.contextmanager
@@ -66,6 +72,18 @@ class Memory:
             # A database that failed for good takes no setting either.
             with contextlib.suppress(duckdb.FatalException):
                 self._con.execute("SET memory_limit = ?", [self._limit])
+
+    def keep_freed(self, events: int | None = None) -> None:
+        """Let freed blocks be used again, more of them once a recording is read that is not large.
+
+        Args:
+            events: how many were read; None: that is not known yet.
+        """
+        more = 0 if events is None else _KEPT_BYTES - round(_LESS_KEPT_PER_EVENT * events)
+        kept = min(max(more, _LEAST_KEPT_BYTES), self._bytes())
+        if kept > self._kept:
+            self._con.execute("SET block_allocator_memory = ?", [f"{kept}B"])
+            self._kept = kept
 
     def make_room(self, events: int) -> None:
         """Take less for a recording of so many events; a limit that the user gave is kept."""

@@ -43,8 +43,6 @@ if TYPE_CHECKING:
     from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress
 
-# What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
-_KEPT_BLOCKS = "48MB"
 # Where more is asked for at once, as for the table of a join, what statements before it freed goes
 # back to the system first. By default that is half a gigabyte, more than an ingest ever asks for.
 _MOST_BESIDE_FREED = "8MB"
@@ -175,7 +173,7 @@ def ingest(
                 contextlib.closing(open_memory()) as con,
             ):
                 memory = Memory(con, memory_limit)
-                con.execute("SET block_allocator_memory = ?", [_KEPT_BLOCKS])
+                memory.keep_freed()
                 con.execute(
                     "SET allocator_bulk_deallocation_flush_threshold = ?", [_MOST_BESIDE_FREED]
                 )
@@ -209,6 +207,7 @@ def ingest(
                 names = (name, fallback_name(paths))
                 events = sum(loaded.event_counts.values())
                 memory.make_room(events)
+                memory.keep_freed(events)
                 with memory.threads(1 + events // _EVENTS_PER_THREAD):
                     run = interruptible(
                         con,
