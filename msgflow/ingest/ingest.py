@@ -50,6 +50,8 @@ _MOST_BESIDE_FREED = "8MB"
 # As many events as another thread of the database is worth: below, statements take less time to run
 # than to be shared out.
 _EVENTS_PER_THREAD = 500_000
+# Below, the model is hardly more work than its planning, which one thread does for each statement.
+_EVENTS_SIDE_BY_SIDE = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -259,7 +261,8 @@ def _write(
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
     watch.enter("building the model")
     with staging.writing(con), _created_meanwhile(target):
-        model.build(con, memory, keep=keep_staging is not None)
+        is_small = sum(loaded.event_counts.values()) < _EVENTS_SIDE_BY_SIDE
+        model.build(con, memory, keep=keep_staging is not None, is_small=is_small)
     if target.is_new:
         attach(con, target.path, is_new=True)
     if keep_staging is not None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import re
 from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.db import objects
 from msgflow.db.conditions import conditions_of_diagnostics, conditions_of_model, is_empty
 from msgflow.db.diagnostic import STAGED, of_model, staged
 from msgflow.db.tables import TABLES
-from msgflow.ingest import calls, staging
+from msgflow.ingest import calls, side_by_side, staging
 from msgflow.ingest.outline import creating, empty_tables
 from msgflow.ingest.reported import restore
 from msgflow.sql.emptiness import NEVER
@@ -18,8 +21,6 @@ from msgflow.sql.parsed import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-
-    import duckdb
 
     from msgflow.db.memory import Memory
     from msgflow.sql.header import Header
@@ -30,7 +31,7 @@ def build(
     memory: Memory,
     *,
     keep: bool = False,
-    built: Callable[[str], None] | None = None,
+    is_small: bool = False,
 ) -> None:
     """Create every object of `schema/model`, each from those before it.
 
@@ -39,22 +40,69 @@ def build(
         memory: the memory limit of `con`.
         keep: keep what was read and what only other objects of the model need; else it goes once
             they are built.
-        built: called with the name of each object, after it was built.
+        is_small: of so few events that most of the time DuckDB plans, in one thread: two
+            objects are created at the same time, and everything is kept.
     """
     restore(con)
     headers = objects.load("model")
     growing = Growing(con, memory.run)
     staging.narrow(con, growing.empty)
+    # One by one each can have all the memory.
+    created = _create_side_by_side(con, headers, growing) if is_small else set()
     dropped: set[str] = set()
     for position, header in enumerate(headers):
-        growing.add(header)
-        if not keep:
+        if header.name not in created:
+            growing.add(header)
+        if not keep and (not is_small or position == len(headers) - 1):
             # A table without rows is no burden.
             for name in _finished(headers, position) - dropped - growing.empty:
                 con.execute(f"DROP TABLE {name}")
                 dropped.add(name)
-        if built is not None:
-            built(header.name)
+
+
+# One changes what was read, the other is of all that is known by then.
+_ALONE = (calls.TAKEN_APART, STAGED)
+
+
+def _create_side_by_side(
+    con: duckdb.DuckDBPyConnection, headers: tuple[Header, ...], growing: Growing
+) -> set[str]:
+    """Create objects of the model, two at the same time, as long as that needs no more memory.
+
+    Returns:
+        The names of those created: all, or fewer where the memory was too little.
+    """
+    created: set[str] = set()
+
+    def create(by: duckdb.DuckDBPyConnection, position: int) -> None:
+        header = headers[position]
+        if header.name in _ALONE:
+            growing.add(header)
+        else:
+            growing.create(header, by)
+        created.add(header.name)
+
+    empty_tables()  # not by both
+    with (
+        contextlib.closing(con.cursor()) as other,
+        contextlib.suppress(duckdb.OutOfMemoryException),
+    ):
+        side_by_side.run(
+            _positions_needed(headers), [functools.partial(create, by) for by in (con, other)]
+        )
+    return created
+
+
+def _positions_needed(headers: tuple[Header, ...]) -> list[set[int]]:
+    """Return for each object which of those before it have to be there."""
+    positions = {header.name: position for position, header in enumerate(headers)}
+    needed = [{positions[name] for name in h.needs if name in positions} for h in headers]
+    for position, header in enumerate(headers):
+        if header.name in _ALONE:
+            needed[position] = set(range(position))
+            for later in needed[position + 1 :]:
+                later.add(position)
+    return needed
 
 
 class Growing:
@@ -95,23 +143,28 @@ class Growing:
 
     def add(self, header: Header) -> None:
         """Create an object of the model, after all that it needs."""
-        self._run(functools.partial(self._create, header))
+        self._run(functools.partial(self.create, header, self._con))
         if header.name == calls.TAKEN_APART and header.name not in self.empty:
             for call in calls.CALLS:
                 self._run(functools.partial(calls.take_apart, self._con, call))
             self.empty -= {f"raw.{calls.apart(layer)}" for layer in calls.layers()}
 
-    def _create(self, header: Header) -> None:
+    def create(self, header: Header, con: duckdb.DuckDBPyConnection) -> None:
+        """Create an object that changes nothing else, once, by any connection.
+
+        Raises:
+            duckdb.OutOfMemoryException: the memory is too little; the object is not there.
+        """
         if header.kind != "view":
-            self._con.execute(parsed(self._con, creating(header)))
+            con.execute(parsed(con, creating(header)))
             return
         if header.name == STAGED and not self.is_empty(STAGED):
             header = staged([each for each in of_model() if not self.is_empty(each.name)])
         if self.is_empty(header.name):
-            self._con.execute(f"CREATE TABLE {header.name} AS {empty_tables()[header.name]}")
+            con.execute(f"CREATE TABLE {header.name} AS {empty_tables()[header.name]}")
             self.empty.add(header.name)
             return
-        ((count,),) = self._con.execute(parsed(self._con, creating(header))).fetchall()
+        ((count,),) = con.execute(parsed(con, creating(header))).fetchall()
         if not count:
             self.empty.add(header.name)
 
