@@ -24,7 +24,7 @@ DEFAULT_LIMIT = "195MB"
 _LOADING_BYTES = 44_000_000
 # DuckDB keeps 0.8 bytes per event beside its limit: where each part of a table is. So its limit is
 # smaller for large recordings, but not so small that what joins look up no longer fits.
-_LESS_PER_EVENT = 0.48
+_LESS_PER_EVENT = 0.24
 _LEAST_DEFAULT_BYTES = 172_000_000
 # What DuckDB keeps of freed blocks, to use it again instead of asking the system for zeroed pages.
 # As much as the limit saves a tenth of the processor time; some of it comes on top of the limit.
