@@ -63,11 +63,14 @@ ARGUMENTS = {
     # Names of tables.
     "flows": ["'same_flows'"],
     "trail": ["'same_trail'"],
+    "callbacks": ["'same_callbacks'"],
     "vertices": ["'same_vertices'"],
 }
 TABLES = {
     "same_flows": "main.end_to_end_flow([1])",
     "same_trail": "main.end_to_end_trail('same_flows', [1])",
+    "same_callbacks": "(SELECT i.*, w.busy_min_ns, w.busy_max_ns FROM main.callback_instance AS i"
+    " LEFT JOIN main.executor_wait AS w USING (callback_instance_id))",
     "same_vertices": "(SELECT 0 AS key, 'take' AS kind, take_id AS id, 0 AS depth FROM main.take)",
 }
 ROWS_SHOWN = 3

@@ -43,9 +43,9 @@
 -- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
 -- note: clocks
--- needs: main.end_to_end_flow, main.end_to_end_trail, main.end_to_end_piece, main.executor_wait,
---     main.flow_path, main.callback_instance, main.callback_label, main.publisher, main.node,
---     main.process
+-- needs: main.end_to_end_flow, main.end_to_end_trail, main.end_to_end_piece_explained,
+--     main.executor_wait, main.flow_path, main.callback_instance, main.callback_label,
+--     main.publisher, main.node, main.process
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns
@@ -60,69 +60,44 @@ FROM main.end_to_end_trail(
     'breakdown_flow', $runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths
 );
 
-CREATE OR REPLACE TEMP TABLE breakdown_part AS
-SELECT path_id, flow_id, hop, position, part, duration_ns, callback_instance_id
-FROM main.end_to_end_piece('breakdown_flow', 'breakdown_trail', $runs);
-
--- A step of its own: looked up while the parts are made, this would stay in memory beside them.
+-- Every callback instance, and how long its executor was busy before it.
 CREATE OR REPLACE TEMP TABLE breakdown_callback AS
 SELECT
-    e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_instance_id,
-    i.callback_id
-FROM breakdown_part AS e
-LEFT JOIN main.callback_instance AS i ON e.callback_instance_id = i.callback_instance_id;
-
--- How long the executor was busy before each take.
-CREATE OR REPLACE TEMP TABLE breakdown_wait AS
-SELECT callback_instance_id, busy_min_ns, busy_max_ns
-FROM main.executor_wait
-WHERE list_contains($runs, run_id) AND callback_instance_id IN (
-    SELECT callback_instance_id
-    FROM breakdown_callback
-    WHERE part IN ('publish_to_take', 'request_to_take')
-);
+    i.callback_instance_id, i.callback_id, i.take_id, i.start_ns, i.end_ns, w.busy_min_ns,
+    w.busy_max_ns
+FROM main.callback_instance AS i
+LEFT JOIN main.executor_wait AS w ON i.callback_instance_id = w.callback_instance_id
+WHERE list_contains($runs, i.run_id);
 
 -- Between clocks that are apart the time that they show may be shorter than the executor was busy.
-WITH taken AS (
+WITH piece AS (
     SELECT
-        e.path_id, e.flow_id, e.hop, e.position, e.part, e.duration_ns, e.callback_id,
-        least(coalesce(w.busy_min_ns, 0), greatest(e.duration_ns, 0)) AS busy_min_ns,
-        least(coalesce(w.busy_max_ns, e.duration_ns), greatest(e.duration_ns, 0)) AS busy_max_ns
-    FROM breakdown_callback AS e
-    LEFT JOIN breakdown_wait AS w ON e.callback_instance_id = w.callback_instance_id
-    WHERE e.part IN ('publish_to_take', 'request_to_take')
+        path_id, flow_id, hop, rank, part, duration_ns, callback_id, is_turning,
+        least(coalesce(busy_min_ns, 0), greatest(duration_ns, 0)) AS busy_min_ns,
+        least(coalesce(busy_max_ns, duration_ns), greatest(duration_ns, 0)) AS busy_max_ns,
+        -- The time up to a take is three parts, all others are one.
+        unnest(
+            CASE WHEN part IN ('publish_to_take', 'request_to_take')
+                THEN ['network_or_idle', 'undecided', 'executor_busy']
+            ELSE [part]
+            END
+        ) AS piece
+    FROM main.end_to_end_piece_explained(
+        'breakdown_flow', 'breakdown_trail', 'breakdown_callback', $runs
+    )
 ),
 part AS (
     SELECT
-        path_id, flow_id, hop, position, part, duration_ns,
-        CASE WHEN part IN ('callback', 'cache', 'take_to_callback', 'service') THEN callback_id END
+        path_id, flow_id, hop, rank, piece AS part, is_turning,
+        CASE piece
+            WHEN 'network_or_idle' THEN duration_ns - greatest(busy_max_ns, busy_min_ns)
+            WHEN 'undecided' THEN greatest(busy_max_ns - busy_min_ns, 0)
+            WHEN 'executor_busy' THEN busy_min_ns
+            ELSE duration_ns
+        END AS duration_ns,
+        CASE WHEN piece <> 'network_or_idle' OR part = 'request_to_take' THEN callback_id END
             AS callback_id
-    FROM breakdown_callback
-    WHERE part NOT IN ('publish_to_take', 'request_to_take')
-    UNION ALL
-    SELECT
-        path_id, flow_id, hop, position, 'network_or_idle',
-        duration_ns - greatest(busy_max_ns, busy_min_ns),
-        CASE WHEN part = 'request_to_take' THEN callback_id END
-    FROM taken
-    UNION ALL
-    SELECT
-        path_id, flow_id, hop, position, 'undecided', greatest(busy_max_ns - busy_min_ns, 0),
-        callback_id
-    FROM taken
-    UNION ALL
-    SELECT path_id, flow_id, hop, position, 'executor_busy', busy_min_ns, callback_id
-    FROM taken
-),
--- A flow has a part twice only in a hop with a cache or a service. To tell so many flows apart
--- everywhere would take most of the memory.
-repeated AS (
-    SELECT p.path_id, p.hop, p.part, p.callback_id, count(DISTINCT p.flow_id) AS flows
-    FROM part AS p
-    JOIN (
-        SELECT DISTINCT path_id, hop FROM breakdown_callback WHERE part IN ('cache', 'service')
-    ) AS r ON p.path_id = r.path_id AND p.hop = r.hop
-    GROUP BY p.path_id, p.hop, p.part, p.callback_id
+    FROM piece
 ),
 measured AS (
     SELECT
@@ -130,8 +105,10 @@ measured AS (
         hop,
         part,
         callback_id,
-        min(position) AS position,
-        count(*) AS flows,
+        min(rank) AS rank,
+        -- DISTINCT would tell all flows apart, not only these: that takes most of the memory.
+        count(*) FILTER (WHERE NOT is_turning)
+        + coalesce(len(list_distinct(list(flow_id) FILTER (WHERE is_turning))), 0) AS flows,
         count(*) FILTER (WHERE duration_ns < 0) AS overlaps,
         quantile_disc(duration_ns, [0.5, 0.95]) AS quantiles,
         round(avg(duration_ns))::BIGINT AS mean_ns,
@@ -160,7 +137,7 @@ SELECT
         l.node, n.full_name, printf('[%s %d]', coalesce(r.name, '?'), r.pid)
     ) AS node,
     coalesce(l.label, h.topic_name) AS what,
-    coalesce(d.flows, m.flows) AS flows,
+    m.flows,
     m.overlaps,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
@@ -171,17 +148,12 @@ SELECT
     p.path
 FROM measured AS m
 JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
-LEFT JOIN repeated AS d
-    ON m.path_id = d.path_id
-    AND m.hop = d.hop
-    AND m.part = d.part
-    AND m.callback_id IS NOT DISTINCT FROM d.callback_id
 LEFT JOIN message AS h ON m.path_id = h.path_id AND m.hop = h.hop
 LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
 LEFT JOIN main.process AS r ON b.process_id = r.process_id
 LEFT JOIN main.node AS n ON b.node_id = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY
-    p.run_id, p.path, m.path_id, m.hop, m.position,
+    p.run_id, p.path, m.path_id, m.hop, m.rank,
     list_position(['network_or_idle', 'undecided', 'executor_busy'], m.part), m.part,
     m.callback_id

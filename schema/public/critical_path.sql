@@ -78,13 +78,20 @@ waiting AS MATERIALIZED (
         AND callback_instance_id IS NOT NULL
         AND to_ns > from_ns
 ),
+-- What ran later tells nothing of them.
+waited AS MATERIALIZED (
+    SELECT x.executor_id, max(i.start_ns) AS until_ns
+    FROM store.callback_instance AS i
+    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+    WHERE i.callback_instance_id IN (SELECT callback_instance_id FROM waiting)
+    GROUP BY x.executor_id
+),
 ready AS MATERIALIZED (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
         earliest_ns, latest_ns, start_ns
-    FROM derive.callback_ready
-    WHERE list_contains(runs, run_id)
-        AND callback_instance_id IN (SELECT callback_instance_id FROM waiting)
+    FROM derive.callback_ready('waited')
+    WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
 wait AS MATERIALIZED (
     SELECT

@@ -12,9 +12,12 @@
 -- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
 --     is unknown)
 -- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
--- needs: derive.callback_ready, derive.executor_meanwhile
-WITH ready AS (
+-- needs: derive.executor_size, derive.callback_ready, derive.executor_meanwhile
+WITH executor AS (
+    SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
+),
+ready AS (
     SELECT run_id, executor_id, callback_instance_id, earliest_ns, latest_ns, start_ns
-    FROM derive.callback_ready
+    FROM derive.callback_ready('executor')
 )
 FROM derive.executor_meanwhile('ready')

@@ -25,13 +25,16 @@
 --     callback ran that never runs beside this one
 -- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
--- needs: derive.callback_ready, derive.executor_waits
-WITH ready AS (
+-- needs: derive.executor_size, derive.callback_ready, derive.executor_waits
+WITH executor AS (
+    SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
+),
+ready AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
         earliest_ns, latest_ns, start_ns, thread_count, wait_start_ns, wait_end_ns,
         wait_before_ns, previous_wait_end_ns, is_loss_affected
-    FROM derive.callback_ready
+    FROM derive.callback_ready('executor')
 )
 SELECT
     run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,

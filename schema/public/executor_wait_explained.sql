@@ -28,15 +28,19 @@
 --     NULL: none
 -- column: meanwhile_ns BIGINT[] [ns]  How long each of them did, from earliest_ns on (from
 --     latest_ns if that is unknown); those on several threads may lie side by side
--- needs: derive.callback_ready, derive.executor_waits, derive.executor_meanwhile
+-- needs: derive.executor_size, derive.callback_ready, derive.executor_waits, derive.executor_meanwhile
 CREATE OR REPLACE MACRO main.executor_wait_explained(runs) AS TABLE
-WITH ready AS MATERIALIZED (
+WITH executor AS (
+    SELECT executor_id, NULL::BIGINT AS until_ns
+    FROM derive.executor_size
+    WHERE list_contains(runs, run_id)
+),
+ready AS MATERIALIZED (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
         earliest_ns, latest_ns, start_ns, thread_count, wait_start_ns, wait_end_ns,
         wait_before_ns, previous_wait_end_ns, is_loss_affected
-    FROM derive.callback_ready
-    WHERE list_contains(runs, run_id)
+    FROM derive.callback_ready('executor')
 ),
 -- Of bursts there are far more pairs than waits: nothing may keep them all.
 together AS (

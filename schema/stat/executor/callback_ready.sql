@@ -1,4 +1,5 @@
 -- name: derive.callback_ready
+-- kind: macro
 -- description: Between which moments the input of a callback became ready in its executor. Not
 --     before its release, nor before the subscription was made. In an executor of one thread also
 --     not before it last went to sleep, nor before the last polling point but one, which would
@@ -7,28 +8,39 @@
 --     callback. With that wait of the executor, the end of the wait before it, and the time spent
 --     waiting before.
 -- grain: one row per callback instance that is not nested in another
+-- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
+--     instances that began after the last of these moments are left out (where all are NULL: none)
 -- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
 --     store.executor_thread, store.executor_state, store.thread_break
+CREATE OR REPLACE MACRO derive.callback_ready(executors) AS TABLE
 WITH sized AS (
-    SELECT executor_id, thread_count, NULL::BIGINT AS until_ns FROM derive.executor_size
+    SELECT e.executor_id, e.until_ns, s.thread_count
+    FROM query_table(executors) AS e
+    JOIN derive.executor_size AS s ON e.executor_id = s.executor_id
 ),
 release AS (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
         r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, s.thread_count
-    FROM derive.callback_release AS r
+    FROM derive.callback_release('sized') AS r
     JOIN sized AS s ON r.executor_id = s.executor_id
 ),
 -- A thread among several picks what it will run when it begins to look, not when it runs it:
 -- another thread may have gone to wait in the meantime.
 picked AS (
-    SELECT callback_instance_id, executor_id, start_ns AS picked_ns
+    SELECT
+        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns,
+        previous_start_ns, since, origin_ns, subscribed_ns, latest_ns, thread_count,
+        start_ns AS picked_ns
     FROM release
     WHERE thread_count = 1
     UNION ALL
-    SELECT r.callback_instance_id, r.executor_id, s.start_ns
+    SELECT
+        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
+        r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, r.thread_count,
+        s.start_ns
     FROM (SELECT * FROM release WHERE thread_count > 1) AS r
-    ASOF JOIN (
+    ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
         FROM store.executor_state AS e
         JOIN sized AS z ON e.executor_id = z.executor_id
@@ -37,10 +49,12 @@ picked AS (
 ),
 polled AS (
     SELECT
-        p.callback_instance_id, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
-        w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
+        p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
+        p.previous_start_ns, p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count,
+        w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns, w.start_ns AS wait_start_ns,
+        w.before_ns AS wait_before_ns
     FROM picked AS p
-    ASOF JOIN derive.executor_poll('sized') AS w
+    ASOF LEFT JOIN derive.executor_poll('sized') AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
 ),
 broken AS (
@@ -55,20 +69,19 @@ resumed AS (
 ),
 known AS (
     SELECT
-        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
-        r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, r.thread_count, b.resumed_ns,
+        p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
+        p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count, b.resumed_ns,
         p.polled_ns AS wait_end_ns, p.wait_start_ns, p.wait_before_ns, p.previous_end_ns,
         CASE WHEN p.polled_ns < b.resumed_ns THEN NULL ELSE p.polled_ns END AS polled_ns,
         CASE
             WHEN p.previous_end_ns < b.resumed_ns THEN NULL
-            WHEN p.previous_end_ns <= r.previous_start_ns THEN NULL
-            WHEN r.thread_count = 1 THEN p.previous_end_ns
+            WHEN p.previous_end_ns <= p.previous_start_ns THEN NULL
+            WHEN p.thread_count = 1 THEN p.previous_end_ns
         END AS not_polled_ns,
-        CASE WHEN r.thread_count = 1 AND coalesce(p.asleep_ns >= b.resumed_ns, true)
+        CASE WHEN p.thread_count = 1 AND coalesce(p.asleep_ns >= b.resumed_ns, true)
             THEN p.asleep_ns END AS asleep_ns
-    FROM release AS r
-    LEFT JOIN polled AS p ON r.callback_instance_id = p.callback_instance_id
-    LEFT JOIN resumed AS b ON r.callback_instance_id = b.callback_instance_id
+    FROM polled AS p
+    LEFT JOIN resumed AS b ON p.callback_instance_id = b.callback_instance_id
 ),
 confined AS (
     SELECT

@@ -1,0 +1,315 @@
+-- name: main.end_to_end_piece_explained
+-- kind: macro
+-- description: The parts of flows (main.end_to_end_piece), with the callback that each is of, and
+--     how long its executor was busy while it waited. What is told of callback instances is given,
+--     so that it need not be looked up for each part.
+-- grain: one row per flow and part
+-- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
+-- param: trail VARCHAR  Likewise of main.end_to_end_trail
+-- param: callbacks VARCHAR  Likewise of all callback instances of these runs:
+--     callback_instance_id, callback_id, take_id, start_ns and end_ns of main.callback_instance,
+--     busy_min_ns and busy_max_ns of main.executor_wait (NULL: not known)
+-- param: runs BIGINT[]  Runs that they are of
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: flow_id BIGINT  Number of the flow in this result
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: take_id BIGINT  Take at the end of the path
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than
+--     the last for the callback at the end
+-- column: position BIGINT  Order within the flow, from 1
+-- column: rank BIGINT  Order within the hop, from 1
+-- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
+--     publishes or calls), 'cache' (from the end of the callback to the callback instance that
+--     publishes for it),
+--     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
+--     (publishing, layer not known), 'publish_to_take' (from its end to the take: the network, an
+--     idle executor or a busy one, see main.executor_wait), 'take_to_callback', 'request_to_take'
+--     (from the sending of a request), 'service' (from the start of the service callback to what
+--     it publishes or calls)
+-- column: from_ns BIGINT [epoch ns]  Begin
+-- column: to_ns BIGINT [epoch ns]  End
+-- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
+-- column: publication_id BIGINT  Message that is published or under way
+-- column: callback_id BIGINT  Its callback
+-- column: busy_min_ns BIGINT [ns]  While a message or request waited for it: executor busy with
+--     other callbacks, at least
+-- column: busy_max_ns BIGINT [ns]  At most
+-- column: is_turning BOOLEAN  The hop leads through a cache or a service: a part may occur twice
+-- needs: main.publication, main.take, main.request, store.flow_call, store.callback_instance,
+--     store.link_causal, store.link_request
+CREATE OR REPLACE MACRO main.end_to_end_piece_explained(flows, trail, callbacks, runs) AS TABLE
+WITH RECURSIVE flow AS NOT MATERIALIZED (
+    SELECT
+        flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns,
+        latency_ns
+    FROM query_table(flows)
+),
+passed AS NOT MATERIALIZED (
+    SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
+    FROM query_table(trail)
+),
+callback AS NOT MATERIALIZED (
+    SELECT callback_instance_id, callback_id, take_id, start_ns, end_ns, busy_min_ns, busy_max_ns
+    FROM query_table(callbacks)
+),
+-- Publications to which their own callback did not lead directly: what led to each instead, of the
+-- callback instance that the flow came in with.
+roundabout AS MATERIALIZED (
+    SELECT c.publication_id, c.entered_id, c.publishing_id, c.kind
+    FROM (
+        SELECT
+            publication_id, callback_instance_id AS entered_id,
+            callback_instance_id AS publishing_id, kind
+        FROM store.link_causal
+        WHERE list_contains(runs, run_id) AND kind <> 'direct'
+        UNION ALL
+        SELECT publication_id, caller_id, callback_instance_id, kind
+        FROM store.flow_call
+        WHERE list_contains(runs, run_id)
+    ) AS c
+    ANTI JOIN (
+        SELECT publication_id, callback_instance_id
+        FROM store.link_causal
+        WHERE list_contains(runs, run_id) AND kind = 'direct'
+    ) AS d ON c.publication_id = d.publication_id AND c.entered_id = d.callback_instance_id
+    SEMI JOIN passed AS h ON c.publication_id = h.publication_id
+    WHERE c.entered_id IS NOT NULL
+    QUALIFY row_number() OVER (
+        PARTITION BY c.publication_id, c.entered_id
+        ORDER BY c.publishing_id <> c.entered_id, c.kind <> 'direct', c.publishing_id
+    ) = 1
+),
+-- Calls of services between the two, from the last one back to the first.
+leg (publishing_id, caller_id, level, request_id, service_id, sender_id) AS (
+    SELECT c.publishing_id, c.entered_id, 1, i.request_id, c.publishing_id, l.callback_instance_id
+    FROM (
+        SELECT DISTINCT publishing_id, entered_id FROM roundabout WHERE publishing_id <> entered_id
+    ) AS c
+    JOIN store.callback_instance AS i ON c.publishing_id = i.callback_instance_id
+    JOIN store.link_request AS l ON i.request_id = l.request_id
+    UNION
+    SELECT g.publishing_id, g.caller_id, g.level + 1, i.request_id, g.sender_id,
+        l.callback_instance_id
+    FROM leg AS g
+    JOIN store.callback_instance AS i ON g.sender_id = i.callback_instance_id
+    JOIN store.link_request AS l ON i.request_id = l.request_id
+    WHERE g.sender_id <> g.caller_id
+),
+call AS (
+    SELECT
+        c.publication_id, c.entered_id, g.level, q.sent_ns, q.taken_ns, i.start_ns,
+        i.callback_instance_id, i.callback_id, i.busy_min_ns, i.busy_max_ns
+    FROM roundabout AS c
+    JOIN leg AS g ON c.publishing_id = g.publishing_id AND c.entered_id = g.caller_id
+    JOIN main.request AS q ON g.request_id = q.request_id
+    JOIN callback AS i ON g.service_id = i.callback_instance_id
+),
+cached AS (
+    SELECT
+        c.publication_id, c.entered_id, coalesce(i.end_ns, i.start_ns) AS stored_ns,
+        s.callback_instance_id, s.callback_id, s.start_ns
+    FROM roundabout AS c
+    JOIN callback AS i ON c.publishing_id = i.callback_instance_id
+    LEFT JOIN store.link_causal AS d ON c.publication_id = d.publication_id AND d.kind = 'direct'
+    LEFT JOIN callback AS s ON d.callback_instance_id = s.callback_instance_id
+    WHERE c.kind IN ('periodic_async', 'partial_sync')
+),
+-- The moments at which a part begins. Those of a hop are in the order of `rank`.
+detour AS (
+    SELECT
+        publication_id, entered_id, -3 * level AS rank, 'request_to_take' AS part, sent_ns AS at_ns,
+        callback_instance_id, callback_id, busy_min_ns, busy_max_ns, NULL::BIGINT AS about_id
+    FROM call
+    WHERE sent_ns IS NOT NULL
+    UNION ALL
+    SELECT
+        publication_id, entered_id, 1 - 3 * level, 'take_to_callback', taken_ns,
+        callback_instance_id, callback_id, NULL, NULL, NULL
+    FROM call
+    WHERE taken_ns IS NOT NULL
+    UNION ALL
+    SELECT
+        publication_id, entered_id, 2 - 3 * level, 'service', start_ns, callback_instance_id,
+        callback_id, NULL, NULL, NULL
+    FROM call
+    UNION ALL
+    SELECT
+        publication_id, entered_id, 0, 'cache', stored_ns, callback_instance_id, callback_id, NULL,
+        NULL, publication_id
+    FROM cached
+    UNION ALL
+    SELECT
+        publication_id, entered_id, 1, 'callback', start_ns, callback_instance_id, callback_id,
+        NULL, NULL, NULL
+    FROM cached
+    WHERE callback_instance_id IS NOT NULL
+),
+between AS MATERIALIZED (
+    SELECT
+        publication_id, entered_id,
+        list(
+            {
+                'at_ns': at_ns, 'rank': rank, 'part': part,
+                'callback_instance_id': callback_instance_id, 'callback_id': callback_id,
+                'busy_min_ns': busy_min_ns, 'busy_max_ns': busy_max_ns, 'publication_id': about_id
+            }
+            ORDER BY rank
+        ) AS moments
+    FROM detour
+    GROUP BY publication_id, entered_id
+),
+turn AS MATERIALIZED (
+    SELECT h.flow_id, h.hop, w.moments
+    FROM passed AS h
+    JOIN between AS w ON h.publication_id = w.publication_id
+    JOIN flow AS f ON h.flow_id = f.flow_id
+    LEFT JOIN store.callback_instance AS i ON h.previous_take_id = i.take_id
+    WHERE w.entered_id = CASE
+        WHEN h.hop > 1 THEN i.callback_instance_id
+        WHEN f.root_kind = 'callback_instance' THEN f.root_id
+    END
+),
+-- A hop begins with the callback (or take without one) of the message before.
+message AS (
+    SELECT
+        f.run_id, f.path_id, f.flow_id, f.root_kind, f.root_id, f.take_id, f.latency_ns, f.sink_ns,
+        h.hop, h.publication_id, t.taken_ns, i.start_ns AS called_ns, i.callback_instance_id,
+        i.callback_id, i.busy_min_ns, i.busy_max_ns,
+        b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns, b.end_ns,
+        least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) AS layer_ns,
+        (b.intra_ns IS NOT NULL)::INTEGER + (b.rclcpp_ns IS NOT NULL)::INTEGER
+        + (b.rcl_ns IS NOT NULL)::INTEGER + (b.rmw_ns IS NOT NULL)::INTEGER
+        + (b.dds_ns IS NOT NULL)::INTEGER AS layer_count,
+        h.hop > 1 OR f.root_kind = 'callback_instance' AS is_entered,
+        CASE WHEN h.hop = 1 THEN f.root_ns ELSE coalesce(p.start_ns, u.taken_ns) END AS entered_ns,
+        CASE WHEN h.hop = 1 THEN f.root_id ELSE p.callback_instance_id END AS entered_id,
+        CASE WHEN h.hop = 1 THEN r.callback_id ELSE p.callback_id END AS entered_callback_id,
+        i.start_ns IS NOT NULL AND (h.next_take_id IS NOT NULL OR f.sink_event <> 'take')
+            AS is_called,
+        h.next_take_id IS NULL AND f.sink_event = 'callback_end' AS is_finished,
+        coalesce(w.moments, []) AS turn
+    FROM passed AS h
+    JOIN flow AS f ON h.flow_id = f.flow_id
+    JOIN main.publication AS b ON h.publication_id = b.publication_id
+    JOIN main.take AS t ON h.take_id = t.take_id
+    LEFT JOIN callback AS i ON h.take_id = i.take_id
+    LEFT JOIN main.take AS u ON h.previous_take_id = u.take_id
+    LEFT JOIN callback AS p ON h.previous_take_id = p.take_id
+    LEFT JOIN callback AS r
+        ON f.root_id = r.callback_instance_id AND f.root_kind = 'callback_instance'
+    LEFT JOIN turn AS w ON h.flow_id = w.flow_id AND h.hop = w.hop
+),
+-- `lead` is the number of its parts before the layers of publishing, `place` that of all parts of
+-- the flow before it.
+counted AS (
+    SELECT
+        *,
+        -- Where the first layer of publishing is not known.
+        start_ns IS DISTINCT FROM layer_ns AS is_vague,
+        is_entered::INTEGER + len(turn) + (start_ns IS DISTINCT FROM layer_ns)::INTEGER AS lead
+    FROM message
+),
+placed AS MATERIALIZED (
+    SELECT
+        *,
+        (sum(lead + layer_count + 1 + is_called::INTEGER) OVER (PARTITION BY flow_id ORDER BY hop))
+        ::BIGINT - (lead + layer_count + 1 + is_called::INTEGER) AS place
+    FROM counted
+),
+-- The layers follow each other in time, everything else in the order of causes.
+layer AS (
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, lead, turn,
+        publication_id, intra_ns, rclcpp_ns, rcl_ns, rmw_ns, dds_ns, end_ns, slot,
+        CASE slot
+            WHEN 1 THEN intra_ns
+            WHEN 2 THEN rclcpp_ns
+            WHEN 3 THEN rcl_ns
+            WHEN 4 THEN rmw_ns
+            ELSE dds_ns
+        END AS at_ns
+    FROM (SELECT *, unnest(range(1, 6)) AS slot FROM placed)
+),
+every_part AS (
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        ['intra', 'rclcpp', 'rcl', 'rmw', 'dds'][slot] AS part,
+        -- Of its layers, how many come before.
+        lead + 1
+        + coalesce((intra_ns < at_ns OR intra_ns = at_ns AND slot > 1)::INTEGER, 0)
+        + coalesce((rclcpp_ns < at_ns OR rclcpp_ns = at_ns AND slot > 2)::INTEGER, 0)
+        + coalesce((rcl_ns < at_ns OR rcl_ns = at_ns AND slot > 3)::INTEGER, 0)
+        + coalesce((rmw_ns < at_ns OR rmw_ns = at_ns AND slot > 4)::INTEGER, 0)
+        + coalesce((dds_ns < at_ns)::INTEGER, 0) AS rank,
+        at_ns AS from_ns,
+        coalesce(
+            least(
+                CASE WHEN intra_ns > at_ns THEN intra_ns END,
+                CASE WHEN rclcpp_ns > at_ns OR rclcpp_ns = at_ns AND slot < 2 THEN rclcpp_ns END,
+                CASE WHEN rcl_ns > at_ns OR rcl_ns = at_ns AND slot < 3 THEN rcl_ns END,
+                CASE WHEN rmw_ns > at_ns OR rmw_ns = at_ns AND slot < 4 THEN rmw_ns END,
+                CASE WHEN dds_ns > at_ns OR dds_ns = at_ns AND slot < 5 THEN dds_ns END
+            ),
+            end_ns
+        ) AS to_ns,
+        NULL::BIGINT AS callback_instance_id,
+        NULL::BIGINT AS callback_id,
+        NULL::BIGINT AS busy_min_ns,
+        NULL::BIGINT AS busy_max_ns,
+        publication_id
+    FROM layer
+    WHERE at_ns IS NOT NULL
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        'callback', 1, entered_ns, coalesce(turn[1].at_ns, start_ns), entered_id,
+        entered_callback_id, NULL, NULL, NULL
+    FROM placed
+    WHERE is_entered
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        turn[slot].part, is_entered::INTEGER + slot, turn[slot].at_ns,
+        coalesce(turn[slot + 1].at_ns, start_ns), turn[slot].callback_instance_id,
+        turn[slot].callback_id, turn[slot].busy_min_ns, turn[slot].busy_max_ns,
+        turn[slot].publication_id
+    FROM (SELECT *, unnest(range(1, len(turn) + 1)) AS slot FROM placed WHERE len(turn) > 0)
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        'publish', lead, start_ns, coalesce(layer_ns, end_ns), NULL, NULL, NULL, NULL,
+        publication_id
+    FROM placed
+    WHERE is_vague
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        'publish_to_take', lead + layer_count + 1, end_ns, taken_ns, callback_instance_id,
+        callback_id, busy_min_ns, busy_max_ns, publication_id
+    FROM placed
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
+        'take_to_callback', lead + layer_count + 2, taken_ns, called_ns, callback_instance_id,
+        callback_id, NULL, NULL, publication_id
+    FROM placed
+    WHERE is_called
+    UNION ALL
+    SELECT
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop + 1,
+        place + lead + layer_count + 1 + is_called::INTEGER, [],
+        'callback', 1, called_ns, sink_ns, callback_instance_id, callback_id, NULL, NULL, NULL
+    FROM placed
+    WHERE is_finished
+)
+SELECT
+    run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop,
+    place + rank AS position, rank::BIGINT AS rank, part, from_ns, to_ns,
+    to_ns - from_ns AS duration_ns,
+    callback_instance_id, publication_id, callback_id, busy_min_ns, busy_max_ns,
+    len(turn) > 0 AS is_turning
+FROM every_part
