@@ -51,6 +51,7 @@ _MOST_BESIDE_FREED = "8MB"
 # than to be shared out.
 _EVENTS_PER_THREAD = 500_000
 # Below, the model is hardly more work than its planning, which one thread does for each statement.
+# Ctrl-C waits for what the second connection runs: a tenth of a second at most.
 _EVENTS_SIDE_BY_SIDE = 2_000_000
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import re
 from typing import TYPE_CHECKING
 
@@ -41,13 +42,12 @@ def build(
         keep: keep what was read and what only other objects of the model need; else it goes once
             they are built.
         is_small: of so few events that most of the time DuckDB plans, in one thread: two
-            objects are created at the same time, and everything is kept.
+            objects are created at the same time, and nothing goes before all are built.
     """
     restore(con)
     headers = objects.load("model")
     growing = Growing(con, memory.run)
     staging.narrow(con, growing.empty)
-    # One by one each can have all the memory.
     created = _create_side_by_side(con, headers, growing) if is_small else set()
     dropped: set[str] = set()
     for position, header in enumerate(headers):
@@ -70,39 +70,41 @@ def _create_side_by_side(
     """Create objects of the model, two at the same time, as long as that needs no more memory.
 
     Returns:
-        The names of those created: all, or fewer where the memory was too little.
+        The names of those created: all, or fewer where the memory was too little for two. One by
+        one each of the others can have all of it.
     """
     created: set[str] = set()
 
-    def create(by: duckdb.DuckDBPyConnection, position: int) -> None:
-        header = headers[position]
-        if header.name in _ALONE:
-            growing.add(header)
-        else:
-            growing.create(header, by)
-        created.add(header.name)
+    def create(by: duckdb.DuckDBPyConnection, among: tuple[Header, ...], position: int) -> None:
+        growing.create(among[position], by)
+        created.add(among[position].name)
 
     empty_tables()  # not by both
-    with (
-        contextlib.closing(con.cursor()) as other,
-        contextlib.suppress(duckdb.OutOfMemoryException),
-    ):
-        side_by_side.run(
-            _positions_needed(headers), [functools.partial(create, by) for by in (con, other)]
-        )
+    with contextlib.closing(con.cursor()) as other:
+        for is_alone, stretch in itertools.groupby(headers, lambda each: each.name in _ALONE):
+            if is_alone:
+                for header in stretch:
+                    growing.add(header)
+                    created.add(header.name)
+                continue
+            together = tuple(stretch)
+            try:
+                side_by_side.run(
+                    _positions_needed(together),
+                    [functools.partial(create, by, together) for by in (con, other)],
+                )
+            except duckdb.OutOfMemoryException:
+                return created
     return created
 
 
 def _positions_needed(headers: tuple[Header, ...]) -> list[set[int]]:
     """Return for each object which of those before it have to be there."""
     positions = {header.name: position for position, header in enumerate(headers)}
-    needed = [{positions[name] for name in h.needs if name in positions} for h in headers]
-    for position, header in enumerate(headers):
-        if header.name in _ALONE:
-            needed[position] = set(range(position))
-            for later in needed[position + 1 :]:
-                later.add(position)
-    return needed
+    return [
+        {positions[name] for name in header.needs if name in positions and name != header.name}
+        for header in headers
+    ]
 
 
 class Growing:

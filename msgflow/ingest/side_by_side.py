@@ -20,7 +20,8 @@ def run(needs: Sequence[Collection[int]], workers: Sequence[Callable[[int], None
         workers: each runs one step at a time, all of them in threads of their own.
 
     Raises:
-        Exception: what the first failing step raised, once no other step is under way.
+        ValueError: a step needs itself or a later one.
+        BaseException: what the first failing step raised, once no other step is under way.
     """
     _Work(needs).be_done_by(workers)
 
@@ -28,6 +29,9 @@ def run(needs: Sequence[Collection[int]], workers: Sequence[Callable[[int], None
 class _Work:
     def __init__(self, needs: Sequence[Collection[int]]) -> None:
         self._needs = [frozenset(each) for each in needs]
+        for step, its in enumerate(self._needs):
+            if its and max(its) >= step:
+                raise ValueError(f"step {step} needs itself or a later one: {sorted(its)}")
         self._waiting = set(range(len(needs)))
         self._done: set[int] = set()
         self._failure: BaseException | None = None

@@ -10,7 +10,7 @@ WITH object AS (
     FROM query_table(objects)
     WHERE handle IS NOT NULL
 ),
-known AS (
+by_handle AS (
     SELECT process_id, handle, min(event_id) AS first_event_id, count(*) > 1 AS is_repeated
     FROM object
     GROUP BY process_id, handle
@@ -20,14 +20,14 @@ SELECT
     u.*,
     CASE WHEN u.event_id >= k.first_event_id THEN k.first_event_id END AS object_event_id
 FROM query_table(uses) AS u
-LEFT JOIN known AS k ON u.process_id = k.process_id AND u.handle = k.handle
+LEFT JOIN by_handle AS k ON u.process_id = k.process_id AND u.handle = k.handle
 WHERE k.is_repeated IS DISTINCT FROM true
 UNION ALL
 SELECT u.*, o.event_id
 FROM (
     SELECT s.*
     FROM query_table(uses) AS s
-    SEMI JOIN (FROM known WHERE is_repeated) AS r
+    SEMI JOIN (FROM by_handle WHERE is_repeated) AS r
         ON s.process_id = r.process_id AND s.handle = r.handle
 ) AS u
 ASOF LEFT JOIN object AS o
