@@ -51,7 +51,8 @@
 -- needs: main.end_to_end_part, derive.flow_piece, derive.callback_ready,
 --     derive.executor_meanwhile, main.callback_instance, main.publication, main.take,
 --     derive.executor_busy, derive.executor_size, derive.callback_exclusion, derive.process_clock,
---     derive.corrected_ns, store.thread, store.link_transport, store.link_causal
+--     derive.corrected_ns, store.callback_instance, store.executor_thread, store.thread,
+--     store.link_transport, store.link_causal
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,

@@ -13,13 +13,8 @@
 --     store.subscription, store.take, store.link_transport, store.publication, store.request,
 --     store.thread, derive.clock_comparable, derive.process_clock, derive.corrected_ns
 CREATE OR REPLACE MACRO derive.callback_release(executors) AS TABLE
-WITH thread AS (
-    SELECT thread_id, executor_id
-    FROM store.executor_thread
-    WHERE executor_id IN (SELECT executor_id FROM query_table(executors))
-),
 -- A callback may have run elsewhere before.
-every_run AS (
+WITH every_run AS (
     SELECT
         run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns, take_id,
         request_id, depth,
@@ -28,12 +23,12 @@ every_run AS (
         any_value(start_ns) OVER (in_time ROWS BETWEEN 2 PRECEDING AND 2 PRECEDING)
             AS earlier_start_ns
     FROM store.callback_instance
-    WHERE callback_id IN (
-            SELECT callback_id FROM store.callback_instance SEMI JOIN thread USING (thread_id)
-        )
-        AND start_ns <= (
+    -- A plain comparison DuckDB expects to leave few rows, and so compares each with all waits.
+    WHERE (
+        start_ns > (
             SELECT coalesce(max(until_ns), 9223372036854775807) FROM query_table(executors)
         )
+    ) IS DISTINCT FROM true
     WINDOW in_time AS (
         PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
     )
@@ -47,10 +42,14 @@ slotted AS (
         (i.previous_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns AS slot,
         (i.earlier_start_ns + t.period_ns // 100 - t.created_ns) // t.period_ns AS earlier_slot
     FROM every_run AS i
-    JOIN thread AS x ON i.thread_id = x.thread_id
+    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
     LEFT JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id AND t.period_ns > 0
     WHERE i.depth = 1
+        -- Likewise of a join with these few.
+        AND list_contains(
+            (SELECT list(executor_id) FROM query_table(executors)), x.executor_id
+        )
 ),
 -- A call shortly before such an instant was for that instant, or for the one before it, almost a
 -- period late. In the second case the instant is still to come.
