@@ -54,8 +54,9 @@
 -- heading: rank, latency_ns, take_id, path
 -- brief: rank, at_ns, duration_ns, share, activity, node, what, is_certain, pieces, hop, part
 -- note: clocks
--- needs: main.critical_path, main.flow_path, main.callback_instance, main.callback_label,
---     main.publication, main.publisher, main.node, main.process
+-- needs: main.end_to_end_part, main.critical_piece, main.flow_path, main.callback_instance,
+--     main.callback_label, main.publication, main.publisher, main.node, main.process
+CREATE OR REPLACE TEMP TABLE critical_part AS
 WITH path AS (
     SELECT path_id
     FROM main.flow_path(
@@ -76,8 +77,21 @@ WITH path AS (
                 lambda step: step = trim(each) OR trim(step, '()') GLOB trim(each)
             ))
         )), false)
-),
-piece AS (
+)
+SELECT
+    flow_id, run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
+    from_ns, to_ns, duration_ns, callback_instance_id, publication_id
+FROM main.end_to_end_part(
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, 'longest',
+    sink_take_id := $flow, max_depth := $max_depth, max_paths := $max_paths,
+    most_flows := $slowest,
+    at_quantile := CASE $at WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
+        WHEN 'p99' THEN 0.99 WHEN 'max' THEN 1.0 END,
+    path_ids := CASE WHEN $via IS NOT NULL OR $without IS NOT NULL
+        THEN (SELECT coalesce(list(path_id), []) FROM path) END
+);
+
+WITH piece AS (
     SELECT
         c.run_id,
         c.flow_rank,
@@ -107,15 +121,7 @@ piece AS (
         c.path_id,
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
             AND c.part = c.activity AS is_layer
-    FROM main.critical_path(
-        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns,
-        sink_take_id := $flow, max_depth := $max_depth, max_paths := $max_paths,
-        most_flows := $slowest,
-        at_quantile := CASE $at WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
-            WHEN 'p99' THEN 0.99 WHEN 'max' THEN 1.0 END,
-        path_ids := CASE WHEN $via IS NOT NULL OR $without IS NOT NULL
-            THEN (SELECT coalesce(list(path_id), []) FROM path) END
-    ) AS c
+    FROM main.critical_piece('critical_part', $runs) AS c
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     LEFT JOIN main.publication AS b ON c.publication_id = b.publication_id

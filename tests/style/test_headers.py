@@ -30,6 +30,7 @@ TABLES = {
     "trail": "main.end_to_end_trail('flows', [1])",
     "callbacks": "(SELECT *, 1::BIGINT AS busy_min_ns, 1::BIGINT AS busy_max_ns"
     " FROM main.callback_instance)",
+    "parts": "main.end_to_end_part([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
 PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]

@@ -1,0 +1,246 @@
+-- name: main.critical_piece
+-- kind: macro
+-- description: What flows had to wait for, moment by moment, as in main.critical_path, of which
+--     this is the last step: their parts, with waits replaced by what they waited for.
+-- grain: one row per piece of a flow
+-- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
+-- param: runs BIGINT[]  Runs that they are of
+-- column: run_id BIGINT  Run
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root
+-- column: take_id BIGINT  Take at the end of the path
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: flow_rank BIGINT  Number of the flow, the longest first
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to
+-- column: position BIGINT  Order within the flow, from 1
+-- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
+-- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
+--     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
+--     one) or 'undecided' (nothing shows when the message arrived); in a cache 'timer' (not due
+--     yet), 'unpublished' (the message that was waited for had not been published), or a part of
+--     that message's own flow
+-- column: from_ns BIGINT [epoch ns]  Begin
+-- column: to_ns BIGINT [epoch ns]  End
+-- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: is_certain BOOLEAN  For 'executor_busy' and 'blocked': what waited was ready by then;
+--     false: it may have arrived during this piece. NULL for others
+-- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
+-- column: publication_id BIGINT  Message that is published, under way or waited for
+-- needs: derive.flow_piece, derive.callback_ready,
+--     derive.executor_meanwhile, main.callback_instance, main.publication, main.take,
+--     derive.executor_busy, derive.executor_size, derive.callback_exclusion, derive.process_clock,
+--     derive.corrected_ns, store.callback_instance, store.executor_thread, store.thread,
+--     store.link_transport, store.link_causal
+CREATE OR REPLACE MACRO main.critical_piece(parts, runs) AS TABLE
+-- Here positions go on from flow to flow.
+WITH part AS MATERIALIZED (
+    SELECT
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns,
+        to_ns, duration_ns, callback_instance_id, publication_id,
+        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
+        row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
+    FROM query_table(parts)
+),
+waiting AS MATERIALIZED (
+    SELECT position, part, from_ns, to_ns, callback_instance_id, publication_id
+    FROM part
+    WHERE part IN ('publish_to_take', 'request_to_take', 'take_to_callback', 'cache')
+        AND callback_instance_id IS NOT NULL
+        AND to_ns > from_ns
+),
+-- What ran later tells nothing of them.
+waited AS MATERIALIZED (
+    SELECT x.executor_id, max(i.start_ns) AS until_ns
+    FROM store.callback_instance AS i
+    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+    WHERE i.callback_instance_id IN (SELECT callback_instance_id FROM waiting)
+    GROUP BY x.executor_id
+),
+ready AS MATERIALIZED (
+    SELECT
+        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
+        earliest_ns, latest_ns, start_ns
+    FROM derive.callback_ready('waited')
+    WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
+),
+wait AS MATERIALIZED (
+    SELECT
+        r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
+        derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
+        derive.corrected_ns(
+            coalesce(r.earliest_ns, r.latest_ns), c.offset_ns, c.drift_ppb, c.reference_ns
+        ) AS earliest_ns,
+        derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
+        derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+        r.earliest_ns IS NOT NULL AS is_bounded
+    FROM ready AS r
+    JOIN store.thread AS t ON r.thread_id = t.thread_id
+    JOIN derive.process_clock AS c ON t.process_id = c.process_id
+),
+meanwhile AS MATERIALIZED (
+    SELECT
+        w.callback_instance_id, w.executor_id, w.callback_id, w.latest_ns,
+        r.callback_instance_id AS meanwhile_id,
+        r.callback_id AS meanwhile_callback_id,
+        r.thread_id = w.thread_id AS is_own_thread,
+        r.process_id,
+        greatest(r.start_ns, w.earliest_ns) AS from_ns,
+        least(r.end_ns, w.start_ns) AS to_ns
+    FROM derive.executor_meanwhile('ready') AS i
+    JOIN wait AS w ON i.callback_instance_id = w.callback_instance_id
+    JOIN main.callback_instance AS r ON i.meanwhile_id = r.callback_instance_id
+    WHERE i.overlap_ns > 0
+),
+-- Of several threads all have to be busy; then the one that took over was, too.
+full_house AS (
+    SELECT
+        b.executor_id,
+        derive.corrected_ns(b.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+        derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
+    FROM derive.executor_busy AS b
+    JOIN derive.executor_size AS s ON b.executor_id = s.executor_id
+    JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
+        ON b.executor_id = p.executor_id
+    JOIN derive.process_clock AS c ON p.process_id = c.process_id
+    WHERE s.thread_count > 1
+),
+occupied AS (
+    SELECT
+        m.callback_instance_id, 1 AS priority, 'executor_busy' AS activity, m.from_ns, m.to_ns,
+        m.latest_ns,
+        m.meanwhile_id
+    FROM meanwhile AS m
+    JOIN derive.executor_size AS s ON m.executor_id = s.executor_id
+    WHERE s.thread_count = 1
+    UNION ALL
+    SELECT
+        m.callback_instance_id, 1, 'executor_busy', greatest(m.from_ns, b.start_ns),
+        least(m.to_ns, b.end_ns), m.latest_ns, m.meanwhile_id
+    FROM meanwhile AS m
+    JOIN full_house AS b
+        ON m.executor_id = b.executor_id AND m.from_ns < b.end_ns AND m.to_ns > b.start_ns
+    WHERE m.is_own_thread
+    UNION ALL
+    SELECT
+        m.callback_instance_id, 2, 'blocked', m.from_ns, m.to_ns, m.latest_ns, m.meanwhile_id
+    FROM meanwhile AS m
+    JOIN derive.callback_exclusion AS w ON m.callback_id = w.callback_id
+    JOIN derive.callback_exclusion AS r
+        ON m.meanwhile_callback_id = r.callback_id
+        AND w.kind = r.kind
+        AND w.exclusion_id = r.exclusion_id
+),
+-- The message whose callback published for what lay in the cache, or the timer that did.
+completing AS (
+    SELECT
+        w.position, b.publication_id, b.start_ns AS published_ns, b.end_ns, t.taken_ns,
+        i.callback_instance_id, s.callback_instance_id AS publishing_id,
+        s.start_ns AS publishing_ns
+    FROM waiting AS w
+    JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
+    JOIN main.take AS t ON i.take_id = t.take_id
+    JOIN store.link_transport AS l ON t.take_id = l.take_id
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    LEFT JOIN store.link_causal AS d ON b.publication_id = d.publication_id AND d.kind = 'direct'
+    LEFT JOIN main.callback_instance AS s ON d.callback_instance_id = s.callback_instance_id
+    WHERE w.part = 'cache'
+),
+candidate AS (
+    SELECT
+        w.position, o.priority, o.activity, o.from_ns, o.to_ns, o.latest_ns,
+        o.meanwhile_id AS callback_instance_id, NULL::BIGINT AS publication_id
+    FROM waiting AS w
+    JOIN occupied AS o ON w.callback_instance_id = o.callback_instance_id
+    UNION ALL
+    SELECT w.position, 3, 'timer', w.from_ns, i.origin_ns, NULL, w.callback_instance_id, NULL
+    FROM waiting AS w
+    JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
+    WHERE w.part = 'cache' AND i.since = 'timer'
+    UNION ALL
+    -- Before it is known that the input was there, the executor may have been what it waited for.
+    SELECT
+        w.position, 4, 'undecided', coalesce(c.end_ns, w.from_ns),
+        CASE WHEN i.callback_instance_id IS NULL THEN coalesce(c.taken_ns, w.to_ns)
+            ELSE least(c.taken_ns, i.latest_ns) END,
+        NULL, w.callback_instance_id, coalesce(c.publication_id, w.publication_id)
+    FROM waiting AS w
+    LEFT JOIN completing AS c ON w.position = c.position
+    LEFT JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
+    WHERE (w.part IN ('publish_to_take', 'request_to_take') OR c.position IS NOT NULL)
+        AND i.is_bounded IS DISTINCT FROM true
+    UNION ALL
+    SELECT c.position, 5, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
+        NULL, c.publishing_id, c.publication_id
+    FROM completing AS c
+    JOIN waiting AS w ON c.position = w.position
+    UNION ALL
+    SELECT position, 5, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
+    FROM completing
+    WHERE publishing_ns IS NOT NULL
+    UNION ALL
+    SELECT position, 5, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
+    FROM completing
+    UNION ALL
+    SELECT
+        position, 5, 'network_or_idle', end_ns, taken_ns, NULL, callback_instance_id,
+        publication_id
+    FROM completing
+    UNION ALL
+    SELECT c.position, 5, 'take_to_callback', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
+        c.publication_id
+    FROM completing AS c
+    JOIN waiting AS w ON c.position = w.position
+),
+named AS (
+    SELECT
+        p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.flow_rank, p.hop,
+        p.part, p.position, c.from_ns, c.to_ns,
+        CASE
+            WHEN c.activity IS NOT NULL THEN c.activity
+            WHEN p.part NOT IN ('publish_to_take', 'request_to_take') THEN p.part
+            WHEN p.callback_instance_id IS NULL AND p.duration_ns > 0 THEN 'undecided'
+            ELSE 'network_or_idle'
+        END AS activity,
+        CASE WHEN c.priority <= 2 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
+        CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id END
+            AS callback_instance_id,
+        CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
+            AS publication_id
+    FROM derive.flow_piece('part', 'candidate') AS c
+    JOIN part AS p ON c.position = p.position
+),
+-- Neighbours that are the same thing become one.
+numbered AS (
+    SELECT
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, position,
+        from_ns, to_ns, activity, is_certain, callback_instance_id, publication_id,
+        row_number() OVER (PARTITION BY position ORDER BY from_ns)
+        - row_number() OVER (
+            PARTITION BY position, activity, is_certain, callback_instance_id, publication_id
+            ORDER BY from_ns
+        ) AS island
+    FROM named
+)
+SELECT
+    run_id,
+    path_id,
+    root_kind,
+    root_id,
+    take_id,
+    latency_ns,
+    flow_rank,
+    hop,
+    row_number() OVER (PARTITION BY flow_rank ORDER BY position, min(from_ns)) AS position,
+    part,
+    activity,
+    min(from_ns) AS from_ns,
+    arg_max(to_ns, from_ns) AS to_ns,
+    sum(to_ns - from_ns)::BIGINT AS duration_ns,
+    is_certain,
+    callback_instance_id,
+    publication_id
+FROM numbered
+GROUP BY
+    run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
+    activity, is_certain, callback_instance_id, publication_id, island
