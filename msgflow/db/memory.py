@@ -33,6 +33,10 @@ _LESS_KEPT_PER_EVENT = 1.44
 _LEAST_KEPT_BYTES = 96_000_000
 # With less, even opening fails.
 _LEAST_BYTES = 15_000_000
+# As DuckDB advises. With less for each, threads spill what fewer would not, or run short of memory.
+_BYTES_PER_THREAD = 125_000_000
+# Of a small limit, two make as much as one does, in less time.
+_LEAST_THREADS = 2
 _EXAMPLE = "--memory-limit 2GB"
 # Of a limit that the user gave, if that is more.
 _LOADING_SHARE = 4
@@ -50,6 +54,7 @@ class Memory:
         self._first = self._limit = limit or default
         self._kept = 0
         self._set(self._limit)
+        limit_threads(con)
 
     @contextlib.contextmanager
     def loading(self) -> Iterator[None]:
@@ -93,15 +98,9 @@ class Memory:
 
     @contextlib.contextmanager
     def threads(self, count: int) -> Iterator[None]:
-        """Let at most so many threads do all work of the database.
-
-        Args:
-            count: below zero, so many fewer than usual; one is left in any case.
-        """
-        ((usual,),) = self._con.execute("SELECT current_setting('threads')").fetchall()
-        self._con.execute(
-            f"SET threads = {max(1, min(usual, count) if count > 0 else usual + count)}"
-        )
+        """Let at most so many threads do all work of the database."""
+        usual = _threads(self._con)
+        self._con.execute(f"SET threads = {min(usual, count)}")
         try:
             yield
         finally:
@@ -178,6 +177,17 @@ def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
         is_enough = False
     if not is_enough:
         raise DatabaseError(f"too little memory for any database — {limit}", _EXAMPLE)
+
+
+def limit_threads(con: duckdb.DuckDBPyConnection) -> None:
+    """Let no more threads work than its memory limit is enough for."""
+    most = max(_LEAST_THREADS, round(_limit_bytes(con) / _BYTES_PER_THREAD))
+    if most < _threads(con):
+        con.execute(f"SET threads = {most}")
+
+
+def _threads(con: duckdb.DuckDBPyConnection) -> int:
+    return int(con.execute("SELECT current_setting('threads')").fetchall()[0][0])
 
 
 def _limit_bytes(con: duckdb.DuckDBPyConnection) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.memory import set_memory_limit
+from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
@@ -45,6 +45,7 @@ def open_file(
             try:
                 if memory_limit is not None:
                     set_memory_limit(con, memory_limit)
+                limit_threads(con)
                 _prepare(con)
                 con.execute("SET temp_directory = ?", [str(spill_directory(path))])
                 con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])

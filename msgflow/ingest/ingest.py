@@ -194,8 +194,8 @@ def ingest(
                 # Its settings stay open, for more memory, which nothing but our own SQL can reach.
                 shut_in(con, beside=[directory, *([keep_staging] if keep_staging else [])])
                 watch.enter("reading the traces")
-                # The reader takes one.
-                with memory.loading(), memory.threads(-1), staging.writing(con):
+                # One inserts faster than the reader reads.
+                with memory.loading(), memory.threads(1), staging.writing(con):
                     loaded = load_traces(
                         con,
                         traces,

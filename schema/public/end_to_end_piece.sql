@@ -30,7 +30,7 @@
 -- column: publication_id BIGINT  Message that is published or under way
 -- needs: main.end_to_end_piece_explained, main.callback_instance
 CREATE OR REPLACE MACRO main.end_to_end_piece(flows, trail, runs) AS TABLE
-WITH instance AS NOT MATERIALIZED (
+WITH every_callback_instance AS NOT MATERIALIZED (
     SELECT
         callback_instance_id, callback_id, take_id, start_ns, end_ns, NULL::BIGINT AS busy_min_ns,
         NULL::BIGINT AS busy_max_ns
@@ -39,4 +39,4 @@ WITH instance AS NOT MATERIALIZED (
 SELECT
     run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
     from_ns, to_ns, duration_ns, callback_instance_id, publication_id
-FROM main.end_to_end_piece_explained(flows, trail, 'instance', runs)
+FROM main.end_to_end_piece_explained(flows, trail, 'every_callback_instance', runs)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
@@ -60,3 +61,19 @@ def test_a_new_database_has_no_log_and_is_whole_after_a_checkpoint(tmp_path: Pat
         copy.write_bytes(path.read_bytes())
     with duckdb.connect(str(copy), read_only=True) as con:
         assert con.execute("SELECT version_num FROM store.alembic_version").fetchall() == [("x",)]
+
+
+def test_no_more_threads_than_the_memory_is_enough_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    connect = duckdb.connect
+
+    def connect_on_many_cores(*args: Any, **options: Any) -> duckdb.DuckDBPyConnection:
+        con = connect(*args, **options)
+        con.execute("SET threads = 16")
+        return con
+
+    monkeypatch.setattr(duckdb, "connect", connect_on_many_cores)
+    for limit, most in (("500MB", 4), ("none", 16)):
+        with open_file(tmp_path / f"{limit}.duckdb", read_only=False, memory_limit=limit) as con:
+            assert con.execute("SELECT current_setting('threads')").fetchone() == (most,)

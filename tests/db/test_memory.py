@@ -16,6 +16,10 @@ def limit_of(con: duckdb.DuckDBPyConnection) -> str:
     return str(con.execute("SELECT current_setting('memory_limit')").fetchall()[0][0])
 
 
+def threads_of(con: duckdb.DuckDBPyConnection) -> int:
+    return int(con.execute("SELECT current_setting('threads')").fetchall()[0][0])
+
+
 def test_a_statement_that_needs_more_gets_it() -> None:
     with duckdb.connect() as con:
         memory = Memory(con, None)
@@ -128,16 +132,36 @@ def test_a_limit_that_grew_is_not_taken_back() -> None:
 
 
 def test_fewer_threads() -> None:
-    def threads() -> int:
-        return int(con.execute("SELECT current_setting('threads')").fetchall()[0][0])
-
     with duckdb.connect() as con:
         memory = Memory(con, None)
         con.execute("SET threads = 5")
-        for count, left in ((1, 1), (2, 2), (9, 5), (-1, 4), (-9, 1)):
+        for count, left in ((1, 1), (2, 2), (9, 5)):
             with memory.threads(count):
-                assert threads() == left
-            assert threads() == 5
+                assert threads_of(con) == left
+            assert threads_of(con) == 5
+
+
+@pytest.mark.parametrize(
+    ("limit", "most"),
+    [
+        (None, 2),
+        ("40MB", 2),
+        ("312MB", 2),
+        ("313MB", 3),
+        ("500MB", 4),
+        ("1GB", 8),
+        ("3GB", 16),
+        ("none", 16),
+    ],
+)
+def test_no_more_threads_than_the_memory_is_enough_for(limit: str | None, most: int) -> None:
+    with duckdb.connect() as con:
+        con.execute("SET threads = 16")
+        Memory(con, limit)
+        assert threads_of(con) == most
+        con.execute("SET threads = 1")
+        Memory(con, limit)
+        assert threads_of(con) == 1
 
 
 def test_too_little_to_read() -> None:

@@ -46,10 +46,7 @@ slotted AS (
     LEFT JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id AND t.period_ns > 0
     WHERE i.depth = 1
-        -- Likewise of a join with these few.
-        AND list_contains(
-            (SELECT list(executor_id) FROM query_table(executors)), x.executor_id
-        )
+        AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
 ),
 -- A call shortly before such an instant was for that instant, or for the one before it, almost a
 -- period late. In the second case the instant is still to come.
