@@ -83,9 +83,10 @@ def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
 
 def json_rows(result: QueryResult) -> Iterator[str]:
     """Yield each row as a JSON object on one line."""
+    encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
     for batch in result.table.to_batches(max_chunksize=_ROWS_AT_ONCE):
         for row in batch.to_pylist():
-            yield json.dumps(plain(row), ensure_ascii=False, allow_nan=False)
+            yield encode(plain(row))
 
 
 def _lines(result: QueryResult, form: Format) -> Iterable[str]:

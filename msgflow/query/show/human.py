@@ -40,14 +40,18 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
             of 1.
         is_handle: an address, shown in hexadecimal.
     """
+    if isinstance(value, str):
+        return printable(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return _number(value, unit, is_handle)
     # A map, such as labels.
     if isinstance(value, list) and value and all(isinstance(item, tuple) for item in value):
         return ", ".join("=".join(map(format_cell, item)) for item in value)
     value = plain(value)
     if value is None:
         return NULL
-    if isinstance(value, bool):
-        return "yes" if value else "no"
     if isinstance(value, int | float):
         return _number(value, unit, is_handle)
     if isinstance(value, list):

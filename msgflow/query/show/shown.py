@@ -40,7 +40,7 @@ def _labelled(label: str, text: str, width: int) -> list[str]:
 
 def shown_html(result: Rows) -> str:
     """Return the first rows as an HTML table; names from a trace are never more than text."""
-    names, rows, right = cells(_first(result))
+    names, columns, right = cells(_first(result))
     styles = [_STYLE.format("right" if is_right else "left") for is_right in right]
     parts = ["<table>"]
     if result.header is not None:
@@ -51,7 +51,7 @@ def shown_html(result: Rows) -> str:
         for name, style in zip(names, styles, strict=True)
     ]
     parts.append("</tr></thead><tbody>")
-    for row in rows:
+    for row in zip(*columns, strict=True):
         parts.append("<tr>")
         parts += [
             f'<td style="{style}">{escape(cell)}</td>'

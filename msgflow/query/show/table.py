@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import cache, partial
+from itertools import repeat
+from operator import add
+from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
@@ -15,47 +18,34 @@ if TYPE_CHECKING:
 
     from msgflow.query.rows import Rows
 
+_GAP = "  "
+
 
 def table_lines(result: Rows) -> Iterator[str]:
     """Yield the lines of a table: names, a rule, one line per row, numbers to the right."""
-    return lay_out(*cells(result))
-
-
-def lay_out(
-    names: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[bool]
-) -> Iterator[str]:
-    """Yield the lines of a table of text.
-
-    Args:
-        names: titles of the columns.
-        rows: cells, as many in each row as there are columns.
-        right: for each column, whether it is aligned to the right.
-    """
+    names, columns, right = cells(result)
     if not names:
         return
-    widths = [
-        max(cell_len(name), max((cell_len(cell) for cell in column), default=0))
-        for name, column in zip(names, _columns(rows, len(names)), strict=True)
-    ]
-    yield _line(names, widths, right)
-    yield "─" * (sum(widths) + 2 * (len(widths) - 1))
-    for row in rows:
-        yield _line(row, widths, right)
+    padded, widths = zip(*map(_aligned, names, columns, right), strict=True)
+    lines = (_GAP.join(row).rstrip() for row in zip(*padded, strict=True))
+    yield next(lines)
+    yield "─" * (sum(widths) + len(_GAP) * (len(widths) - 1))
+    yield from lines
 
 
 def markdown_lines(result: Rows) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
-    names, rows, right = cells(result)
+    names, columns, right = cells(result)
     if not names:
         return
     yield _markdown_line(names)
     yield "|" + "|".join(" ---: " if is_right else " --- " for is_right in right) + "|"
-    for row in rows:
+    for row in zip(*columns, strict=True):
         yield _markdown_line(row)
 
 
 def cells(result: Rows) -> tuple[list[str], list[list[str]], list[bool]]:
-    """Return titles, rows as people read them, and which columns are numbers."""
+    """Return titles, columns as people read them, and which of them are numbers."""
     import pyarrow.types
 
     units = result.units
@@ -64,15 +54,12 @@ def cells(result: Rows) -> tuple[list[str], list[list[str]], list[bool]]:
     right: list[bool] = []
     for field, column in zip(result.table.schema, result.table.columns, strict=True):
         is_handle = field.name.endswith("_handle") and pyarrow.types.is_uint64(field.type)
-        unit = units.get(field.name)
-        columns.append([format_cell(value, unit, is_handle=is_handle) for value in _list(column)])
+        cell = partial(format_cell, unit=units.get(field.name), is_handle=is_handle)
+        # Of the texts in a column most are alike.
+        texts = cache(cell) if pyarrow.types.is_string(field.type) else cell
+        columns.append(list(map(texts, column.to_pylist())))
         right.append(_is_number(field.type))
-    return names, [list(row) for row in zip(*columns, strict=True)], right
-
-
-def _list(column: pa.ChunkedArray) -> list[Any]:
-    values: list[Any] = column.to_pylist()
-    return values
+    return names, columns, right
 
 
 def _is_number(kind: pa.DataType) -> bool:
@@ -85,16 +72,16 @@ def _is_number(kind: pa.DataType) -> bool:
     )
 
 
-def _columns(rows: Sequence[Sequence[str]], count: int) -> list[Sequence[str]]:
-    return list(zip(*rows, strict=True)) if rows else [()] * count
-
-
-def _line(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> str:
-    parts = []
-    for cell, width, is_right in zip(cells, widths, right, strict=True):
-        padding = " " * (width - cell_len(cell))
-        parts.append(padding + cell if is_right else cell + padding)
-    return "  ".join(parts).rstrip()
+def _aligned(name: str, column: Sequence[str], is_right: bool) -> tuple[Iterator[str], int]:
+    """Return the title and cells of a column, all of one width, and that width."""
+    texts = [name, *column]
+    characters = "".join(texts)
+    if characters.isascii() or all(cell_len(character) == 1 for character in set(characters)):
+        width = max(map(len, texts))
+        return map(str.rjust if is_right else str.ljust, texts, repeat(width)), width
+    width = max(map(cell_len, texts))
+    padding = (" " * (width - cell_len(text)) for text in texts)
+    return map(add, *((padding, texts) if is_right else (texts, padding))), width
 
 
 def _markdown_line(cells: Sequence[str]) -> str:
