@@ -119,7 +119,8 @@ def main() -> int:
             ):
                 is_right &= _report(measured, true_messages(truths[run_id], measured))
         for delay_ms in sorted({delay_ms for _, delay_ms in runs}):
-            _compare(database, *(runs[name, delay_ms] for name in NAMES), delay_ms)
+            one, other = (runs[name, delay_ms] for name in NAMES)
+            _compare(database, one, other, delay_ms)
     return 0 if is_right else 1
 
 

@@ -188,8 +188,8 @@ def main() -> None:
             with open_db(database) as opened:
                 report = opened.report(place / "report.html", max_size=500_000_000)
             with serving(database) as (address, _):
-                for name, place in (("report", report.path.as_uri()), ("ui", address)):
-                    seen = [look(place, database) for _ in range(TIMES)]
+                for name, page in (("report", report.path.as_uri()), ("ui", address)):
+                    seen = [look(page, database) for _ in range(TIMES)]
                     steps = [step for _, _, several in seen for step in several]
                     paint = statistics.median(painted for _, painted, _ in seen)
                     print(

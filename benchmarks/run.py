@@ -1,12 +1,14 @@
 """Speed and memory of reading and ingesting, beside Babeltrace 2 on the same trace in one run.
 
     python benchmarks/run.py [--events 10000000] [--packet-bytes 0 8388608] [--runs 3]
-                             [--trace DIRECTORY] [--memory-limit SIZE] [--bt2] [--markdown FILE]
+                             [--trace DIRECTORY] [--memory-limit SIZE] [--query-limit SIZE] [--bt2]
+                             [--markdown FILE]
 
 Simulates a pipeline of nodes, once with packets of 32 KiB, as ros2_tracing records, and once with
 packets of 8 MB, as those have who give LTTng large sub-buffers. Then measures in processes of their
-own: our reader alone (all the columns of the catalogue, nothing kept), the whole ingest by stage,
-the query e2e-latency on the result, and `babeltrace2 -o dummy`, which decodes and does nothing.
+own: our reader alone (all the columns of the catalogue, nothing kept), the ingest by stage and as
+a whole, with the start of Python, the costliest queries on the result, without a memory limit and
+with a small one, and `babeltrace2 -o dummy`, which decodes and does nothing.
 `--bt2` adds Babeltrace's Python bindings. They take turns, so that other work on the machine slows
 all of them alike. Seconds of different machines and days cannot be compared, ratios of one run can,
 but not those of the first run on a virtual machine just started: memory that was never used there
@@ -31,6 +33,8 @@ from pathlib import Path
 
 EVENTS_PER_FACTOR = 66_000
 PEER = "babeltrace2 -o dummy"
+# All rows go to a file of the fastest format: what is measured is the query, not its printing.
+QUERIES = ("e2e-latency", "flows", "path-breakdown", "critical-path", "executor-wait")
 
 SIMULATE = """
 import sys; from pathlib import Path; from msgflow.sim import Recording, simulate
@@ -64,11 +68,11 @@ print(json.dumps([report.event_count, {name: [wall[name], cpu.get(name, 0)] for 
 
 @dataclass(frozen=True)
 class Sample:
-    """One run: wall and CPU time [s], and peak memory of its process [bytes] where measured."""
+    """One run: wall and CPU time [s], peak memory [bytes] of its process, 0 for a part of it."""
 
     wall: float
     cpu: float
-    peak_bytes: int | None = None
+    peak_bytes: int = 0
 
 
 def run(*command: str) -> tuple[str, Sample]:
@@ -86,24 +90,29 @@ def run(*command: str) -> tuple[str, Sample]:
 
 
 def measure(
-    trace: str, database: Path, memory_limit: str, with_bt2: bool
+    trace: str, database: Path, arguments: argparse.Namespace
 ) -> tuple[int, dict[str, Sample]]:
     """Measure everything on one trace once; return its number of events and the measurements."""
     samples = {}
     if shutil.which("babeltrace2"):
         _, samples[PEER] = run("babeltrace2", "-o", "dummy", trace)
     for reader, name in (("msgflow", "reader alone"), ("bt2", "reader bt2 (Python bindings)")):
-        if reader == "msgflow" or with_bt2:
+        if reader == "msgflow" or arguments.bt2:
             output, sample = run(sys.executable, "-c", READ, trace, reader)
-            samples[name] = Sample(*json.loads(output), sample.peak_bytes)
+            wall, cpu = json.loads(output)
+            samples[name] = Sample(wall, cpu, sample.peak_bytes)
     database.unlink(missing_ok=True)
-    output, sample = run(sys.executable, "-c", INGEST, trace, str(database), memory_limit)
+    output, sample = run(sys.executable, "-c", INGEST, trace, str(database), arguments.memory_limit)
     events, stages = json.loads(output)
     samples |= {f"ingest: {name}": Sample(*taken) for name, taken in stages.items()}
-    wall, cpu = (sum(taken[which] for taken in stages.values()) for which in (0, 1))
-    samples["ingest, whole"] = Sample(wall, cpu, sample.peak_bytes)
-    query = (sys.executable, "-m", "msgflow", "query", "e2e-latency", "--db", str(database))
-    _, samples["query e2e-latency"] = run(*query)
+    samples["ingest, whole"] = sample
+    result = str(database.with_suffix(".parquet"))
+    for name in QUERIES:
+        query = (sys.executable, "-m", "msgflow", "query", name, "--db", str(database))
+        for limit in ("", arguments.query_limit):
+            limited = ("--memory-limit", limit) if limit else ()
+            _, sample = run(*query, *limited, "--output", result)
+            samples[f"query {name}" + (f", limit {limit}" if limit else "")] = sample
     return events, samples
 
 
@@ -141,7 +150,7 @@ def table(trace: str, directory: Path, what: str, arguments: argparse.Namespace)
     database = directory / "bench.duckdb"
     rounds = []
     for _ in range(arguments.runs):
-        events, samples = measure(trace, database, arguments.memory_limit, arguments.bt2)
+        events, samples = measure(trace, database, arguments)
         rounds.append(samples)
     lines = [
         f"{datetime.now(UTC):%Y-%m-%d}: {events:,} events{what}, {os.cpu_count()} cores "
@@ -165,6 +174,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--trace", help="measure on this trace instead of simulated ones")
     parser.add_argument("--memory-limit", default="", help="as of `msgflow ingest`")
+    parser.add_argument(
+        "--query-limit", default="300MB", help="memory limit of queries, beside none"
+    )
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
     parser.add_argument("--markdown", type=Path, help="append the tables to this file")
     arguments = parser.parse_args()

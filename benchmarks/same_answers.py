@@ -28,7 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 
@@ -200,7 +200,10 @@ def read_all() -> None:
         for header in opened.list_queries():
             result = opened.query(header.name, run=1, internal=True)
             result.to_parquet(folder / f"query {header.name}.parquet")
-        told = {"findings": opened.findings(run=1), "audits": opened.check()}
+        told: dict[str, Sequence[Any]] = {
+            "findings": opened.findings(run=1),
+            "audits": opened.check(),
+        }
     for name, items in told.items():
         rows = pyarrow.array([json.dumps(asdict(item)) for item in items], pyarrow.string())
         pyarrow.parquet.write_table(pyarrow.table({"told": rows}), folder / f"query {name}.parquet")

@@ -86,14 +86,14 @@ class Cost:
 
 def measure(code: str, *arguments: str) -> Cost:
     """Run code in a process of its own; it prints its seconds and rows."""
-    output, _, peak = run(sys.executable, "-c", code, *arguments)
+    output, sample = run(sys.executable, "-c", code, *arguments)
     seconds, rows = json.loads(output)
-    return Cost(seconds, peak, rows)
+    return Cost(seconds, sample.peak_bytes, rows)
 
 
 def ingest(trace: Path, database: Path) -> int:
     """Ingest a trace in a process of its own; return its number of events."""
-    output, _, _ = run(sys.executable, "-c", INGEST, str(trace), str(database), "")
+    output, _ = run(sys.executable, "-c", INGEST, str(trace), str(database), "")
     return int(json.loads(output)[0])
 
 

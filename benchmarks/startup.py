@@ -27,11 +27,10 @@ SCRIPT = "import sys; sys.argv[0] = 'msgflow'; from msgflow.__main__ import main
 def seconds(command: list[str]) -> float:
     """Return the wall time of a command [s]."""
     started = time.perf_counter()
-    environment = os.environ
+    environment = dict(os.environ)
     if command[-1].startswith(TAB):
         line = command[-1].removeprefix(TAB)
-        environment = {
-            **os.environ,
+        environment |= {
             "_MSGFLOW_COMPLETE": "complete_bash",
             "COMP_WORDS": line,
             "COMP_CWORD": str(len(line.split()) - 1),

@@ -118,11 +118,14 @@ def compare(trace: Path, directory: Path) -> dict[str, tuple[set[Link], set[Link
             }
             suggested |= links
             doubtful |= links if row["doubt"] else set()
+
+    def of(node: str, links: set[Link]) -> set[Link]:
+        return {link for link in links if link[1] == node}
+
     return {
-        node: tuple({link for link in links if link[1] == node}
-                    for links in (declared, suggested, doubtful))
+        node: (of(node, declared), of(node, suggested), of(node, doubtful))
         for node in sorted({link[1] for link in declared | suggested})
-    }  # fmt: skip
+    }
 
 
 def main() -> None:
