@@ -80,6 +80,7 @@ def selected(header: Header, selection: Selection, internal: bool) -> tuple[str,
     is_cut = CUT_COLUMN if CUT_COLUMN in names else "false"
     order = [*_order(header, selection), f'"{PLACE}"']
     limit = selection.limit if selection.slowest is None else selection.slowest
+    first = "" if limit is None else f"ORDER BY {', '.join(order)} LIMIT {int(limit)}"
     total, hidden, cut = (f'"{name}"' for name in COUNTS)
     sql = f"""
 WITH numbered AS (
@@ -98,8 +99,7 @@ counted AS (
     FROM wanted
 ),
 shown AS (
-    SELECT * FROM wanted WHERE NOT {is_hidden}
-    ORDER BY {", ".join(order)} {"" if limit is None else f"LIMIT {int(limit)}"}
+    SELECT * FROM wanted WHERE NOT {is_hidden} {first}
 )
 SELECT s.*, {total}, {hidden}, {cut}
 FROM counted
