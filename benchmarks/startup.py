@@ -21,7 +21,7 @@ from pathlib import Path
 PYTHON = "python -c pass"
 TAB = "Tab: "
 # What a console script does; `python -m` has another name for completion.
-SCRIPT = "import sys; sys.argv[0] = 'msgflow'; from msgflow.__main__ import main; main()"
+SCRIPT = "import sys; sys.argv[0] = 'msgflow'; from msgflow.__main__ import program; program()"
 
 
 def seconds(command: list[str]) -> float:

@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import sys
 
 
 def main() -> None:
@@ -24,5 +25,37 @@ def main() -> None:
     app()
 
 
+def program() -> None:
+    """Run the program, and end the process.
+
+    Python would free all that it has, piece by piece, which takes longer than to print a help. The
+    system takes it all at once.
+    """
+    try:
+        main()
+    except SystemExit as end:
+        # A profiler has not written yet what it found.
+        if isinstance(end.code, int) and sys.getprofile() is sys.gettrace() is None:
+            _end(end.code)
+        raise
+
+
+def _end(code: int) -> None:
+    import atexit
+    import threading
+
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and not thread.daemon:
+            thread.join()
+    atexit._run_exitfuncs()
+    try:
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                stream.flush()
+    except (OSError, ValueError):
+        return  # Python tries again, and says so
+    os._exit(code)
+
+
 if __name__ == "__main__":
-    main()
+    program()

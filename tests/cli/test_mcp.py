@@ -205,7 +205,7 @@ def test_a_waiting_agent_keeps_nobody_from_writing(small_database: Path) -> None
 def test_without_the_extra_it_says_what_to_install(small_database: Path) -> None:
     code = (
         "import sys; sys.modules['mcp'] = None; sys.argv = ['msgflow', 'mcp']\n"
-        "from msgflow.__main__ import main; main()"
+        "from msgflow.__main__ import program; program()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 2

@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 from msgflow.cli.app import app
 from msgflow.db.definition import expected
+from msgflow.errors import ExitCode
 from msgflow.ingest import ingest
 from msgflow.sim import Recording, simulate
 
@@ -68,6 +69,50 @@ def test_numpy_starts_no_threads() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
     )
     assert done.stdout.split()[-1] == "1"
+
+
+_ENDING = """
+import atexit, sys, threading, time
+
+def late():
+    time.sleep(0.3)
+    print("thread")
+
+def looking(*arguments):
+    pass
+
+atexit.register(print, "at exit")
+threading.Thread(target=late).start()
+from msgflow.__main__ import program
+if sys.argv.pop(1) == "profiled":
+    sys.setprofile(looking)
+try:
+    program()
+finally:
+    print("still there")
+"""
+
+
+def ended(how: str, *arguments: str) -> tuple[int, list[str]]:
+    done = subprocess.run(
+        [sys.executable, "-c", _ENDING, how, *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
+        env={key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"},
+    )
+    return done.returncode, done.stdout.splitlines()[-3:]
+
+
+def test_the_process_ends_with_the_program() -> None:
+    """Nothing is freed; but threads are waited for, and what is registered for the end is done."""
+    code, lines = ended("plain", "--version")
+    assert (code, lines[-2:]) == (0, ["thread", "at exit"])
+    assert ended("plain", "nonsense") == (ExitCode.USAGE, ["thread", "at exit"])
+
+
+def test_a_profiler_lives_to_write_what_it_found() -> None:
+    assert ended("profiled", "--version") == (0, ["still there", "thread", "at exit"])
 
 
 HELP = (
