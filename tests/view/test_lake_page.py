@@ -145,7 +145,10 @@ def test_labels_are_only_ever_text(address: str, page: Page) -> None:
     assert page.page.locator("main img, main script, main style").count() == 0
     for width, height in ((1280, 800), (390, 844)):
         page.page.set_viewport_size({"width": width, "height": height})
-        assert page.page.evaluate("document.documentElement.scrollWidth") == width
+        # The page is drawn anew only after that.
+        page.page.wait_for_function(
+            "width => document.documentElement.scrollWidth === width", arg=width
+        )
 
 
 def test_the_server_shows_the_page_anew(lake: Lake, page: Page) -> None:
