@@ -33,6 +33,7 @@ from pathlib import Path
 
 EVENTS_PER_FACTOR = 66_000
 PEER = "babeltrace2 -o dummy"
+NO_ROOM = "more memory is needed"  # What the command says where a query does not fit.
 # All rows go to a file of the fastest format: what is measured is the query, not its printing.
 QUERIES = ("e2e-latency", "flows", "path-breakdown", "critical-path", "executor-wait")
 
@@ -75,25 +76,38 @@ class Sample:
     peak_bytes: int = 0
 
 
+class Failed(Exception):
+    """A process that ended with an error: its command, and what it said."""
+
+
 def run(*command: str) -> tuple[str, Sample]:
-    """Run a process; return its output and what it took."""
+    """Run a process; return its output and what it took.
+
+    Raises:
+        Failed: it ended with an error.
+    """
     begin = time.monotonic()
-    with tempfile.TemporaryFile("w+") as output:
-        process = subprocess.Popen(command, stdout=output)
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
+        process = subprocess.Popen(command, stdout=output, stderr=errors)
         _, status, usage = os.wait4(process.pid, 0)
         wall = time.monotonic() - begin
-        if os.waitstatus_to_exitcode(status):
-            raise SystemExit(f"failed: {' '.join(command)}")
         output.seek(0)
+        errors.seek(0)
+        if os.waitstatus_to_exitcode(status):
+            raise Failed(f"{' '.join(command)}\n{errors.read()}")
         sample = Sample(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
         return output.read(), sample
 
 
 def measure(
     trace: str, database: Path, arguments: argparse.Namespace
-) -> tuple[int, dict[str, Sample]]:
-    """Measure everything on one trace once; return its number of events and the measurements."""
-    samples = {}
+) -> tuple[int, dict[str, Sample | None]]:
+    """Measure everything on one trace once.
+
+    Returns:
+        The number of events, and what each process took; None where it did not fit into its limit.
+    """
+    samples: dict[str, Sample | None] = {}
     if shutil.which("babeltrace2"):
         _, samples[PEER] = run("babeltrace2", "-o", "dummy", trace)
     for reader, name in (("msgflow", "reader alone"), ("bt2", "reader bt2 (Python bindings)")):
@@ -109,14 +123,25 @@ def measure(
     result = str(database.with_suffix(".parquet"))
     for name in QUERIES:
         query = (sys.executable, "-m", "msgflow", "query", name, "--db", str(database))
-        for limit in ("", arguments.query_limit):
-            limited = ("--memory-limit", limit) if limit else ()
-            _, sample = run(*query, *limited, "--output", result)
-            samples[f"query {name}" + (f", limit {limit}" if limit else "")] = sample
+        _, samples[f"query {name}"] = run(*query, "--output", result)
+        if limit := arguments.query_limit:
+            samples[f"query {name}, limit {limit}"] = _if_it_fits(
+                *query, "--memory-limit", limit, "--output", result
+            )
     return events, samples
 
 
-def report(rounds: list[dict[str, Sample]], events: int) -> list[str]:
+def _if_it_fits(*command: str) -> Sample | None:
+    """Return what a process took; None where its memory limit was too small."""
+    try:
+        return run(*command)[1]
+    except Failed as failed:
+        if NO_ROOM not in str(failed):
+            raise
+        return None
+
+
+def report(rounds: list[dict[str, Sample | None]], events: int) -> list[str]:
     """Return the lines of a Markdown table; ratios are those within a round."""
     lines = [
         f"| median (least to most) | seconds | CPU | events/s | ratio to `{PEER}` | ratio of CPU "
@@ -124,14 +149,18 @@ def report(rounds: list[dict[str, Sample]], events: int) -> list[str]:
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for name in rounds[0]:
-        samples = [each[name] for each in rounds]
+        taken = [(sample, each.get(PEER)) for each in rounds if (sample := each[name])]
+        if not taken:
+            lines.append(f"| {name} | does not fit | | | | | |")
+            continue
+        samples = [sample for sample, _ in taken]
         walls = [sample.wall for sample in samples]
         wall = statistics.median(walls)
         cpu = statistics.median(sample.cpu for sample in samples)
         ratio = cpu_ratio = ""
         if PEER in rounds[0]:
-            ratio = _spread([each[name].wall / each[PEER].wall for each in rounds])
-            cpu_ratio = _spread([each[name].cpu / each[PEER].cpu for each in rounds])
+            ratio = _spread([sample.wall / peer.wall for sample, peer in taken if peer])
+            cpu_ratio = _spread([sample.cpu / peer.cpu for sample, peer in taken if peer])
         peaks = [sample.peak_bytes for sample in samples if sample.peak_bytes]
         peak = f"{max(peaks) / 1e6:,.0f} MB" if peaks else ""
         rate = f"{events / wall:,.0f}" if wall > 0.005 else ""
@@ -180,6 +209,13 @@ def main() -> None:
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
     parser.add_argument("--markdown", type=Path, help="append the tables to this file")
     arguments = parser.parse_args()
+    try:
+        _measure_all(arguments)
+    except Failed as failed:
+        raise SystemExit(f"failed: {failed}") from None
+
+
+def _measure_all(arguments: argparse.Namespace) -> None:
     # Users have byte code: pip writes it, or the first call.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for packet_bytes in [0] if arguments.trace else arguments.packet_bytes:

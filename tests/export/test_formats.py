@@ -9,6 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from rich.cells import cell_len
 
 from msgflow.export.formats import Format, format_of, write_result
 from msgflow.query.result import QueryResult
@@ -128,6 +129,18 @@ def test_a_wide_table_is_never_cut_and_wide_letters_align() -> None:
     lines = written(table, Format.TABLE).decode().splitlines()
     assert lines[2] == "漢字" + " " * 496 + "  a"
     assert lines[3] == "x" * 500 + "  b"
+
+
+@pytest.mark.parametrize(
+    ("title", "shown"),
+    [("a\tb", "a\\tb"), ("\x1b[1mb", "\\x1b[1mb"), ("漢字", "漢字"), ("e\u0301", "e\u0301")],
+)
+def test_cells_stand_below_any_title(title: str, shown: str) -> None:
+    table = QueryResult(pa.table({title: [1], "next": ["a"]}))
+    lines = written(table, Format.TABLE).decode().splitlines()
+    assert lines[0] == f"{shown}  next"
+    assert len(lines[1]) == cell_len(lines[0])
+    assert lines[2] == "1".rjust(cell_len(shown)) + "  a"
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,8 @@ def make_irregular(trace: Path, random: Random) -> str:
     elif kind == "directory":
         path.mkdir()
     else:
-        path.symlink_to({"circle": path, "nowhere": "nowhere", "zeros": "/dev/zero"}[kind])
+        targets = {"circle": path.name, "nowhere": "nowhere", "zeros": "/dev/zero"}
+        path.symlink_to(targets[kind])
     return f"{path.name} is {kind}"
 
 

@@ -79,8 +79,8 @@ def shown_name(name: str, unit: str | None, names: tuple[str, ...]) -> str:
     """Return the title of a column: `_ns` goes where the unit stands in the cells instead."""
     short = name.removesuffix("_ns")
     if unit in (DURATION, MOMENT) and short and (short == name or short not in names):
-        return short
-    return name
+        return printable(short)
+    return printable(name)
 
 
 def _number(value: float, unit: str | None, is_handle: bool) -> str:

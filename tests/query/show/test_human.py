@@ -80,6 +80,11 @@ def test_the_suffix_goes_where_the_unit_stands_in_the_cells() -> None:
     assert shown_name("delay_ns", "ns", ("delay", "delay_ns")) == "delay_ns"
 
 
+def test_no_terminal_obeys_a_title() -> None:
+    assert shown_name("a\tb", None, ("a\tb",)) == "a\\tb"
+    assert shown_name("\x1b[31m_ns", "ns", ("\x1b[31m_ns",)) == "\\x1b[31m"
+
+
 @pytest.mark.parametrize(
     ("symbol", "shown"),
     [
