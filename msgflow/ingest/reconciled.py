@@ -18,7 +18,7 @@ import numpy as np
 from msgflow.ingest.catalogue import load
 from msgflow.resources import resource_directory
 from msgflow.sql.statement import Statements
-from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
+from msgflow.trace.numpy_arrow import distinct, is_valid, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +89,7 @@ def find(con: duckdb.DuckDBPyConnection) -> Corrections:
         "SELECT host, session FROM session_trace ORDER BY trace_index"
     ).fetchnumpy()
     # What is in the record twice, two sessions have recorded.
-    left_out = _left_out(con) if np.unique(traces["session"]).size > 1 else np.empty(0, np.int64)
+    left_out = _left_out(con) if distinct(traces["session"]).size > 1 else np.empty(0, np.int64)
     for table in _TABLES:
         con.execute(f"DROP TABLE {table}")
     processes = _process(told["host"], told["vpid"])

@@ -41,7 +41,7 @@ THREAD_SCHEMA = pa.schema(
 THREAD_NAME_SCHEMA = pa.schema(
     [
         pa.field("thread_index", pa.int32(), nullable=False),
-        pa.field("procname", pa.string()),
+        pa.field("procname", pa.dictionary(pa.int32(), pa.string())),
         pa.field("first_event_id", pa.int64(), nullable=False),
         pa.field("last_event_id", pa.int64(), nullable=False),
         pa.field("first_seen_ns", pa.int64(), nullable=False),
@@ -240,8 +240,7 @@ class _Threads:
             values = np.concatenate(
                 [np.where(is_valid(column), to_numpy(column), 0) for column in given]
             )
-            is_given = np.concatenate([is_valid(column) for column in given])
-            spaces |= np.where(is_given, self._namespaces.of(values) + 1, 0)
+            spaces |= np.where(_present(batches, "pid_ns"), self._namespaces.of(values) + 1, 0)
         return self._threads.of(names | (self._spaces.of(spaces).astype(np.int64) << 32))
 
 
@@ -350,10 +349,13 @@ def _new_threads(
     batches: Sequence[tuple[str, pa.RecordBatch]], threads: NDArray[np.int32], known: int
 ) -> pa.RecordBatch:
     fresh = np.flatnonzero(threads >= known)
+    if not fresh.size:
+        nothing = [pa.nulls(0, field.type) for field in THREAD_SCHEMA]
+        return pa.RecordBatch.from_arrays(nothing, schema=THREAD_SCHEMA)
     found, first = np.unique(threads[fresh], return_index=True)
-    rows = to_arrow(fresh[first])
+    rows = fresh[first]
     columns = [
-        pa.chunked_array([batch[name] for _, batch in batches]).take(rows).combine_chunks()
+        to_arrow(_gathered(batches, name)[rows], ~_present(batches, name)[rows])
         for name in THREAD_SCHEMA.names[1:]
     ]
     return pa.RecordBatch.from_arrays([to_arrow(found), *columns], schema=THREAD_SCHEMA)
@@ -382,7 +384,7 @@ def _name_rows(
     codes: NDArray[np.int32],
     extents: Sequence[NDArray[np.int64]],
 ) -> pa.RecordBatch:
-    names = dictionary.take(to_arrow(codes, codes == _NONE)).cast(pa.string())
+    names = pa.DictionaryArray.from_arrays(to_arrow(codes, codes == _NONE), dictionary)
     return pa.RecordBatch.from_arrays(
         [to_arrow(threads), names, *map(to_arrow, extents)], schema=THREAD_NAME_SCHEMA
     )
@@ -404,3 +406,7 @@ def _coded_names(
 
 def _gathered(batches: Sequence[tuple[str, pa.RecordBatch]], name: str) -> NDArray[Any]:
     return np.concatenate([to_numpy(batch[name]) for _, batch in batches])
+
+
+def _present(batches: Sequence[tuple[str, pa.RecordBatch]], name: str) -> NDArray[np.bool_]:
+    return np.concatenate([is_valid(batch[name]) for _, batch in batches])

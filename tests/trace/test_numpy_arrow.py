@@ -14,11 +14,14 @@ from hypothesis import strategies as st
 
 from msgflow.sim import simulate
 from msgflow.trace.numpy_arrow import (
+    distinct,
     integers_to_arrow,
     is_valid,
+    text_lengths,
     texts_to_arrow,
     to_arrow,
     to_numpy,
+    without,
 )
 
 TYPES = ["bool", "int8", "int32", "int64", "uint16", "uint64", "float32", "float64", ">u4", ">i8"]
@@ -76,14 +79,51 @@ def test_texts(texts: list[str | None]) -> None:
     assert array.to_pylist() == texts
 
 
-def test_an_ingest_does_not_import_pandas(tmp_path: Path) -> None:
-    """It takes longer than reading a small trace."""
+@settings(deadline=None)
+@given(st.lists(st.none() | st.text(st.characters(exclude_categories=["Cs"]))), st.integers(0, 9))
+def test_lengths_of_texts(texts: list[str | None], begin: int) -> None:
+    array = pa.array(texts, pa.string()).slice(begin)
+    lengths = text_lengths(array)
+    assert lengths.dtype == np.int32
+    expected = [None if text is None else len(text.encode()) for text in texts[begin:]]
+    assert [
+        length if valid else None
+        for length, valid in zip(lengths.tolist(), is_valid(array), strict=True)
+    ] == expected
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.tuples(st.none() | st.integers(0, 99), st.booleans())),
+    st.sampled_from([pa.int64(), pa.string()]),
+    st.integers(0, 20),
+)
+def test_values_left_out(
+    rows: list[tuple[int | None, bool]], kind: pa.DataType, begin: int
+) -> None:
+    array = pa.array([value for value, _ in rows]).cast(kind).slice(begin)
+    is_left_out = np.array([left_out for _, left_out in rows[begin:]], np.bool_)
+    kept = without(array, is_left_out)
+    kept.validate(full=True)
+    assert kept.to_pylist() == [
+        None if left_out else value
+        for value, left_out in zip(array.to_pylist(), is_left_out, strict=True)
+    ]
+
+
+def test_each_value_once() -> None:
+    assert distinct(np.array([3, 1, 3, 2, 1])).tolist() == [1, 2, 3]
+    assert distinct(np.empty(0, np.int64)).size == 0
+
+
+def test_an_ingest_does_not_import_what_takes_long(tmp_path: Path) -> None:
+    """pandas takes longer than reading a small trace."""
     pytest.importorskip("pandas")
     simulate("pipeline", tmp_path / "trace", factor=0.02)
     script = (
         "import sys; from pathlib import Path; from msgflow.ingest import ingest\n"
         "ingest([sys.argv[1]], Path(sys.argv[2]))\n"
-        "sys.exit('pandas' in sys.modules)"
+        "assert not {'pandas', 'pyarrow.compute', 'numpy.ma'} & set(sys.modules)"
     )
     command = [sys.executable, "-c", script, tmp_path / "trace", tmp_path / "run.duckdb"]
     subprocess.run(command, check=True)

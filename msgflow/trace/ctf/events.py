@@ -12,6 +12,7 @@ from msgflow.trace.ctf.headers import read_headers
 from msgflow.trace.ctf.lockstep import scan_lockstep
 from msgflow.trace.ctf.types import BYTE
 from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -119,7 +120,7 @@ def without_absurd(
         return events
     packets = np.repeat(np.arange(events.counts.size), events.counts)
     good = (events.clock >= limits[packets, 0]) & (events.clock <= limits[packets, 1])
-    for place in np.unique(packets[~good]).tolist():
+    for place in distinct(packets[~good]).tolist():
         entry = entries[place]
         rows = np.flatnonzero((packets == place) & ~good)
         at = int(events.positions[rows[0]])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from msgflow.trace.ctf.event_body import EventBody, Kind
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -167,7 +168,7 @@ def _blocks(
     values: NDArray[Any],
 ) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64], Block]]:
     """Yield name, rows that have it, where it begins there, and block, of all chosen options."""
-    present = np.unique(values).tolist()
+    present = distinct(values).tolist()
     for choice, block in tail.options:
         choosing = [value for value in present if tail.block(value) is block]
         if not choosing:

@@ -14,6 +14,7 @@ import numpy as np
 from msgflow.trace.ctf.entries import PacketEvents
 from msgflow.trace.ctf.events import find_events, read_events, without_absurd
 from msgflow.trace.ctf.layout import GAP
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,7 +55,7 @@ def cut(
     if not (is_sound and begins.size and (ts_ns[1:] >= ts_ns[:-1]).all()):
         return None
     entry.events = None
-    first = np.unique(np.searchsorted(begins, np.arange(0, begins[-1] + 1, _PIECE)))
+    first = distinct(np.searchsorted(begins, np.arange(0, begins[-1] + 1, _PIECE)))
     pieces = []
     for at, end in pairwise([*first.tolist(), begins.size]):
         # Positions are laid out alike that differ by a multiple of it.
