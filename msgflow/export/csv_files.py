@@ -45,12 +45,13 @@ def export_csv(
 def _write(
     connection: duckdb.DuckDBPyConnection, selection: Selection, view: str, path: Path
 ) -> int:
-    import pyarrow
     import pyarrow.csv
+
+    from msgflow.numpy_arrow import empty_batch
 
     row_count = 0
     with selection.read(connection, view, selection.runs) as reader:
-        empty = csv_batch(pyarrow.RecordBatch.from_pylist([], schema=reader.schema))
+        empty = csv_batch(empty_batch(reader.schema))
         with pyarrow.csv.CSVWriter(path, empty.schema) as writer:
             for batch in reader:
                 writer.write_batch(csv_batch(batch))

@@ -125,18 +125,19 @@ def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
 
 
 def _write_csv(table: pa.Table, stream: IO[bytes]) -> None:
-    import pyarrow
     import pyarrow.csv
 
-    empty = pyarrow.RecordBatch.from_pylist([], schema=table.schema)
-    with pyarrow.csv.CSVWriter(stream, csv_batch(empty).schema) as writer:
+    from msgflow.numpy_arrow import empty_batch
+
+    with pyarrow.csv.CSVWriter(stream, csv_batch(empty_batch(table.schema)).schema) as writer:
         for batch in table.to_batches(max_chunksize=_ROWS_AT_ONCE):
             writer.write_batch(csv_batch(batch))
 
 
 def _csv_column(column: pa.Array) -> pa.Array:
-    import pyarrow
     import pyarrow.types as types
+
+    from msgflow.numpy_arrow import texts_to_arrow
 
     kind = column.type
     if (
@@ -148,7 +149,7 @@ def _csv_column(column: pa.Array) -> pa.Array:
         return column
     if types.is_decimal(kind) and kind.scale == 0:
         return column
-    return pyarrow.array(map(_csv_text, column.to_pylist()), "string")
+    return texts_to_arrow(list(map(_csv_text, column.to_pylist())))
 
 
 def _csv_text(value: object) -> str | None:

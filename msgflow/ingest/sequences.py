@@ -16,8 +16,8 @@ import pyarrow as pa
 from msgflow import kernel
 from msgflow.ingest.catalogue import Origin
 from msgflow.ingest.compiled_sequences import Latest, Numbers, OfTracepoint
+from msgflow.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
 from msgflow.trace import COMMON_SCHEMA
-from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     import ctypes
@@ -350,8 +350,7 @@ def _new_threads(
 ) -> pa.RecordBatch:
     fresh = np.flatnonzero(threads >= known)
     if not fresh.size:
-        nothing = [pa.nulls(0, field.type) for field in THREAD_SCHEMA]
-        return pa.RecordBatch.from_arrays(nothing, schema=THREAD_SCHEMA)
+        return empty_batch(THREAD_SCHEMA)
     found, first = np.unique(threads[fresh], return_index=True)
     rows = fresh[first]
     columns = [

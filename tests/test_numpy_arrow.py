@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from msgflow.sim import simulate
-from msgflow.trace.numpy_arrow import (
+from msgflow.numpy_arrow import (
     distinct,
+    empty_batch,
     integers_to_arrow,
     is_valid,
     text_lengths,
@@ -23,6 +23,7 @@ from msgflow.trace.numpy_arrow import (
     to_numpy,
     without,
 )
+from msgflow.sim import simulate
 
 TYPES = ["bool", "int8", "int32", "int64", "uint16", "uint64", "float32", "float64", ">u4", ">i8"]
 
@@ -116,14 +117,27 @@ def test_each_value_once() -> None:
     assert distinct(np.empty(0, np.int64)).size == 0
 
 
-def test_an_ingest_does_not_import_what_takes_long(tmp_path: Path) -> None:
+def test_a_batch_without_rows() -> None:
+    schema = pa.schema([("name", pa.string()), ("ids", pa.list_(pa.int64()))])
+    assert empty_batch(schema).equals(pa.RecordBatch.from_pylist([], schema=schema))
+
+
+def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) -> None:
     """pandas takes longer than reading a small trace."""
     pytest.importorskip("pandas")
     simulate("pipeline", tmp_path / "trace", factor=0.02)
     script = (
-        "import sys; from pathlib import Path; from msgflow.ingest import ingest\n"
-        "ingest([sys.argv[1]], Path(sys.argv[2]))\n"
-        "assert not {'pandas', 'pyarrow.compute', 'numpy.ma'} & set(sys.modules)"
+        "import sys; from msgflow.__main__ import main\n"
+        "try:\n"
+        "    main()\n"
+        "finally:\n"
+        "    assert not {'pandas', 'pyarrow.compute', 'numpy.ma'} & set(sys.modules)"
     )
-    command = [sys.executable, "-c", script, tmp_path / "trace", tmp_path / "run.duckdb"]
-    subprocess.run(command, check=True)
+    database = ["--db", tmp_path / "run.duckdb"]
+    for command in (
+        ["ingest", tmp_path / "trace"],
+        ["query", "e2e-latency"],
+        ["query", "flows", "--limit", "3", "--format", "csv"],
+        ["export", "csv", tmp_path / "tables"],
+    ):
+        subprocess.run([sys.executable, "-c", script, *command, *database], check=True)

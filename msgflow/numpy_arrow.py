@@ -63,6 +63,12 @@ def texts_to_arrow(texts: Sequence[str | None]) -> pa.Array:
     return pa.Array.from_buffers(pa.string(), len(texts), [valid, pa.py_buffer(offsets), content])
 
 
+def empty_batch(schema: pa.Schema) -> pa.RecordBatch:
+    """Return a batch without rows."""
+    nothing = [pa.nulls(0, field.type) for field in schema]
+    return pa.RecordBatch.from_arrays(nothing, schema=schema)
+
+
 def to_numpy(array: pa.Array) -> NDArray[Any]:
     """Return numbers or truth values; what is in the place of NULL means nothing."""
     _, content = array.buffers()
