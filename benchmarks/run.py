@@ -76,8 +76,8 @@ class Sample:
     peak_bytes: int = 0
 
 
-class Failed(Exception):
-    """A process that ended with an error: its command, and what it said."""
+class Failed(SystemExit):
+    """A process ended with an error: its command, and what it said. Ends the benchmark, too."""
 
 
 def run(*command: str) -> tuple[str, Sample]:
@@ -94,7 +94,8 @@ def run(*command: str) -> tuple[str, Sample]:
         output.seek(0)
         errors.seek(0)
         if os.waitstatus_to_exitcode(status):
-            raise Failed(f"{' '.join(command)}\n{errors.read()}")
+            raise Failed(f"failed: {' '.join(command)}\n{errors.read()}")
+        sys.stderr.write(errors.read())
         sample = Sample(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024)
         return output.read(), sample
 
@@ -153,6 +154,8 @@ def report(rounds: list[dict[str, Sample | None]], events: int) -> list[str]:
         if not taken:
             lines.append(f"| {name} | does not fit | | | | | |")
             continue
+        if len(taken) < len(rounds):
+            name += f" (fits in {len(taken)} of {len(rounds)})"
         samples = [sample for sample, _ in taken]
         walls = [sample.wall for sample in samples]
         wall = statistics.median(walls)
@@ -209,13 +212,6 @@ def main() -> None:
     parser.add_argument("--bt2", action="store_true", help="measure the bt2 reader, too")
     parser.add_argument("--markdown", type=Path, help="append the tables to this file")
     arguments = parser.parse_args()
-    try:
-        _measure_all(arguments)
-    except Failed as failed:
-        raise SystemExit(f"failed: {failed}") from None
-
-
-def _measure_all(arguments: argparse.Namespace) -> None:
     # Users have byte code: pip writes it, or the first call.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for packet_bytes in [0] if arguments.trace else arguments.packet_bytes:

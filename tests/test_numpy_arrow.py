@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -115,6 +114,12 @@ def test_values_left_out(
 def test_each_value_once() -> None:
     assert distinct(np.array([3, 1, 3, 2, 1])).tolist() == [1, 2, 3]
     assert distinct(np.empty(0, np.int64)).size == 0
+    script = (
+        "import sys, numpy; from msgflow.numpy_arrow import distinct\n"
+        "distinct(numpy.array([3, 1, 3]))\n"
+        "assert 'numpy.ma' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
 
 
 def test_a_batch_without_rows() -> None:
@@ -123,8 +128,7 @@ def test_a_batch_without_rows() -> None:
 
 
 def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) -> None:
-    """pandas takes longer than reading a small trace."""
-    pytest.importorskip("pandas")
+    """pandas, where it is installed, takes longer than reading a small trace."""
     simulate("pipeline", tmp_path / "trace", factor=0.02)
     script = (
         "import sys; from msgflow.__main__ import main\n"
