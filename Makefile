@@ -9,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := .demo
 HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()' 2>/dev/null
-HAS_CHROMIUM := PYTHONPATH=benchmarks $(BIN)/python -c 'from browser import find_browser; exit(not find_browser())'
+HAS_CHROMIUM := PYTHONPATH=tests/support $(BIN)/python -c 'from browser import find_browser; exit(not find_browser())'
 
 # Shell function: apt_install PACKAGE...; fails where apt is missing or not allowed.
 APT := apt_install() { \

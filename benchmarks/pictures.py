@@ -26,12 +26,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import SplitResult, urlsplit
 
-from browser import ARGUMENTS, find_browser
 from playwright.sync_api import sync_playwright
 
 from msgflow.database import open_db
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+from browser import ARGUMENTS, find_browser
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from clock_sync import judge
+from clock_bounds import judge
 from thorough import few
 
 from msgflow import open_db

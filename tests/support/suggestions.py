@@ -1,21 +1,14 @@
-"""How many of the declared indirect links does `msgflow links suggest` find without them?
+"""Indirect links that `msgflow links suggest` finds, compared with those that nodes declare.
 
-    python benchmarks/suggestions.py [SYSTEM…] [--factor 0.5] [--traces DIR]
-
-Simulates annotated systems, ingests them without what their nodes declare, and compares the query
-`link-suggestions` with that: for each node its links as (kind, input, output). Those of a candidate
-with a doubt count as doubtful beside being right or wrong. With `--traces` recordings are read as
-well whose nodes declare their links.
+`compare` ingests a trace twice: with the declarations of its nodes, and without them. A link is
+(kind, node, input, output). Links of a doubtful candidate are listed as doubtful too.
 """
 
 from __future__ import annotations
 
-import argparse
-import tempfile
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgflow import open_db
-from msgflow.sim import simulate
 from msgflow.sim.entity import (
     MILLISECOND,
     SECOND,
@@ -27,7 +20,9 @@ from msgflow.sim.entity import (
 )
 from msgflow.sim.system import Host, Node, Process, Scenario
 
-SYSTEMS = ("periodic_async", "partial_sync", "reentrant", "autoware", "merges")
+if TYPE_CHECKING:
+    from pathlib import Path
+
 _PERIODS = {"/a": 7, "/b": 11, "/c": 16, "/d": 23}
 Link = tuple[str, str, str, str]
 
@@ -126,33 +121,3 @@ def compare(trace: Path, directory: Path) -> dict[str, tuple[set[Link], set[Link
         node: (of(node, declared), of(node, suggested), of(node, doubtful))
         for node in sorted({link[1] for link in declared | suggested})
     }
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("systems", nargs="*", metavar="SYSTEM")
-    parser.add_argument("--factor", type=float, default=0.5, help="length of the recordings")
-    parser.add_argument("--traces", type=Path, action="append", default=[])
-    given = parser.parse_args()
-    print("| system | node | declared | right | wrong | in doubt |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for system in given.systems or SYSTEMS:
-        with tempfile.TemporaryDirectory() as directory:
-            scenario = merges() if system == "merges" else system
-            trace = simulate(scenario, Path(directory) / "trace", factor=given.factor)
-            show(system, trace.directory, Path(directory))
-    for path in given.traces:
-        with tempfile.TemporaryDirectory() as directory:
-            show(path.name, path, Path(directory))
-
-
-def show(name: str, trace: Path, directory: Path) -> None:
-    """Print the rows of a system."""
-    for node, (declared, suggested, doubtful) in compare(trace, directory).items():
-        counts = map(len, (declared, declared & suggested, suggested - declared, doubtful))
-        print(f"| {name} | {node} | {' | '.join(map(str, counts))} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,11 +1,10 @@
-"""Which corrections of a clock are possible, calculated from all messages by bisection.
+"""Corrections of a clock that its messages allow, computed by bisection.
 
-A correction is a line: offset and drift. Each message from the reference to the clock says that the
-line is not below a point, each one back that it is not above one, and clocks drift apart by 200 ppm
-at most. This is a linear programme with two variables. msgflow solves it in SQL with convex hulls;
-here it is solved again without them, so that neither can hide a mistake of the other: of all drifts
-those are possible for which the highest point below is not above the lowest point above, which is a
-concave function of the drift.
+A correction is a line with an offset and a drift. A message from the reference to the clock puts a
+point below the line. A message back puts a point above it. Clocks drift apart by at most 200 ppm.
+msgflow solves this linear programme in SQL with convex hulls. This module solves it again by other
+means, so that neither can hide a mistake of the other: a drift is possible if the highest point
+below does not exceed the lowest point above, and that room is a concave function of the drift.
 """
 
 from __future__ import annotations
