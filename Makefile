@@ -19,10 +19,11 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo test test-all bench truth fuzz sanitize mutants wheels babeltrace chromium compiler clean
+.PHONY: help demo quick test test-all bench truth fuzz sanitize mutants wheels babeltrace chromium compiler clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
+	@echo 'make quick   style, types, golden cases of schema, queries and pages: seconds'
 	@echo 'make test    style, types, import contracts, tests: minutes'
 	@echo 'make test-all the same with thorough tests: what others show on one input, on all of them'
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
@@ -46,6 +47,12 @@ demo: $(VENV)/.installed
 	@echo '  msgflow query interference                       which callbacks keep which waiting'
 	@echo '  msgflow flow --topic /camera/image               one message: its causes and effects'
 	@echo 'see it: $(BIN)/msgflow ui --db $(DEMO)/msgflow.duckdb'
+
+quick: $(VENV)/.developed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy --num-workers auto
+	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(wildcard tests/*/cases)
 
 test: SELECTED := -m 'not thorough'
 test test-all: $(VENV)/.developed babeltrace chromium
