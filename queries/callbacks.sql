@@ -25,8 +25,6 @@
 -- slowest: duration_ns
 -- brief: duration_ns, node, callback, start_ns, take_id, published, tid, callback_instance_id,
 --     process, host
--- needs: main.callback_instance, main.callback_label, main.link_causal, main.publication,
---     main.publisher, main.process, main.thread, main.host
 WITH instance AS (
     SELECT
         run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns,

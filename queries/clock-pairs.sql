@@ -15,7 +15,6 @@
 -- column: shortest_packet_ns BIGINT [ns]      Shortest delay of a packet, after correction
 -- brief: from_hosts, to_hosts, message_count, shortest_message_ns, packet_count,
 --     shortest_packet_ns
--- needs: main.clock_pair, main.host
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
     FROM main.host

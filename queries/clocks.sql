@@ -22,7 +22,6 @@
 --     recording; main.clock_uncertainty has the bound at any moment
 -- column: uuid VARCHAR                        UUID of the clock (LTTng: boot identity)
 -- brief: hosts, method, reference, offset_ns, uncertainty_ns, greatest_uncertainty_ns, drift_ppb
--- needs: main.clock, main.clock_uncertainty, main.host
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
     FROM main.host

@@ -54,8 +54,6 @@
 -- heading: rank, latency_ns, take_id, path
 -- brief: rank, at_ns, duration_ns, share, activity, node, what, is_certain, pieces, hop, part
 -- note: clocks
--- needs: main.end_to_end_part, main.critical_piece, main.flow_path, main.callback_instance,
---     main.callback_label, main.publication, main.publisher, main.node, main.process
 CREATE OR REPLACE TEMP TABLE critical_part AS
 WITH path AS (
     SELECT path_id

@@ -34,7 +34,6 @@
 -- brief: path, outputs, median_ns, p95_ns, max_ns, peak_max_ns, loss_affected, p99_ns,
 --     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks
--- needs: main.flow_path, main.end_to_end
 WITH output AS (
     SELECT
         path_id,

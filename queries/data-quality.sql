@@ -17,9 +17,6 @@
 -- column: is_internal BOOLEAN    ROS uses the topic for itself
 -- brief: scope, subject, measure, affected, total, affected_percent
 -- answer: affected
--- needs: main.trace, main.gap, main.process, main.host, main.callback_instance,
---     main.node, main.publisher, main.subscription, main.callback, main.take, main.stat_orphan,
---     main.stat_delivery, main.link_transport, main.link_causal, main.run
 WITH gap_edge AS (
     SELECT
         run_id, trace_id, start_ns, end_ns,

@@ -28,8 +28,6 @@
 -- brief: topic_name, subscriber, delivered, skipped, lost, delivered_percent, unknown,
 --     lost_percent, published, reasons, unconnected, orphans, orphan_reasons
 -- answer: delivered, lost, unknown
--- needs: main.stat_delivery, main.stat_orphan, main.publication, main.take, main.subscription,
---     main.node, main.process
 WITH outcome AS (
     SELECT d.subscription_id, d.status, d.reason, count(*) AS number
     FROM main.stat_delivery AS d

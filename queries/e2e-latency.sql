@@ -43,8 +43,6 @@
 -- brief: path, median_ns, p95_ns, max_ns, reached, roots, lost, superseded, p99_ns,
 --     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
 -- note: clocks
--- needs: main.flow_path, main.end_to_end, main.looped_arrival,
---     main.continued_subscription
 WITH flow AS (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, sink_event, latency_ns, status, reason,

@@ -22,8 +22,6 @@
 -- column: thread_id BIGINT          Identity of the thread
 -- brief: process, tid, callback_share, callback_ns, callbacks, host, execute_ns, wait_ns, seen_ns,
 --     executor_kind, pid, process_ns
--- needs: main.executor_thread, main.executor, main.executor_state, main.callback_instance,
---     main.thread, main.process, main.host
 WITH member AS (
     SELECT
         x.run_id, x.executor_id, x.thread_id, e.kind, t.tid, p.pid, p.name, h.hostname,

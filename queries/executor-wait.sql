@@ -32,7 +32,6 @@
 -- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, meanwhile, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 -- note: clocks
--- needs: main.executor_wait_explained, main.callback_label
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, wait_ns, busy_min_ns, busy_max_ns,

@@ -29,7 +29,6 @@
 -- slowest: latency_ns
 -- brief: path, root_ns, latency_ns, status, reason, take_id, sink_ns, root_kind, root_id
 -- note: clocks
--- needs: main.flow_path, main.end_to_end
 SELECT
     f.run_id,
     f.root_kind,

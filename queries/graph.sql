@@ -20,10 +20,6 @@
 -- column: is_internal BOOLEAN      ROS uses the topic or service for itself
 -- brief: kind, node, name, rate_hz, median_ns, p95_ns, count, indirect, executor
 -- note: clocks
--- needs: main.publication, main.publisher, main.take, main.link_transport, main.link_causal,
---     main.subscription, main.request, main.response, main.service, main.client,
---     main.callback_instance, main.callback_label, main.executor, main.executor_thread,
---     main.process, main.host, main.node
 WITH indirect AS (
     SELECT b.publisher_id, string_agg(DISTINCT l.kind, ', ' ORDER BY l.kind) AS kinds
     FROM main.link_causal AS l

@@ -19,9 +19,6 @@
 -- column: annotation_id BIGINT      Identity of the annotation
 -- brief: node, kind, inputs, outputs, publications, complete, links, median_wait_ns, max_wait_ns,
 --     ambiguous, source
--- needs: main.annotation, main.annotation_input, main.annotation_output, main.annotation_firing,
---     main.link_causal, main.publication, main.subscription, main.publisher, main.node,
---     main.process
 WITH input AS (
     SELECT
         i.annotation_id,

@@ -6,10 +6,6 @@
 -- column: run_id BIGINT      Run
 -- column: object VARCHAR     View that holds the rows
 -- column: row_count BIGINT   Rows
--- needs: main.run, main.host, main.process, main.thread, main.node, main.publisher,
---     main.subscription, main.timer, main.service, main.client, main.callback, main.executor,
---     main.publication, main.take, main.callback_instance, main.request, main.response,
---     main.link_transport, main.link_causal
 WITH object AS (
     SELECT
         unnest([

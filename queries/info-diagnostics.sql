@@ -10,7 +10,6 @@
 -- column: trace VARCHAR      Path of the trace, where it concerns one
 -- column: detail VARCHAR     Where, and what it means
 -- brief: severity, name, count, detail, trace
--- needs: main.diagnostic, main.trace
 SELECT
     diagnostic.run_id,
     diagnostic.severity,

@@ -8,7 +8,6 @@
 -- column: process_count BIGINT                Processes seen on it
 -- column: clock_method VARCHAR                How its clock was corrected; none: as recorded
 -- column: clock_uncertainty_ns BIGINT [ns]    Bound of the error of that correction
--- needs: main.host, main.clock, main.trace, main.process
 SELECT
     host.run_id,
     host.hostname,

@@ -15,8 +15,6 @@
 -- column: client_count BIGINT         Service clients
 -- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
 --     client_count, pid
--- needs: main.node, main.process, main.publisher, main.subscription, main.timer, main.service,
---     main.client
 SELECT
     node.run_id,
     node.full_name AS node,

@@ -13,7 +13,6 @@
 -- column: duration_ns BIGINT [ns]           From its first event to its last
 -- brief: process_name, pid, hostname, node_count, thread_count, duration_ns, tracetools_version,
 --     first_seen_ns
--- needs: main.process, main.host, main.node, main.thread
 SELECT
     process.run_id,
     host.hostname,

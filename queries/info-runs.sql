@@ -14,7 +14,6 @@
 -- column: labels VARCHAR[]               What users say of it (msgflow runs label), NULL: nothing
 -- brief: run_id, name, labels, start_ns, duration_ns, event_count, discarded_event_count,
 --     trace_count, end_ns, msgflow_version
--- needs: main.run, main.trace
 WITH run_trace AS (
     SELECT
         run_id,

@@ -12,7 +12,6 @@
 -- column: take_count BIGINT           Messages handed over to a subscription
 -- column: is_internal BOOLEAN         ROS uses it for itself
 -- brief: topic_name, publication_count, take_count, publisher_count, subscription_count
--- needs: main.publisher, main.subscription, main.publication, main.take
 WITH publisher_message AS (
     SELECT publisher_id, count(*) AS publication_count
     FROM main.publication

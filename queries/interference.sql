@@ -21,7 +21,6 @@
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, callback, meanwhile_callback, waits,
 --     overlap_max_ns, overlap_min_ns, instances
--- needs: main.callback_instance, main.executor_interference, main.callback_label
 WITH together AS (
     -- The messages of a burst wait for each other: pairs are far more than rows of the answer, and
     -- nothing may keep them all. So they are summed up before anything is joined to them.

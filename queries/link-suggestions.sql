@@ -19,8 +19,6 @@
 -- column: host VARCHAR [host]  Host of the node
 -- column: is_name_repeated BOOLEAN  Several nodes of the run have this name
 -- brief: kind, node, inputs, outputs, evidence, doubt
--- needs: main.node, main.process, main.host, main.timer, main.callback, main.callback_instance,
---     main.subscription, main.publication, main.publisher, main.link_causal
 WITH named_node AS (
     SELECT
         n.run_id, n.node_id, n.full_name, p.name AS process, p.pid, h.hostname AS host,

@@ -18,8 +18,6 @@
 -- column: is_inferred BOOLEAN       Its initialisation was not recorded
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: kind, name, node, process, pid, host, queue_depth, created_ns, symbols
--- needs: main.publisher, main.subscription, main.timer, main.service, main.client, main.callback,
---     main.node, main.process, main.host
 WITH object AS (
     SELECT
         run_id, process_id, node_id, 'publisher' AS kind, topic_name AS name, queue_depth,

@@ -43,9 +43,6 @@
 -- brief: path, hop, part, node, median_ns, share, max_ns, p95_ns, what, mean_ns, total_ns, flows,
 --     overlaps
 -- note: clocks
--- needs: main.end_to_end_flow, main.end_to_end_trail, main.end_to_end_piece_explained,
---     main.executor_wait, main.flow_path, main.callback_instance, main.callback_label,
---     main.publisher, main.node, main.process
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns

@@ -17,7 +17,6 @@
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, publisher, rate_hz, period_median_ns, period_deviation_ns, period_max_ns,
 --     count, period_p95_ns, period_min_ns
--- needs: main.publication, main.publisher, main.node, main.process
 WITH published AS (
     SELECT
         run_id,

@@ -35,7 +35,6 @@
 -- brief: path, inputs, median_ns, p95_ns, max_ns, unanswered, event_mean_ns, p99_ns,
 --     loss_affected, intervals, mean_ns, min_ns
 -- note: clocks
--- needs: main.flow_path, main.end_to_end
 WITH input AS (
     SELECT
         path_id,

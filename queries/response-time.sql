@@ -32,7 +32,6 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, response, count, median_ns, p95_ns, max_ns, p99_ns, mean_ns, min_ns
 -- note: clocks
--- needs: main.flow_path, main.end_to_end
 WITH input AS (
     SELECT
         path_id,

@@ -36,8 +36,6 @@
 --     requests, answered, server, not_taken, not_answered, not_received, callback_median_ns,
 --     wait_median_ns, request_median_ns, response_median_ns, reply_median_ns
 -- note: clocks
--- needs: main.request, main.response, main.callback_instance, main.service, main.client,
---     main.node, main.process
 WITH single_service AS (
     SELECT run_id, service_name, min(service_id) AS service_id
     FROM main.service

@@ -40,8 +40,6 @@
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, jitter_p99_ns, meanwhile,
 --     lateness_median_ns, busy_share, rate_hz, bunched
--- needs: main.callback, main.timer, main.callback_instance, main.callback_label,
---     main.executor_thread, main.thread_break, main.executor_wait_explained
 WITH asked AS (
     SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns
     FROM main.callback AS c

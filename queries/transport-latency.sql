@@ -26,8 +26,6 @@
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, busy_mean_min_ns, busy_mean_max_ns,
 --     takes, linked, negative, ambiguous, mean_ns, p99_ns, min_ns
 -- note: clocks
--- needs: main.take, main.link_transport, main.callback_instance, main.executor_wait,
---     main.subscription, main.node, main.process
 WITH received AS (
     SELECT
         t.run_id, t.subscription_id, t.take_id, l.candidate_count, l.latency_ns,

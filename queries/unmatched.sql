@@ -24,8 +24,6 @@
 -- column: subscription_id BIGINT  Identity of the subscription
 -- column: is_internal BOOLEAN     ROS uses the topic for itself
 -- brief: at_ns, topic_name, side, status, reason, subscriber, publisher, publication_id, take_id
--- needs: main.stat_delivery, main.stat_orphan, main.publication, main.publisher, main.take,
---     main.subscription, main.node, main.process
 WITH missing AS (
     SELECT
         d.run_id, b.start_ns AS at_ns, 'publication' AS side, d.publisher_id, d.status, d.reason,

@@ -30,7 +30,6 @@
 -- brief: start_ns, node, callback, wait_ns, busy_max_ns, meanwhile, busy_min_ns, since,
 --     rest_max_ns, rest_min_ns, callback_instance_id
 -- note: clocks
--- needs: main.executor_wait_explained, main.callback_label
 WITH waited AS MATERIALIZED (
     SELECT
         run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,

@@ -97,7 +97,6 @@ def _object(name: str, description: str, headers: Sequence[Header]) -> Header:
         kind="view",
         params=(),
         columns=(),
-        needs=_statements().sources(short_name(header) for header in headers),
         severity=None,
         cause=None,
         cure=None,
@@ -114,4 +113,4 @@ def short_name(header: Header) -> str:
 
 @cache
 def _statements() -> Statements:
-    return Statements("diagnostic", resource_directory("schema") / "health" / "diagnostic")
+    return Statements(resource_directory("schema") / "health" / "diagnostic")

@@ -34,7 +34,6 @@ def _view(table: tables.Table) -> Header:
         f"\n{kind} {relation} AS {alias} ON {condition}"
         for kind, relation, alias, condition in joins
     )
-    is_corrected = {"derive.corrected_ns"} if joins else set()
     return Header(
         name=f"main.{table.name}",
         title=f"main.{table.name}",
@@ -43,9 +42,6 @@ def _view(table: tables.Table) -> Header:
         kind="view",
         params=(),
         columns=tuple(_described(column) for column in columns),
-        needs=tuple(
-            sorted({table.full_name, *is_corrected, *(relation for _, relation, _, _ in joins)})
-        ),
         severity=None,
         cause=None,
         cure=None,

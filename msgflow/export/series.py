@@ -74,7 +74,6 @@ def read_series(
         title=f"{what} over time",
         params=(),
         columns=tuple(columns),
-        needs=(),
     )
     notes = clock_notes(connection, [run]) if what is not What.CALLBACKS else []
     return QueryResult(_side_by_side(table, subjects), header, (run,), notes)

@@ -32,7 +32,7 @@ from msgflow.query.catalogue import query_names
 from msgflow.query.result import QueryResult
 from msgflow.query.run import bind, first_line, without_counts
 from msgflow.query.selection import CUT_COLUMN, INTERNAL_COLUMN, make_selection, selected
-from msgflow.sql.header import Column
+from msgflow.sql.header import Column, relations_of
 from msgflow.sql.interrupt import interruptible
 from msgflow.sql.statement import Statements
 
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
 GROUP = "label_group"
 WORST = "worst"
 DEFAULT_LIMIT = 10
-_LAYER = "fleet"
-_OF_LAKE = "lake."
-_MADE = ("run", "run_group")
 # What looks at tables without naming them.
 _LISTS = re.compile(
     r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
@@ -60,7 +57,7 @@ _BUCKETS = "distributed"
 @cache
 def statements() -> Statements:
     """Return what a lake is asked for."""
-    return Statements(_LAYER, Path(__file__).parent / "sql")
+    return Statements(Path(__file__).parent / "sql")
 
 
 @cache
@@ -149,7 +146,7 @@ def fleet_query(
     if cut:
         notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
     is_each_alone = len(choice.runs) == 1 or "run" in group_by
-    if f"{_LAYER}.{_BUCKETS}" in header.needs and not is_each_alone:
+    if _BUCKETS in header.relations and not is_each_alone:
         notes.append("medians and other quantiles of several runs are off by less than 1 %")
     return QueryResult(table, grouped, notes=notes)
 
@@ -244,9 +241,8 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 def _tables(header: Header) -> list[str]:
     """Return the tables of the lake that a statement reads."""
-    sources = statements().sources([header.name.partition(".")[2]])
-    found = [name.removeprefix(_OF_LAKE) for name in sources]
-    return [name for name in found if name not in _MADE]
+    read = relations_of(statements().text(header.name.partition(".")[2]))
+    return sorted(read & {answer.table for answer in answers()})
 
 
 def _require_tables(reading: Reading, header: Header) -> None:

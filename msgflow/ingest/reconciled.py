@@ -130,7 +130,7 @@ def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:
 @cache
 def statements() -> Statements:
     """Return what is asked about what traces tell twice."""
-    return Statements("reconcile", resource_directory("schema") / "reconcile")
+    return Statements(resource_directory("schema") / "reconcile")
 
 
 def _events() -> str:

@@ -13,7 +13,7 @@
     -- answer: lost
     -- heading: rank, latency_ns
     -- note: clocks
-    -- needs: flow_path, stat_end_to_end
+    -- after: staging.taken_apart
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 `note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ,
@@ -27,7 +27,8 @@ names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choos
 public view over the table of its name, a column may be named alone: it is what the table declares.
 What is in `schema/health` has a `severity`; findings and diagnostics the `phase` of an ingest that
 they come from, a `cause` and a `cure`, in place of which a diagnostic may name the `finding` that
-has them.
+has them. An object is made after all objects that its statement names; `after` adds one that it
+does not name.
 
 What a statement looks up stays in memory until it ends. A query may therefore go in steps: before
 its own statement stand others, each of the form `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
@@ -37,6 +38,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from msgflow.sql.value import Value, is_integer, parse_literal
@@ -56,11 +58,14 @@ _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<descrip
 _STEP = re.compile(
     r"(?:--[^\n]*\n)*CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+", re.DOTALL
 )
+_COMMENT = re.compile(r"--[^\n]*")
+_OBJECT = re.compile(r"\b(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
+_RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "phase",
-    "finding", "note", "needs", "brief", "answer", "heading", "slowest",
+    "finding", "note", "after", "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks", "gate")
@@ -139,7 +144,6 @@ class Header:
             same, but never made a table) or 'macro' (the body is the whole statement).
         params: parameters in the order of the file.
         columns: output columns in the order of the file.
-        needs: names of the objects that the body reads.
         severity: of a check, finding or diagnostic, else None.
         cause: where a finding comes from, else None.
         cure: what to do about a finding, else None.
@@ -154,6 +158,7 @@ class Header:
         phase: of a finding or diagnostic, one of `PHASES`, else None.
         finding: of a diagnostic, the finding that has its cause and cure, else None.
         steps: what a query makes before, in order.
+        after: objects that come before this one although its statements do not name them.
     """
 
     name: str
@@ -163,7 +168,6 @@ class Header:
     kind: str
     params: tuple[Param, ...]
     columns: tuple[Column, ...]
-    needs: tuple[str, ...]
     severity: str | None
     cause: str | None
     cure: str | None
@@ -177,6 +181,21 @@ class Header:
     phase: str | None = None
     finding: str | None = None
     steps: tuple[Step, ...] = ()
+    after: tuple[str, ...] = ()
+
+    @cached_property
+    def needs(self) -> tuple[str, ...]:
+        """The objects and tables that come before this one, as `schema.name`, sorted.
+
+        A name in a string counts, since a table may be given to a macro by name.
+        """
+        named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
+        return tuple(sorted({*named, *self.after} - {self.name}))
+
+    @cached_property
+    def relations(self) -> frozenset[str]:
+        """The names without a schema that the statements read from; see `relations_of`."""
+        return frozenset().union(*map(relations_of, self.statements))
 
     @property
     def statements(self) -> tuple[str, ...]:
@@ -248,7 +267,6 @@ def parse(text: str, path: Path) -> Header:
         kind=kind,
         params=params,
         columns=columns,
-        needs=_names(single.get("needs", "")),
         severity=single.get("severity"),
         cause=single.get("cause"),
         cure=single.get("cure"),
@@ -262,6 +280,7 @@ def parse(text: str, path: Path) -> Header:
         phase=phase,
         finding=single.get("finding"),
         steps=steps,
+        after=_names(single.get("after", "")),
     )
 
 
@@ -272,6 +291,11 @@ def read(path: Path) -> Header:
         HeaderError: says which line is wrong, and how.
     """
     return parse(path.read_text(encoding="utf-8"), path)
+
+
+def relations_of(text: str) -> frozenset[str]:
+    """Return the names without a schema that SQL reads from: tables, other statements, CTEs."""
+    return frozenset(_RELATION.findall(_code(text)))
 
 
 def _split(text: str, path: Path) -> tuple[list[_Field], str]:
@@ -310,6 +334,10 @@ def _steps(body: str) -> tuple[tuple[Step, ...], str]:
         steps.append(Step(match["table"], match[0].rstrip()))
         body = body[match.end() :]
     return tuple(steps), body
+
+
+def _code(text: str) -> str:
+    return _COMMENT.sub("", text)
 
 
 def _names(text: str) -> tuple[str, ...]:

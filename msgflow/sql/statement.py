@@ -22,12 +22,10 @@ class Statements:
     """The statements of a folder and those below it.
 
     Attributes:
-        layer: what stands before their names in headers. A statement has those that it names as
-            `layer.NAME` in `needs` in front of it, as NAME.
-        directory: the folder.
+        directory: the folder. A statement that reads from another of kind 'inline', by its file
+            name, has that one in front.
     """
 
-    layer: str
     directory: Path
 
     def names(self) -> tuple[str, ...]:
@@ -51,13 +49,6 @@ class Statements:
         needed = (part for name in names for part in _parts(self, self.header(name)))
         return tuple(f"{part} AS (\n{self.header(part).body}\n)" for part in dict.fromkeys(needed))
 
-    def sources(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Return what these statements and their parts read that is not among the others."""
-        headers = [self.header(name) for name in names]
-        parts = {part for header in headers for part in _parts(self, header)}
-        needs = {need for h in (*headers, *map(self.header, parts)) for need in h.needs}
-        return tuple(sorted(need for need in needs if need.partition(".")[0] != self.layer))
-
     def run(
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
     ) -> duckdb.DuckDBPyRelation:
@@ -79,7 +70,7 @@ class Statements:
 @cache
 def program() -> Statements:
     """Return what the program asks for itself: rows that become files, pictures or sentences."""
-    return Statements("program", resource_directory("schema") / "program")
+    return Statements(resource_directory("schema") / "program")
 
 
 @cache
@@ -106,8 +97,8 @@ def _text(statements: Statements, name: str) -> str:
 def _parts(statements: Statements, header: Header) -> list[str]:
     # Each after those that it needs.
     names: list[str] = []
-    for need in header.needs:
-        layer, _, name = need.partition(".")
-        if layer == statements.layer:
-            names += [*_parts(statements, statements.header(name)), name]
+    for name in sorted(header.relations & _paths(statements).keys()):
+        part = statements.header(name)
+        if part.kind == "inline" and part is not header:
+            names += [*_parts(statements, part), name]
     return list(dict.fromkeys(names))

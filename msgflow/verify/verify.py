@@ -60,7 +60,7 @@ _COLUMNS = (
 _HEADER = Header(
     name="verify", title="Requirements", description="Whether a run meets its requirements.",
     grain="one row per requirement and thing that it is of", kind="view", params=(),
-    columns=_COLUMNS, needs=(), severity=None, cause=None, cure=None, note=None, body="",
+    columns=_COLUMNS, severity=None, cause=None, cure=None, note=None, body="",
     path=Path(),
     brief=("verdict", "subject", "metric", "condition", "measured", "reason", "worst_ns", "see",
            "worst_at_ns", "target"),

@@ -2,7 +2,7 @@
 
 They lie in `msgflow/view/sql`, not in `queries/`, because their rows mean nothing without the page:
 bins as wide as a pixel, keys of rows, times that count from the begin of the run. Headers are those
-of named queries. A file of kind 'inline' is put in front of each that names it as `view.NAME`.
+of named queries. A file of kind 'inline' is put in front of each that reads from its name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 DIRECTORY = Path(__file__).parent / "sql"
-_PAGES = Statements("view", DIRECTORY)
+_PAGES = Statements(DIRECTORY)
 
 page_query = _PAGES.header
 statement = _PAGES.text

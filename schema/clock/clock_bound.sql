@@ -6,7 +6,6 @@
 --     what at most. The difference is `-sense * bound_ns`: in both directions the largest
 --     `bound_ns` tells most.
 -- grain: one row per pair of clocks and message or packet between them
--- needs: derive.clock_way
 CREATE OR REPLACE MACRO derive.clock_bound(only_run) AS TABLE
 SELECT
     greatest(from_clock_id, to_clock_id) AS clock_id,

@@ -2,7 +2,6 @@
 -- description: Whether times of two processes can be compared: they have one clock, or one of the
 --     two clocks was brought to the other's time.
 -- grain: one row per ordered pair of processes of a run
--- needs: store.process, store.host, store.clock
 WITH timed AS (
     SELECT p.run_id, p.process_id, c.clock_id, c.method
     FROM store.process AS p

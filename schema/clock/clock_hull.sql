@@ -7,7 +7,6 @@
 --     what does not lie above the line through its neighbours. Times count from `base_ns`, and
 --     differences from `base_bound_ns`, which keeps them exact as DOUBLE.
 -- grain: one row per pair of clocks, direction and corner
--- needs: derive.clock_bound, derive.clock_drift_limit
 CREATE OR REPLACE MACRO derive.clock_hull(only_run) AS TABLE
 WITH RECURSIVE bound AS MATERIALIZED (
     SELECT clock_id, other_clock_id, is_packet, sense, at_ns, bound_ns

@@ -7,7 +7,6 @@
 --     hulls as derive.clock_hull gives them, `edges` that of one with what lies between these and
 --     beyond them.
 -- grain: one row per pair of clocks with a hull on both sides
--- needs: derive.clock_drift_limit
 CREATE OR REPLACE MACRO derive.clock_line(corners, edges) AS TABLE
 -- The hulls are nearest at a corner of one of them.
 WITH distance AS (

@@ -14,8 +14,6 @@
 --     bounded by the fastest message or packet of each stretch. Without any in one of the
 --     directions, all is NULL.
 -- grain: one row per pair of clocks with messages or packets between them
--- needs: derive.clock_hull, derive.clock_drift_limit, derive.clock_line, derive.clock_bound,
---     derive.clock_line_error, store.host, store.trace
 CREATE OR REPLACE MACRO derive.clock_pair(only_run) AS TABLE
 WITH corner AS MATERIALIZED (
     SELECT

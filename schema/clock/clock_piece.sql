@@ -4,7 +4,6 @@
 --     `from_ns` until the next row. Outside the moments for which a bound is known, it grows as
 --     fast as a clock can drift away from its correction.
 -- grain: one row per clock and line
--- needs: store.clock_uncertainty, store.clock, derive.clock_drift_limit
 WITH bound AS (
     SELECT
         u.run_id, u.clock_id, u.at_ns, u.uncertainty_ns,

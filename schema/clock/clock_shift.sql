@@ -3,7 +3,6 @@
 --     which a message sent then is received: the shortest way of any message in ten seconds.
 --     Holds from `from_ns` of the sender's clock until the next row.
 -- grain: one row per pair of clocks that exchange messages, and ten seconds
--- needs: store.link_transport, store.publication, store.take, store.process, store.host
 WITH way AS (
     SELECT
         l.run_id,

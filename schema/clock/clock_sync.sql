@@ -6,8 +6,6 @@
 --     smallest sum of greatest uncertainties; the errors of its steps add up. `bounds` holds the
 --     error at some moments; between them it is at most a straight line.
 -- grain: one row per clock
--- needs: store.clock, derive.clock_pair, derive.corrected_ns, derive.recorded_ns,
---     derive.clock_drift_limit
 CREATE OR REPLACE MACRO derive.clock_sync(only_run) AS TABLE
 WITH RECURSIVE pair AS MATERIALIZED (
     SELECT

@@ -8,9 +8,6 @@
 --     the end of the service callback on the thread that sent it, else the begin of that
 --     callback, or the take of the request.
 -- grain: one row per message or packet between two clocks
--- needs: store.link_transport, store.publication, store.take, store.request, store.response,
---     store.link_request, store.callback_instance, store.thread, store.host,
---     store.link_packet, store.trace, derive.process_clock
 WITH trace_clock AS (
     SELECT t.trace_id, h.clock_id
     FROM store.trace AS t

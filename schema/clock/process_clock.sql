@@ -1,7 +1,6 @@
 -- name: derive.process_clock
 -- description: The clock of each process, and how its times are corrected.
 -- grain: one row per process
--- needs: store.process, store.host, store.clock
 SELECT p.process_id, c.clock_id, c.offset_ns, c.drift_ppb, c.reference_ns
 FROM store.process AS p
 JOIN store.host AS h ON p.host_id = h.host_id

@@ -5,7 +5,6 @@
 --     the shifted stamp says when the events of the publication were at the earliest and at the
 --     latest. Holds from the stamp `from_ns` on.
 -- grain: one row per host and ten seconds
--- needs: store.link_transport, store.publication, store.take, store.process
 WITH difference AS (
     SELECT
         l.run_id,

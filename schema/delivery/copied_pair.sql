@@ -3,7 +3,6 @@
 --     Each is one subscription with the reader of the buffer, but nothing in the trace joins the
 --     two. So it is not known what the placeholder should have taken.
 -- grain: one row per publisher and placeholder of a subscription
--- needs: store.link_transport, store.subscription
 SELECT DISTINCT l.run_id, l.publisher_id, l.subscription_id
 FROM store.link_transport AS l
 JOIN store.subscription AS s ON l.subscription_id = s.subscription_id

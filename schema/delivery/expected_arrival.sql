@@ -4,8 +4,6 @@
 --     where messages tell how far the two are apart, else by the correction of both clocks (NULL:
 --     nothing tells).
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
--- needs: store.publication, store.publisher, store.subscription, store.clock,
---     derive.process_clock, derive.clock_shift, derive.corrected_ns, derive.recorded_ns
 WITH audience AS (
     SELECT DISTINCT s.run_id, s.topic_name, c.clock_id
     FROM store.subscription AS s

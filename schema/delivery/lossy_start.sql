@@ -2,7 +2,6 @@
 -- description: Processes of which events may have been lost while they were created: a gap other
 --     than a pause lies before the first callback instance, or before the process was seen at all.
 -- grain: one row per process
--- needs: derive.process_presence, derive.recording, store.callback_instance, store.gap
 WITH loss AS (
     SELECT r.recording_id, min(l.start_ns) AS start_ns
     FROM store.gap AS l

@@ -10,10 +10,6 @@
 --     senders had ended says nothing where a publisher whose topic is not known published at that
 --     moment.
 -- grain: one row per take whose publication is not known
--- needs: store.take, store.link_transport, derive.unlinked_take, store.subscription,
---     store.publisher, store.node, store.publication, store.process, store.trace,
---     derive.stamp_shift, derive.process_gap, derive.process_presence, derive.take_candidate,
---     store.nearest_message, derive.delivery_limit
 CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT

@@ -6,8 +6,6 @@
 --     to stop and to go on. So for a process, a pause lasts from its last event before the pause
 --     to its first one after it.
 -- grain: one row per process and gap
--- needs: derive.process_presence, derive.recording, store.gap, store.publication,
---     store.take, store.callback_instance, store.executor_state, store.thread
 CREATE OR REPLACE MACRO derive.process_gap(only_run) AS TABLE
 WITH presence AS MATERIALIZED (
     SELECT run_id, process_id, recording_id, begin_ns, end_ns, first_ns, last_ns, is_born

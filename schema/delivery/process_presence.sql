@@ -5,8 +5,6 @@
 --     one process after the other that it begins. A process whose first events may have been lost
 --     counts from the begin of the recording.
 -- grain: one row per process and recording (the chunks of one trace) that it did something in
--- needs: derive.recording, store.trace, store.process, store.publication, store.take,
---     store.callback_instance, store.node, store.publisher, store.subscription, store.gap
 WITH recording AS (
     SELECT
         r.run_id,

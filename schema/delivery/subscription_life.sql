@@ -5,7 +5,6 @@
 --     as the one for what comes through the middleware, and nobody can tell what it should have
 --     got.
 -- grain: one row per subscription with a handle
--- needs: store.subscription, store.process, store.host, store.thread, derive.subscription_reader
 WITH host_end AS (
     SELECT host_id, max(last_seen_ns) AS end_ns
     FROM store.process

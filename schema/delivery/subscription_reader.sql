@@ -2,7 +2,6 @@
 -- description: Threads that take for a subscription: those that did, and those of the same
 --     executor. If a subscription never took anything: every executor thread of its process.
 -- grain: one row per subscription and thread
--- needs: store.take, store.subscription, store.executor_thread, store.thread
 WITH taking AS (
     SELECT DISTINCT run_id, subscription_id, thread_id
     FROM store.take

@@ -10,9 +10,6 @@
 --     identified. Nor are messages said to be overwritten where the subscription took none of the
 --     publisher, and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
--- needs: derive.expected_arrival, derive.subscription_life, derive.process_gap, store.publisher,
---     derive.copied_pair, store.link_transport, store.take, derive.vain_take, store.executor_state,
---     derive.delivery_limit, derive.stretch
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT

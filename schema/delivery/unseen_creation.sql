@@ -4,8 +4,6 @@
 --     lost. Objects of ROS itself do not count: /rosout is published on handles never
 --     initialised.
 -- grain: one row per such process
--- needs: store.node, store.publisher, store.subscription, store.timer, store.service,
---     store.client, store.callback, derive.lossy_start
 WITH object AS (
     SELECT process_id, 'nodes' AS kind, is_inferred FROM store.node
     UNION ALL

@@ -3,7 +3,6 @@
 --     attempt says nothing if a callback takes by hand, only to look whether there is a message;
 --     nor behind a callback that was never seen to end, as the attempt may be inside of it.
 -- grain: one row per attempt outside of callbacks
--- needs: store.failed_take, store.callback_instance, derive.stretch
 WITH tried AS (
     SELECT DISTINCT thread_id, derive.stretch(failed_ns) AS stretch FROM store.failed_take
 ),

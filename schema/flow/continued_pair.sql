@@ -2,8 +2,6 @@
 -- description: Subscriptions and publishers that flows go on through, whatever the message: the
 --     pairs of derive.flow_continuation, which are much cheaper to find than its rows.
 -- grain: one row per subscription and publisher that a message of it led to
--- needs: store.link_causal, store.publisher, store.callback_instance, store.take,
---     derive.flow_caller
 WITH pair AS (
     SELECT DISTINCT run_id, subscription_id, publisher_id
     FROM store.link_causal

@@ -3,8 +3,6 @@
 -- description: Publications that the callbacks of services led to. Each has the callback instance
 --     on whose request they ran, and the message that this instance was for, if any.
 -- grain: one row per publication, callback instance that called for it, and way it did so
--- needs: derive.flow_caller, store.link_request, store.callback_instance, store.take,
---     store.link_causal
 
 -- What a join looks up stays in memory until the query ends, and how often services were called is
 -- hard to guess. So only callback instances that called, and publications of services, are looked

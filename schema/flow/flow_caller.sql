@@ -4,7 +4,6 @@
 --     client that the caller used (the negative process where the node is not known, 0 where
 --     nothing is), then the services in order (0: not known), each of them once.
 -- grain: one row per instance of a service callback, callback instance that called it, and route
--- needs: store.callback_instance, store.link_request, store.request, store.client
 WITH RECURSIVE called AS (
     SELECT
         i.run_id, i.callback_instance_id, l.callback_instance_id AS caller_id, q.client_id,

@@ -2,7 +2,6 @@
 -- description: Causes of publications, each once, however many annotations declare it.
 -- grain: one row per callback instance, or take outside of any, publication that it led to, and
 --     kind of link
--- needs: store.link_causal
 SELECT
     run_id, callback_instance_id, take_id, publication_id, kind, candidate_count,
     is_loss_affected

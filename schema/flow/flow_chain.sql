@@ -6,7 +6,6 @@
 --     there. A name or glob that fits a topic stands for topics. One that fits none stands for
 --     nodes: a node is often called like the topic that it publishes.
 -- grain: one row per run and chain
--- needs: store.flow_hop, store.publisher, store.subscription, store.node
 CREATE OR REPLACE MACRO derive.flow_chain(
     runs, from_topic, to_topic, max_depth := 32, max_paths := 1000
 ) AS TABLE

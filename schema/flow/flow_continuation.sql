@@ -3,7 +3,6 @@
 --     that the callback of this take led to. It may have led to them by calling services: then
 --     the route to the publication is given (derive.flow_caller), else an empty one.
 -- grain: one row per take, publication that it led to, and way it did so
--- needs: store.link_causal, store.publisher, store.flow_call
 SELECT
     l.run_id, l.take_id, l.subscription_id, l.publication_id, l.publisher_id, l.kind,
     []::BIGINT[] AS route

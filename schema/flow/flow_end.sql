@@ -3,7 +3,6 @@
 --     that a subscription of their topic did not take, and takes whose publication is not known.
 -- grain: one row per publication and subscription of its topic that did not take it, and one per
 --     take without a publication
--- needs: store.undelivered, store.orphan_take
 SELECT run_id, 'publication' AS kind, publication_id AS id, subscription_id, reason
 FROM store.undelivered
 UNION ALL

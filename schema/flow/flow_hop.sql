@@ -5,7 +5,6 @@
 --     (derive.flow_caller) or directly. A step is cached where the message may wait in the node for
 --     others (an indirect link).
 -- grain: one row per run, subscription before (NULL: source), route, publisher and subscription
--- needs: derive.flow_transport, derive.flow_continuation, store.flow_root
 CREATE OR REPLACE MACRO derive.flow_hop(only_run) AS TABLE
 WITH carried AS (
     SELECT DISTINCT publisher_id, subscription_id

@@ -4,8 +4,6 @@
 --     callback instance to request or response. Where no service callback was traced, a request
 --     leads to its response. Self loops are left out: flows do not pass through them.
 -- grain: one row per cause, effect and kind of link
--- needs: store.link_transport, derive.flow_cause, store.callback_instance, store.link_request,
---     store.link_response, store.response
 SELECT
     run_id,
     'publication' AS from_kind, publication_id AS from_id,

@@ -1,7 +1,6 @@
 -- name: derive.flow_link_reversed
 -- description: All links, from effect to cause.
 -- grain: one row per link
--- needs: derive.flow_link
 SELECT
     run_id, to_kind AS from_kind, to_id AS from_id, from_kind AS to_kind, from_id AS to_id,
     link_kind

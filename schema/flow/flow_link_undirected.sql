@@ -1,7 +1,6 @@
 -- name: derive.flow_link_undirected
 -- description: All links in both directions.
 -- grain: two rows per link
--- needs: derive.flow_link, derive.flow_link_reversed
 SELECT run_id, from_kind, from_id, to_kind, to_id, link_kind
 FROM derive.flow_link
 UNION ALL

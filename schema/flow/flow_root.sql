@@ -6,8 +6,6 @@
 --     message led to it. The route (derive.flow_caller) starts at the instance that called; if
 --     none did, it is empty.
 -- grain: one row per publication on a topic of the application
--- needs: store.publication, store.publisher, store.link_causal, store.flow_call,
---     derive.flow_caller
 CREATE OR REPLACE MACRO derive.flow_root(only_run) AS TABLE
 WITH called AS (
     SELECT run_id, publication_id, publisher_id, caller_id, take_id, route

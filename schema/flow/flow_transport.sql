@@ -2,7 +2,6 @@
 -- description: Messages handed over on the topics of the application, with both objects. ROS's own
 --     topics, self loops and copies that no callback gets are no part of a path.
 -- grain: one row per take whose publication is known
--- needs: store.link_transport, store.publisher, store.subscription
 SELECT l.run_id, l.publication_id, l.publisher_id, l.take_id, l.subscription_id
 FROM store.link_transport AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id

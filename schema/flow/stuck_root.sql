@@ -11,8 +11,6 @@
 -- param: reached VARCHAR  Name of rows of path_id, root_key, take_id: how far roots came
 -- param: arrived VARCHAR  Name of rows of path_id, take_id: takes at which paths ended
 -- param: runs BIGINT[]  Runs that they are of
--- needs: derive.flow_transport, derive.flow_continuation, store.publication, store.take,
---     store.undelivered
 CREATE OR REPLACE MACRO derive.stuck_root(
     missing, lineages, prefixes, reached, arrived, runs
 ) AS TABLE

@@ -11,7 +11,6 @@
 -- column: input_count BIGINT  Inputs of the annotation
 -- column: linked_count BIGINT  Inputs with a message
 -- column: is_complete BOOLEAN  Every input has a message
--- needs: derive.annotation_firing
 SELECT
     run_id,
     annotation_id,

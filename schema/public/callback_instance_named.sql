@@ -15,7 +15,6 @@
 -- column: callback_id BIGINT  Callback that ran
 -- column: take_id BIGINT  Message it was called with
 -- column: is_internal BOOLEAN  Infrastructure of ROS
--- needs: main.callback_instance, main.callback_label, store.process, store.thread, store.host
 SELECT
     i.callback_instance_id,
     i.run_id,

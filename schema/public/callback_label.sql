@@ -8,8 +8,6 @@
 -- column: node VARCHAR  Full name of the node, or the name and pid of the process in brackets
 -- column: label VARCHAR  What triggers it
 -- column: is_internal BOOLEAN  Infrastructure of ROS
--- needs: store.callback, store.node, store.process, store.timer, store.subscription,
---     store.service, derive.node_label
 SELECT
     c.callback_id,
     c.run_id,

@@ -11,7 +11,6 @@
 -- column: packet_count BIGINT  Network packets that kernel traces saw on both ends
 -- column: shortest_message_ns BIGINT [ns]  Shortest delay of a message, after correction
 -- column: shortest_packet_ns BIGINT [ns]  Shortest delay of a packet, after correction
--- needs: derive.clock_way, store.clock, derive.corrected_ns
 WITH way AS (
     SELECT
         w.run_id, w.from_clock_id, w.to_clock_id, w.is_packet,

@@ -57,10 +57,6 @@
 -- column: b_loss_affected BIGINT  The same for run B
 -- column: is_cut BOOLEAN  Paths were left out beyond max_depth or max_paths
 -- column: subject VARCHAR  Path, callback, or topic and receiving node
--- needs: derive.known_word, main.run, main.flow_path, main.end_to_end, main.callback_instance,
---     main.callback_label, main.take, main.link_transport, main.subscription, main.process,
---     main.node, derive.node_label, derive.dominance, derive.block_length,
---     derive.bootstrap_interval
 CREATE OR REPLACE MACRO main.comparison(
     what, run_a, run_b, from_topic := NULL, to_topic := NULL, wanted_case := 'first',
     skip_ns := 0, confidence := 0.95, resamples := 1000, seed := 0, internal := false,

@@ -5,7 +5,6 @@
 -- grain: one row per such subscription
 -- param: runs BIGINT[]  Runs to look at
 -- column: subscription_id BIGINT  The subscription
--- needs: derive.continued_pair
 CREATE OR REPLACE MACRO main.continued_subscription(runs) AS TABLE
 SELECT DISTINCT subscription_id
 FROM derive.continued_pair

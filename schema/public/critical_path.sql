@@ -48,7 +48,6 @@
 --     false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- needs: main.end_to_end_part, main.critical_piece
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,

@@ -27,11 +27,6 @@
 --     false: it may have arrived during this piece. NULL for others
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- needs: derive.flow_piece, derive.callback_ready,
---     derive.executor_meanwhile, main.callback_instance, main.publication, main.take,
---     derive.executor_busy, derive.executor_size, derive.callback_exclusion, derive.process_clock,
---     derive.corrected_ns, store.callback_instance, store.executor_thread, store.thread,
---     store.link_transport, store.link_causal
 CREATE OR REPLACE MACRO main.critical_piece(parts, runs) AS TABLE
 -- Here positions go on from flow to flow.
 WITH part AS MATERIALIZED (

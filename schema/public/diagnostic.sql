@@ -7,7 +7,6 @@
 -- column: severity
 -- column: count
 -- column: detail
--- needs: store.diagnostic, derive.link_diagnostic
 SELECT run_id, trace_id, name, severity, count, detail
 FROM store.diagnostic
 UNION ALL

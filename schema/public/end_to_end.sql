@@ -38,9 +38,6 @@
 -- column: is_newest BOOLEAN  Newest root of the arrival
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
--- needs: derive.known_word, derive.flow_chain, store.flow_root, derive.flow_transport,
---     derive.flow_continuation, derive.stuck_root, main.publication, main.callback_instance,
---     main.take, main.gap
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,

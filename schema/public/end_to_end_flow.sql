@@ -36,7 +36,6 @@
 -- column: sink_event VARCHAR  Event that ended the flow, as in main.end_to_end
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- needs: derive.known_word, main.end_to_end
 CREATE OR REPLACE MACRO main.end_to_end_flow(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,

@@ -51,7 +51,6 @@
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
--- needs: main.end_to_end_flow, main.end_to_end_trail, main.end_to_end_piece
 CREATE OR REPLACE MACRO main.end_to_end_part(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL,

@@ -28,7 +28,6 @@
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
 -- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
 -- column: publication_id BIGINT  Message that is published or under way
--- needs: main.end_to_end_piece_explained, main.callback_instance
 CREATE OR REPLACE MACRO main.end_to_end_piece(flows, trail, runs) AS TABLE
 WITH every_callback_instance AS NOT MATERIALIZED (
     SELECT

@@ -39,8 +39,6 @@
 --     other callbacks, at least
 -- column: busy_max_ns BIGINT [ns]  At most
 -- column: is_turning BOOLEAN  The hop leads through a cache or a service: a part may occur twice
--- needs: main.publication, main.take, main.request, store.flow_call, store.callback_instance,
---     store.link_causal, store.link_request
 CREATE OR REPLACE MACRO main.end_to_end_piece_explained(flows, trail, callbacks, runs) AS TABLE
 WITH RECURSIVE flow AS NOT MATERIALIZED (
     SELECT

@@ -17,8 +17,6 @@
 -- column: publication_id BIGINT  The message
 -- column: previous_take_id BIGINT  Take of the message before it; NULL: none
 -- column: next_take_id BIGINT  Take of the message after it; NULL: none
--- needs: derive.flow_chain, derive.flow_transport, store.link_causal, store.flow_call,
---     store.flow_root
 CREATE OR REPLACE MACRO main.end_to_end_trail(
     flows, runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000
 ) AS TABLE

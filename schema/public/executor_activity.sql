@@ -15,9 +15,6 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; NULL: not known (the last, or a gap follows)
 -- column: callback_instance_id BIGINT  Innermost callback that ran
--- needs: store.executor_state, store.callback_instance, store.callback, store.take,
---     store.thread_break, store.executor_thread, store.executor, store.thread,
---     derive.corrected_ns, derive.process_clock
 WITH instance AS (
     SELECT
         i.run_id, i.thread_id, i.callback_instance_id, i.parent_id, i.start_ns, i.end_ns,

@@ -12,7 +12,6 @@
 -- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
 --     is unknown)
 -- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
--- needs: derive.executor_size, derive.callback_ready, derive.executor_meanwhile
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
 ),

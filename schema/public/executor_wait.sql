@@ -25,7 +25,6 @@
 --     callback ran that never runs beside this one
 -- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on; NULL: not known
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
--- needs: derive.executor_size, derive.callback_ready, derive.executor_waits
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
 ),

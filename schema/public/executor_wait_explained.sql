@@ -28,8 +28,6 @@
 --     NULL: none
 -- column: meanwhile_ns BIGINT[] [ns]  How long each of them did, from earliest_ns on (from
 --     latest_ns if that is unknown); those on several threads may lie side by side
--- needs: derive.executor_size, derive.callback_ready, derive.executor_waits,
---     derive.executor_meanwhile
 CREATE OR REPLACE MACRO main.executor_wait_explained(runs) AS TABLE
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns

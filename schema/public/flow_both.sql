@@ -11,7 +11,6 @@
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- column: id BIGINT  Identity of the vertex
--- needs: main.flow_forward, main.flow_backward
 CREATE OR REPLACE MACRO main.flow_both(start_kind, start_id, max_depth := NULL) AS TABLE
 SELECT kind, id
 FROM main.flow_forward(start_kind, start_id, max_depth := max_depth)

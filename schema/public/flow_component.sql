@@ -10,7 +10,6 @@
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or
 --     'response'
 -- column: id BIGINT  Identity of the vertex
--- needs: derive.graph_reachable, derive.flow_link_undirected
 CREATE OR REPLACE MACRO main.flow_component(start_kind, start_id, max_depth := NULL) AS TABLE
 SELECT kind, id
 FROM derive.graph_reachable(

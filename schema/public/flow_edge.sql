@@ -13,8 +13,6 @@
 --     of the callback instance
 -- column: to_ns BIGINT [epoch ns]  Take, start of the callback instance or publication, or sending
 --     of the request or response
--- needs: main.link_transport, derive.flow_cause, main.publication, main.take,
---     main.callback_instance, main.link_request, main.link_response, main.request, main.response
 SELECT
     l.run_id,
     'publication' AS from_kind,

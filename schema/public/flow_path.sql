@@ -30,8 +30,6 @@
 -- column: is_cached BOOLEAN  The last step may wait in its node for other messages
 -- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
 -- column: is_cut BOOLEAN  The chain goes on, or has siblings, beyond the limits
--- needs: derive.flow_chain, derive.node_label, store.publisher, store.subscription, store.node,
---     store.process, store.service
 CREATE OR REPLACE MACRO main.flow_path(
     runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000,
     only_paths := false

@@ -41,11 +41,6 @@
 -- column: reason VARCHAR  Why it is missing, as far as known
 -- column: cut_count BIGINT  Links that lead on from here beyond the limits
 -- column: internal_count BIGINT  Effects on ROS's own topics and services that are left out
--- needs: derive.vertex_key, derive.flow_link, derive.vertex_kind, derive.flow_cause,
---     derive.node_label, derive.flow_end, main.flow_vertex, store.publication, store.take,
---     store.callback_instance, store.request, store.response, store.link_causal, store.publisher,
---     store.link_request, store.client, store.link_transport, store.thread, store.process,
---     store.host, store.subscription, store.node
 CREATE OR REPLACE MACRO main.flow_step(
     start_kind, start_id, direction := 'both', max_depth := 96, max_vertices := 1000,
     internal := false

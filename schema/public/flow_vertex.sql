@@ -22,10 +22,6 @@
 -- column: symbol VARCHAR  Function of the callback
 -- column: missing VARCHAR  What the trace does not show here, as in main.flow_step
 -- column: reason VARCHAR  Why it is missing, as far as known
--- needs: derive.node_label, derive.flow_end, main.publication, main.take, main.callback_instance,
---     main.callback_label, main.request, main.response, store.process, store.publisher, store.node,
---     store.subscription, store.callback_instance, store.link_causal, store.link_transport,
---     store.callback, store.thread, store.client, store.service, store.response
 CREATE OR REPLACE MACRO main.flow_vertex(vertices) AS TABLE
 SELECT
     v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,

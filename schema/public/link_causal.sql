@@ -11,7 +11,6 @@
 --     direct links
 -- column: candidate_count
 -- column: is_loss_affected
--- needs: store.link_causal, main.callback_instance, main.publication, main.take
 SELECT
     l.run_id,
     l.callback_instance_id,

@@ -15,7 +15,6 @@
 -- column: destination_port
 -- column: identification
 -- column: sequence_number
--- needs: store.link_packet, store.trace, store.host, store.clock, derive.corrected_ns
 WITH trace_clock AS (
     SELECT t.trace_id, c.offset_ns, c.drift_ppb, c.reference_ns
     FROM store.trace AS t

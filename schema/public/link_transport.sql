@@ -11,7 +11,6 @@
 -- column: is_loss_affected
 -- column: is_copy
 -- column: latency_ns BIGINT [ns]  From the end of the publication to the take
--- needs: store.link_transport, main.publication, main.take
 SELECT
     l.run_id,
     l.publication_id,

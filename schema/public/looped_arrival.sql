@@ -8,8 +8,6 @@
 -- param: arrivals BIGINT[][]  Arrivals of main.end_to_end: each pair of path_id and take_id once
 -- column: path_id BIGINT  Path, as main.end_to_end numbers it
 -- column: take_id BIGINT  Take at the end of the path
--- needs: derive.flow_transport, derive.flow_continuation, derive.continued_pair,
---     store.take
 CREATE OR REPLACE MACRO main.looped_arrival(runs, arrivals) AS TABLE
 WITH RECURSIVE arrival AS MATERIALIZED (
     SELECT arrival[1] AS path_id, arrival[2] AS take_id

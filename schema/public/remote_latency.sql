@@ -10,8 +10,6 @@
 -- column: latency_ns BIGINT [ns]  From the end of the publication to the take
 -- column: uncertainty_ns BIGINT [ns]  Bound of the error of the latency; NULL: not known, as the
 --     clocks were not brought together
--- needs: store.link_transport, store.publication, store.take, store.process, store.host,
---     store.clock, derive.clock_piece, derive.corrected_ns
 WITH place AS (
     SELECT
         p.process_id, h.host_id, h.clock_id, c.offset_ns, c.drift_ppb, c.reference_ns,

@@ -10,7 +10,6 @@
 -- column: end_ns BIGINT [epoch ns]  Last event of any trace but kernel traces
 -- column: event_count
 -- column: labels
--- needs: store.run, store.trace, main.trace
 WITH extent AS (
     SELECT
         t.run_id,

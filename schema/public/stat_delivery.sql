@@ -15,7 +15,6 @@
 -- column: reason VARCHAR  Why it was not taken: 'before_subscription', 'subscription_ended',
 --     'receiver_gap', 'take_failed', 'before_discovery', 'not_delivered', 'overwritten',
 --     'lost_in_transport', 'pending_at_end' or 'unknown', the first that holds; NULL: delivered
--- needs: store.link_transport, store.undelivered, derive.delivery_status
 SELECT
     run_id,
     publication_id,

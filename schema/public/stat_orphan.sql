@@ -7,6 +7,5 @@
 -- column: reason VARCHAR  'no_stamp', 'receiver_gap' (the event with the stamp was lost),
 --     'before_tracing', 'publisher_gap', 'publisher_trace_ends', 'publisher_not_traced',
 --     'ambiguous' or 'unknown', the first that holds
--- needs: store.orphan_take
 SELECT run_id, take_id, subscription_id, reason
 FROM store.orphan_take

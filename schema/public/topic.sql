@@ -11,8 +11,6 @@
 -- column: subscription_count BIGINT  Subscriptions
 -- column: publication_count BIGINT  Messages published
 -- column: take_count BIGINT  Messages handed over to a subscription
--- needs: store.publisher, store.subscription, store.publication, store.take, store.node,
---     store.process, derive.node_label
 WITH published AS (
     SELECT publisher_id, count(*) AS number FROM store.publication GROUP BY publisher_id
 ),

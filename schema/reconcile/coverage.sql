@@ -1,7 +1,7 @@
 -- name: reconcile.coverage
+-- kind: inline
 -- description: From when to when a session recorded on each CPU.
 -- grain: one row per session and CPU
--- needs: reconcile.session_trace, staging.source
 SELECT
     s.host,
     s.session,

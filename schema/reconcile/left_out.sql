@@ -1,9 +1,9 @@
 -- name: reconcile.left_out
+-- kind: inline
 -- description: Of the sessions that recorded a tracepoint on a thread that with most events of the
 --     thread is used, and of the others what it does not have. `thread_event` are the events of
 --     threads.
 -- grain: one row per event that is left out
--- needs: reconcile.session_trace, reconcile.told_namespace, reconcile.overlap
 WITH thread AS (
     SELECT
         r.thread_index,

@@ -1,7 +1,6 @@
 -- name: reconcile.left_out_between
 -- description: How much was left out of one trace since another one holds it as well.
 -- grain: one row per such pair of traces
--- needs: reconcile.left_out
 SELECT
     trace_index,
     used_index,

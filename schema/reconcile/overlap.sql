@@ -1,8 +1,8 @@
 -- name: reconcile.overlap
+-- kind: inline
 -- description: When a session recorded what another one recorded, too.
 -- grain: one row per pair of sessions and CPU
 -- param: slack_ns BIGINT  By how much the two records of one event may be apart
--- needs: reconcile.coverage
 SELECT
     a.session AS left_session,
     b.session AS used_session,

@@ -1,8 +1,8 @@
 -- name: reconcile.session_trace
+-- kind: inline
 -- description: Which host each trace is of, and which session of that host. A session is all traces
 --     of one uuid.
 -- grain: one row per trace
--- needs: staging.source
 SELECT
     trace_index,
     dense_rank() OVER (ORDER BY clock_key, hostname) AS host,

@@ -1,7 +1,7 @@
 -- name: reconcile.told_namespace
+-- kind: inline
 -- description: Processes whose PID namespace only some traces tell, and always the same one.
 -- grain: one row per process
--- needs: reconcile.session_trace
 SELECT s.host, r.vpid, any_value(r.pid_ns) AS pid_ns
 FROM raw.thread AS r
 JOIN session_trace AS s ON r.trace_index = s.trace_index

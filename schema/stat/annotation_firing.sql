@@ -4,8 +4,6 @@
 --     instance was called with. Where all inputs have to come together (partial_sync), only
 --     publications from the callback of an input are listed.
 -- grain: one row per annotation and publication that it applies to
--- needs: store.annotation, store.annotation_input, store.annotation_output, store.publication,
---     store.link_causal, store.callback_instance, store.callback
 WITH input AS (
     SELECT annotation_id, count(*) AS input_count
     FROM store.annotation_input

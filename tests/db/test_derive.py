@@ -1,4 +1,4 @@
-"""What is stored of links follows from what the objects say that they need."""
+"""What is stored of links follows from what the objects read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from msgflow.sql.header import parse
 
 
 def header(name: str, *needs: str) -> objects.Header:
-    text = f"-- name: {name}\n-- description: A rule.\n-- needs: {', '.join(needs)}\nSELECT 1\n"
+    text = f"-- name: {name}\n-- description: A rule.\nFROM {', '.join(needs)}\n"
     return parse(text, Path("rule.sql"))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -66,11 +65,6 @@ def test_columns_are_those_of_the_output(
     ).fetchall()
     declared = TABLES[view.name.removeprefix("main.")].declared
     assert dict(comments).items() <= {column.name: column.comment for column in declared}.items()
-
-
-@pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.name)
-def test_needs_are_what_the_body_refers_to(view: objects.Header) -> None:
-    assert set(view.needs) == set(re.findall(r"\b(?:store|derive|main)\.\w+", view.body))
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.name)

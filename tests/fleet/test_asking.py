@@ -33,17 +33,12 @@ def rows(table: pa.Table, columns: list[str]) -> list[tuple[object, ...]]:
 
 
 def test_headers_are_those_of_the_statements(night: Lake) -> None:
-    """And what they need is what they read."""
     with Reading(choose(night)) as reading:
         con = reading.connection
         con.execute("CREATE TABLE run_group AS SELECT run, 1::BIGINT AS label_group FROM run")
         for name in statements().names():
             header = statements().header(name)
-            read = set(re.findall(r"(?:FROM|JOIN) ([a-z_0-9]+)", header.body))
-            needs = {need.partition(".")[2] for need in header.needs}
-            assert needs == read & (needs | {"run", "run_group"}), name
-            assert needs <= read
-            if header.kind == "inline":
+            if not header.columns:
                 continue
             relation = statements().run(con, name, {"path": "x", "count": 1})
             described = list(zip(relation.columns, map(str, relation.types), strict=True))

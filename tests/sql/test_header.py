@@ -28,7 +28,7 @@ FULL = """\
 -- column: size DECIMAL(18,3)  Size
 -- column: start_ns BIGINT [epoch ns]
 --     When
--- needs: main.a,
+-- after: main.a,
 --     main.b
 -- answer: median_ns
 -- heading: start_ns, median_ns
@@ -66,12 +66,27 @@ def test_everything_is_parsed() -> None:
         Column("size", "DECIMAL(18,3)", None, "Size"),
         Column("start_ns", "BIGINT", "epoch ns", "When"),
     )
-    assert header.needs == ("main.a", "main.b")
+    assert header.after == ("main.a", "main.b")
     assert header.severity == "warning"
     assert header.brief == ("start_ns", "median_ns")
     assert header.answer == ("median_ns",)
     assert header.heading == ("start_ns", "median_ns")
     assert header.body == "SELECT 1\n-- a comment of the body\n"
+
+
+def test_an_object_needs_what_its_statements_name() -> None:
+    header = parse_with(
+        "-- after: staging.d\nCREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
+        "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
+        "JOIN query_table('raw.a') USING (id)"
+    )
+    assert header.needs == ("derive.f", "main.b", "raw.a", "staging.d", "store.c")
+    assert header.relations == {"e"}
+
+
+def test_an_object_does_not_need_itself() -> None:
+    text = "-- name: main.a\n-- description: x\nCREATE MACRO main.a() AS TABLE FROM main.b\n"
+    assert parse(text, PATH).needs == ("main.b",)
 
 
 def test_an_integer_may_have_a_minimum() -> None:

@@ -16,6 +16,7 @@ from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.database import Database
 from msgflow.db import objects
+from msgflow.ingest.calls import TAKEN_APART
 from msgflow.query.run import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.statement import program
@@ -33,13 +34,11 @@ TABLES = {
     "parts": "main.end_to_end_part([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
-PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
+PROGRAM = [file for file in FILES if file.layer == "program"]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 LAYER_OF |= {
     header.name: layer for layer in ("model", "stat", "public") for header in objects.load(layer)
 }
-# Of statements, which have those that they need in front of them by their bare names.
-PARTS = ("program.", "reconcile.", "diagnostic.")
 
 
 @pytest.fixture(scope="module")
@@ -71,11 +70,6 @@ def defined(connection: duckdb.DuckDBPyConnection) -> set[str]:
     }
 
 
-def is_defined_in_sql(name: str) -> bool:
-    """Tell staged events, whose tables ingest makes, from everything else."""
-    return name in LAYER_OF or name.startswith(("store.", "derive.", "main."))
-
-
 def described(relation: duckdb.DuckDBPyRelation) -> list[tuple[str, str]]:
     return [(name, str(kind)) for name, kind in zip(relation.columns, relation.types, strict=True)]
 
@@ -95,11 +89,10 @@ def test_the_name_is_the_place(file: SqlFile) -> None:
 
 
 @each(FILES)
-def test_needs_are_what_the_body_refers_to(file: SqlFile) -> None:
-    needs = [
-        name for name in file.header.needs if is_defined_in_sql(name) and not name.startswith(PARTS)
-    ]
-    assert sorted(needs) == sorted(filter(is_defined_in_sql, file.references))
+def test_what_reads_calls_apart_comes_after_they_are_taken_apart(file: SqlFile) -> None:
+    is_changed = re.search(r"\b(?:raw\.whole_[a-z_]+|[a-z0-9_]+_apart)\b", file.header.body)
+    is_model = file.layer == "model" and file.header.name != TAKEN_APART
+    assert (TAKEN_APART in file.header.after) == bool(is_model and is_changed)
 
 
 @each(FILES)

@@ -47,7 +47,7 @@ def test_what_is_stored_of_a_phase_has_a_parameter(header: Header) -> None:
     """Of what was read and built there is one run; of the others, it has to be named."""
     if header.phase in ("reading", "model"):
         assert not header.params
-        assert all(need.startswith(("staging.", "diagnostic.")) for need in header.needs)
+        assert all(need.startswith("staging.") for need in header.needs)
     elif header.phase in ("clocks", "database"):
         assert header.params
     elif not header.params:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from msgflow.db import objects
-from msgflow.ingest.calls import TAKEN_APART
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
 
@@ -31,10 +29,6 @@ SCHEMAS = {
     "diagnostic": "diagnostic",
     "program": "program",
 }
-_REFERENCE = re.compile(r"\b(?:staging|store|derive|main)\.[a-z_0-9]+\b")
-# What is read, but differs once calls were taken apart.
-_TAKEN_APART = re.compile(r"\b(?:raw\.whole_[a-z_]+|[a-z0-9_]+_apart)\b")
-_COMMENT = re.compile(r"--[^\n]*")
 
 
 @dataclass(frozen=True)
@@ -56,10 +50,8 @@ class SqlFile:
 
     @property
     def references(self) -> set[str]:
-        """Every object that the body names, or has to come after, but for itself."""
-        text = _COMMENT.sub("", "\n".join(self.header.statements))
-        after = {TAKEN_APART} if _TAKEN_APART.search(text) else set()
-        return ({*_REFERENCE.findall(text)} | after) - {self.header.name}
+        """Every object that comes before this one, but for the tables of events."""
+        return {name for name in self.header.needs if not name.startswith("raw.")}
 
 
 def sql_paths() -> list[tuple[str, Path]]:

@@ -22,7 +22,6 @@
 -- column: symbol VARCHAR            Functions registered for it
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, median_ns, max_ns, p95_ns, runs, count, period_median_ns, p99_ns, mean_ns
--- needs: lake.callback_duration, lake.run_group, fleet.distributed
 WITH merged AS (
     SELECT
         g.label_group,

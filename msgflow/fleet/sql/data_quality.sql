@@ -14,7 +14,6 @@
 -- column: is_internal BOOLEAN    ROS uses the topic for itself
 -- brief: scope, topic, measure, runs, affected, total, affected_percent
 -- answer: affected
--- needs: lake.data_quality, lake.run_group
 SELECT
     g.label_group,
     q.scope,

@@ -23,7 +23,6 @@
 -- brief: topic_name, subscriber, delivered, skipped, lost, delivered_percent, runs, lossy_runs,
 --     unknown, lost_percent, published, reasons, unconnected, orphans, orphan_reasons
 -- answer: delivered, lost, unknown
--- needs: lake.delivery, lake.run_group, fleet.reason_count
 WITH merged AS (
     SELECT
         g.label_group,

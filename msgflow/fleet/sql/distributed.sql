@@ -4,7 +4,6 @@
 --     quantile. What stands for a bucket is off by less than 1 % of any time in it.
 -- grain: one row per group of runs, measure, node and subject
 -- kind: inline
--- needs: lake.distribution, lake.run_group
 WITH summed AS (
     SELECT g.label_group, d.measure, d.node, d.subject, d.bucket, sum(d.count) AS number
     FROM distribution AS d

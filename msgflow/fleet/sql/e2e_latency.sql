@@ -28,7 +28,6 @@
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, lost, superseded, p99_ns,
 --     cut_by_recording, lost_reasons, mean_ns, min_ns, loss_affected, pairs
--- needs: lake.flow, lake.e2e_latency, lake.run_group
 WITH arrival AS MATERIALIZED (
     SELECT
         g.label_group, f.run, f.path, f.path_id, f.root_kind, f.root_id, f.latency_ns,

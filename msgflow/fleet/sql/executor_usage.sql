@@ -19,7 +19,6 @@
 -- column: callback_share_max DOUBLE [share] The same of the busiest thread of any run
 -- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, callbacks, host,
 --     execute_ns, wait_ns, seen_ns, executor_kind, process_ns
--- needs: lake.executor_usage, lake.run_group
 SELECT
     g.label_group,
     u.host,

@@ -23,7 +23,6 @@
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, runs, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
--- needs: lake.executor_wait, lake.run_group, fleet.distributed
 WITH merged AS (
     SELECT
         g.label_group,

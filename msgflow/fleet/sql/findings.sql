@@ -16,7 +16,6 @@
 -- column: cause VARCHAR       Where it comes from, as a rule
 -- column: cure VARCHAR        What to do about it
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
--- needs: lake.finding, lake.run_group
 SELECT
     g.label_group,
     f.severity,

@@ -10,7 +10,6 @@
 -- column: worst_run VARCHAR   Run with most of it
 -- column: detail VARCHAR      There: where, and what it means
 -- brief: severity, name, runs, count, worst_run, detail
--- needs: lake.info_diagnostics, lake.run_group
 SELECT
     g.label_group,
     d.severity,

@@ -9,7 +9,6 @@
 -- column: median_ns BIGINT [ns]      Median latency of the run
 -- column: usual_ns BIGINT [ns]       Median of the medians of all runs
 -- column: change_percent DOUBLE [%]  Difference of the two
--- needs: fleet.page_point
 WITH middle AS (
     SELECT path, quantile_cont(median_ns, 0.5) AS usual, count(median_ns) AS runs
     FROM page_point

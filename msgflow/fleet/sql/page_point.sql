@@ -1,5 +1,6 @@
 -- name: fleet.page_point
 -- title: Latencies of every path, run by run
+-- kind: inline
 -- description: Quantiles of the first arrivals of each run, and how many flows began and were lost.
 -- grain: one row per path and run
 -- column: path VARCHAR [path]     Nodes and topics
@@ -10,7 +11,6 @@
 -- column: roots BIGINT            Flows that began
 -- column: reached BIGINT          Flows that reached the end of the path
 -- column: lost BIGINT             Flows that were lost
--- needs: lake.flow, lake.run
 SELECT
     f.path,
     f.run,

@@ -10,7 +10,6 @@
 -- column: event_count BIGINT  Events read
 -- column: source VARCHAR      What it was read from
 -- column: has_database BOOLEAN  The lake has its database
--- needs: lake.run
 SELECT
     run,
     name,

@@ -9,7 +9,6 @@
 -- column: at_ns BIGINT [ns]       Start of the root, since the start of the run
 -- column: root_kind VARCHAR       'callback_instance' or 'publication'
 -- column: root_id BIGINT          Identity of the root in the database of the run
--- needs: lake.flow, lake.run
 SELECT
     f.path,
     f.run,

@@ -17,7 +17,6 @@
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, publisher, rate_hz, period_median_least_ns, period_median_most_ns,
 --     period_max_ns, runs, count, period_min_ns
--- needs: lake.publication_rate, lake.run_group
 SELECT
     g.label_group,
     p.topic_name,

@@ -3,7 +3,6 @@
 -- description: Adds up what stands in the column reasons of delivery as 'reason 3, other 2'.
 -- grain: one row per group of runs, topic, receiving node and column
 -- kind: inline
--- needs: lake.delivery, lake.run_group
 WITH told AS (
     SELECT g.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
     FROM delivery AS d

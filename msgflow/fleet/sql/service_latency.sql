@@ -21,7 +21,6 @@
 -- column: is_internal BOOLEAN         ROS uses the service for itself
 -- brief: service_name, client, round_trip_median_most_ns, round_trip_p99_most_ns,
 --     round_trip_max_ns, runs, requests, answered, server, not_taken, not_answered, not_received
--- needs: lake.service_latency, lake.run_group
 SELECT
     g.label_group,
     s.service_name,

@@ -22,7 +22,6 @@
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: node, callback, count, missed, lateness_p99_most_ns, lateness_max_ns, jitter_p99_most_ns,
 --     runs, lateness_median_most_ns, bunched
--- needs: lake.timers, lake.run_group
 SELECT
     g.label_group,
     t.node,

@@ -20,7 +20,6 @@
 -- column: is_internal BOOLEAN       ROS uses the topic for itself
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, runs, takes, linked, negative,
 --     ambiguous, mean_ns, p99_ns, min_ns
--- needs: lake.transport_latency, lake.run_group, fleet.distributed
 WITH merged AS (
     SELECT
         g.label_group,

@@ -16,7 +16,6 @@
 -- column: root_id BIGINT      Identity of the root in the database of the run
 -- column: has_database BOOLEAN  The lake has the database of the run
 -- brief: latency_ns, name, labels, run, root_ns, source
--- needs: lake.flow, lake.run
 WITH fitting AS (
     SELECT run, path, root_kind, root_id, root_ns, latency_ns
     FROM flow

@@ -15,8 +15,6 @@
 -- column: recorded_end_ns BIGINT  End; the begin where the end was not seen
 -- column: flags UTINYINT  1: lost events may hide a part; 2: the end was not seen; 4: called with
 --     an intra-process message; 8: nested in another callback instance
--- needs: store.callback_instance, store.callback, store.publication, store.take,
---     store.executor_state, store.thread
 SELECT
     i.run_id,
     i.process_id,

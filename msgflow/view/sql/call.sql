@@ -10,7 +10,6 @@
 -- column: start_ns BIGINT [epoch ns]  Sending; taking where that is all there is
 -- column: end_ns BIGINT [epoch ns]  Taking; sending where that is all there is
 -- column: flags UTINYINT  2: one of the two was not seen
--- needs: main.request, main.response, main.thread
 SELECT
     q.run_id,
     coalesce(8 * q.client_id + 3, 8 * q.service_id + 2, 8 * t.process_id + 7) AS row_key,

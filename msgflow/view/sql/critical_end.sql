@@ -9,8 +9,6 @@
 -- column: from_topic VARCHAR  Topic of the first message
 -- column: to_topic VARCHAR  Topic of the last take
 -- column: take_id BIGINT  That take
--- needs: main.flow_forward, main.flow_backward, main.publication, main.publisher, main.take,
---     main.subscription, main.callback_instance
 WITH reached AS MATERIALIZED (
     SELECT kind, id, true AS is_effect FROM main.flow_forward($kind, $id)
     UNION ALL

@@ -13,7 +13,6 @@
 -- column: from_kind UTINYINT  Cause
 -- column: from_id BIGINT  Its identity
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
--- needs: view.segment, derive.flow_link
 WITH held AS (
     SELECT kind, id FROM segment WHERE kind < 5
 ),

@@ -9,8 +9,6 @@
 -- column: executor_id BIGINT  The executor
 -- column: executor_kind VARCHAR  Its kind
 -- column: threads BIGINT  Threads that it has
--- needs: main.callback_instance, main.callback_label, main.executor_thread, main.executor,
---     main.process, main.host
 WITH ran AS (
     SELECT DISTINCT callback_id, thread_id FROM main.callback_instance WHERE run_id = $run
 ),

@@ -13,7 +13,6 @@
 -- column: length BIGINT [ns]  Length of the piece
 -- column: state VARCHAR  'wait', 'process', 'execute', or 'callback'
 -- column: busy BIGINT [ns]  Time of the piece in the state
--- needs: main.executor_state, main.executor_thread, main.callback_instance
 WITH extent AS (
     SELECT ($end_ns - $start_ns) // $bins + 1 AS width
 ),

@@ -21,8 +21,6 @@
 -- column: from_id BIGINT  Its identity
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
 -- column: vertex_count BIGINT  Vertices of the whole flow
--- needs: view.bar, view.call, main.flow_forward, main.flow_backward, derive.flow_link,
---     derive.process_clock, derive.corrected_ns
 WITH code AS (
     SELECT unnest(
         ['callback_instance', 'publication', 'take', 'request', 'response']

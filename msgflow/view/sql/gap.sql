@@ -11,7 +11,6 @@
 -- column: length BIGINT [ns]  Length
 -- column: event_count BIGINT  Events lost, where the tracer counted them
 -- column: total BIGINT  Gaps of the run
--- needs: main.gap, main.trace, main.host
 WITH longest AS (
     SELECT
         h.hostname AS host, g.kind, g.start_ns, g.end_ns, g.event_count,

@@ -18,8 +18,6 @@
 -- column: from_at BIGINT [ns since origin]  Begin
 -- column: to_at BIGINT [ns since origin]  End
 -- column: is_loss_affected BOOLEAN  Lost events may hide a better partner
--- needs: store.link_transport, store.link_causal, store.publication, store.take,
---     store.callback_instance, store.callback, derive.process_clock, derive.corrected_ns
 
 -- Identities follow time on the clocks as recorded. What overlaps the window is found by them, and
 -- joined with times afterwards: joined first, all that was before it would be held in memory.

@@ -12,7 +12,6 @@
 -- column: id BIGINT  Identity of the thing
 -- column: start_at BIGINT [ns since origin]  Begin
 -- column: length BIGINT [ns]  Length
--- needs: view.bar, view.call, derive.process_clock, derive.corrected_ns
 WITH beside AS (
     SELECT
         b.kind, b.id,

@@ -10,8 +10,6 @@
 -- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: is_cut BOOLEAN  The path goes on or has siblings beyond the limits of the search
 -- column: is_comparable BOOLEAN  The clocks of all its hosts were brought together, or are one
--- needs: main.flow_path, main.publisher, main.subscription, main.process, main.host, main.clock,
---     derive.clock_group_id
 WITH path AS MATERIALIZED (
     SELECT path_id, path, topics, publishers, subscriptions, is_cut
     FROM main.flow_path([$run], NULL, NULL)

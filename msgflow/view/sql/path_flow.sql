@@ -15,7 +15,6 @@
 -- column: latency BIGINT [ns]  From the start of the root to the end
 -- column: status VARCHAR  As in flows
 -- column: is_loss_affected BOOLEAN  A gap of a trace lies in its time
--- needs: main.end_to_end
 SELECT
     path_id, root_kind, root_id, root_ns - $origin_ns AS root_at, take_id, latency_ns AS latency,
     status, is_loss_affected

@@ -8,7 +8,6 @@
 -- param: end_ns BIGINT  Its end, epoch ns
 -- column: recorded_from_ns BIGINT [epoch ns]  Earliest begin on any clock
 -- column: recorded_before_ns BIGINT [epoch ns]  Latest end on any clock
--- needs: main.clock, derive.recorded_ns
 SELECT
     -- A drift is undone with rounding.
     min(derive.recorded_ns($start_ns, offset_ns, drift_ppb, reference_ns)) - 2

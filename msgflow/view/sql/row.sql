@@ -16,9 +16,6 @@
 -- column: label VARCHAR  Period, topic, service, or thread
 -- column: symbol VARCHAR  Functions registered for its callbacks
 -- column: is_internal BOOLEAN  Infrastructure of ROS
--- needs: main.timer, main.subscription, main.service, main.client, main.publisher, main.callback,
---     main.executor_thread, main.executor, main.thread, main.process, main.host, main.node,
---     main.publication, main.take, main.callback_label
 WITH symbol AS (
     SELECT timer_id, subscription_id, service_id,
         string_agg(DISTINCT symbol, ', ' ORDER BY symbol) AS symbol

@@ -9,7 +9,6 @@
 -- column: event_count BIGINT  Events read
 -- column: host_count BIGINT  Machines and containers
 -- column: msgflow_version VARCHAR  Version that read it
--- needs: main.run, main.trace, main.host
 SELECT
     r.run_id,
     r.name,

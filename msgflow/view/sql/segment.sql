@@ -9,7 +9,6 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
 -- column: flags UTINYINT  As in bar.sql
--- needs: view.bar, view.call, derive.process_clock, derive.corrected_ns
 SELECT row_key, kind, id, start_ns, end_ns, flags
 FROM (
     SELECT

@@ -8,5 +8,4 @@
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: count BIGINT  Bars
--- needs: view.segment
 SELECT count(*) AS count FROM segment ORDER BY count

@@ -18,7 +18,6 @@
 -- column: flags UTINYINT  As in segment.sql
 -- column: count BIGINT  Bars in the bin; 1 for a bar
 -- column: busy BIGINT [ns]  Sum of their lengths
--- needs: view.segment
 SELECT
     row_key,
     kind,

@@ -5,8 +5,6 @@
 --     do those that only get copies of what these carry.
 -- grain: one row per run and topic, or run, for which the sums differ
 -- severity: error
--- needs: store.publication, store.publisher, store.subscription, store.link_transport,
---     store.undelivered, store.take, store.orphan_take, derive.copied_pair
 WITH published AS (
     SELECT p.run_id, p.topic_name, count(*) AS number
     FROM store.publication AS b

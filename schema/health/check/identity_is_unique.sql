@@ -3,7 +3,6 @@
 --     their own.
 -- grain: one row per identity used twice
 -- severity: error
--- needs: store.publication, store.take, store.callback_instance, store.request, store.response
 SELECT run_id, 'publication' AS kind, publication_id AS id
 FROM store.publication
 GROUP BY run_id, publication_id

@@ -2,7 +2,6 @@
 -- description: Nothing ends before it begins.
 -- grain: one row per publication, callback instance or executor state that does
 -- severity: error
--- needs: store.publication, store.callback_instance, store.executor_state
 SELECT run_id, 'publication' AS kind, start_event_id
 FROM store.publication
 WHERE end_ns < start_ns

@@ -2,8 +2,6 @@
 -- description: Nothing is linked across runs: the ids of a run are one block.
 -- grain: one row per link between two runs
 -- severity: error
--- needs: store.link_transport, store.link_causal, store.publication, store.take,
---     store.callback_instance
 WITH publication AS (
     SELECT run_id, min(publication_id) AS first_id, max(publication_id) AS last_id
     FROM store.publication

@@ -2,7 +2,6 @@
 -- description: A publication is made inside at most one callback instance.
 -- grain: one row per publication with several
 -- severity: error
--- needs: store.link_causal
 SELECT run_id, publication_id, count(*) AS link_count
 FROM store.link_causal
 WHERE kind = 'direct'

@@ -3,7 +3,6 @@
 --     buffer of its process, and through the middleware, whose copy it drops.
 -- grain: one row per publication and subscription with several takes of one way
 -- severity: error
--- needs: store.link_transport
 SELECT
     run_id, publication_id, subscription_id, method = 'ring_buffer' AS is_intra_process,
     count(*) AS take_count

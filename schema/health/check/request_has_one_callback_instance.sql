@@ -2,7 +2,6 @@
 -- description: A request leads to at most one callback instance, and both say so.
 -- grain: one row per request and callback instance that do not agree
 -- severity: error
--- needs: store.request, store.callback_instance
 SELECT
     coalesce(q.run_id, i.run_id) AS run_id, coalesce(q.request_id, i.request_id) AS request_id,
     i.callback_instance_id

@@ -2,7 +2,6 @@
 -- description: A take leads to at most one callback instance.
 -- grain: one row per take with several
 -- severity: error
--- needs: store.callback_instance
 SELECT run_id, take_id, count(*) AS run_count
 FROM store.callback_instance
 WHERE take_id IS NOT NULL

@@ -2,7 +2,6 @@
 -- description: A take comes from at most one publication.
 -- grain: one row per take with several
 -- severity: error
--- needs: store.link_transport
 SELECT run_id, take_id, count(*) AS link_count
 FROM store.link_transport
 GROUP BY run_id, take_id

@@ -2,9 +2,6 @@
 -- description: Kinds, methods, states and severities are words of the vocabulary.
 -- grain: one row per word that is not
 -- severity: error
--- needs: store.gap, store.clock, store.callback, store.annotation, store.take,
---     store.executor_state, store.ring_buffer_event, store.link_transport, store.link_causal,
---     store.undelivered, store.orphan_take, store.diagnostic
 SELECT DISTINCT run_id, 'gap.kind' AS place, kind AS word
 FROM store.gap
 WHERE kind NOT IN ('loss', 'packets', 'pause')

@@ -6,7 +6,6 @@
 -- grain: one row per run
 -- severity: warning
 -- phase: links
--- needs: store.link_transport
 SELECT
     run_id,
     NULL AS trace_id,

@@ -8,7 +8,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: model
--- needs: staging.service_event, staging.client_event, staging.client_gid, staging.request_pair
 WITH ambiguous_request AS (
     SELECT DISTINCT t.event_id
     FROM staging.service_event AS t

@@ -3,7 +3,6 @@
 -- description: How clocks are named in details.
 -- grain: one row per clock of the run
 -- param: run_id BIGINT  Run
--- needs: store.host
 SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS name
 FROM store.host
 WHERE run_id = $run_id

@@ -6,7 +6,6 @@
 -- severity: warning
 -- phase: clocks
 -- param: run_id BIGINT  Run
--- needs: store.clock, diagnostic.clock_compared, diagnostic.clock_name
 WITH sync AS MATERIALIZED (
     SELECT clock_id, coalesce(reference_clock_id, clock_id) AS reference_clock_id
     FROM store.clock

@@ -7,7 +7,6 @@
 -- grain: one row, if there are any
 -- severity: info
 -- phase: reading
--- needs: staging.source
 SELECT
     NULL AS trace_id,
     count(*) AS count,

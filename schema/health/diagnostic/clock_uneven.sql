@@ -8,7 +8,6 @@
 -- severity: warning
 -- phase: clocks
 -- param: run_id BIGINT  Run
--- needs: diagnostic.clock_compared
 SELECT
     NULL AS trace_id,
     1 AS count,

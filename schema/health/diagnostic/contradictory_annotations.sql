@@ -8,7 +8,6 @@
 -- grain: one row per run
 -- severity: warning
 -- phase: links
--- needs: store.subscription, store.publisher, diagnostic.declared_pair
 SELECT
     c.run_id,
     NULL AS trace_id,

@@ -5,7 +5,6 @@
 -- grain: one row per damage, the first twenty of each trace, then one for the rest
 -- severity: data_loss
 -- phase: reading
--- needs: staging.damage
 WITH damage AS (
     SELECT
         trace_index, file, position, byte_offset, message,

@@ -2,7 +2,6 @@
 -- kind: inline
 -- description: Inputs and outputs that annotations declare.
 -- grain: one row per annotation, input and output
--- needs: store.annotation, store.annotation_input, store.annotation_output
 SELECT a.run_id, a.kind, i.subscription_id, o.publisher_id
 FROM store.annotation AS a
 JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id

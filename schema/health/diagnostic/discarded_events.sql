@@ -5,7 +5,6 @@
 -- grain: one row per trace
 -- severity: data_loss
 -- phase: reading
--- needs: staging.gap, staging.damage
 SELECT
     trace_id,
     least(coalesce(sum(event_count), count(*)), 9007199254740992) AS count,

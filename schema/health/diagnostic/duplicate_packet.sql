@@ -6,7 +6,6 @@
 -- grain: one row, if there are any
 -- severity: info
 -- phase: reading
--- needs: staging.packet_read_once
 SELECT
     NULL AS trace_id,
     packet_count AS count,

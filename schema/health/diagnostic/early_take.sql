@@ -8,7 +8,6 @@
 -- grain: one row per run
 -- severity: info
 -- phase: links
--- needs: diagnostic.latency
 SELECT
     run_id,
     NULL AS trace_id,

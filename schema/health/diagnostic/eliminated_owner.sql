@@ -6,7 +6,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: model
--- needs: staging.callback_owner, diagnostic.process_label
 SELECT
     NULL AS trace_id,
     count(*) AS count,

@@ -5,7 +5,6 @@
 -- grain: one row per trace
 -- severity: warning
 -- phase: reading
--- needs: staging.trace
 SELECT
     t.trace_id,
     1 AS count,

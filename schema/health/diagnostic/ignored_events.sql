@@ -5,7 +5,6 @@
 -- grain: one row, if there are any
 -- severity: info
 -- phase: reading
--- needs: staging.ignored, staging.event_count
 WITH by_pattern AS (
     SELECT i.place, i.pattern, sum(e.event_count)::BIGINT AS event_count
     FROM staging.ignored AS i

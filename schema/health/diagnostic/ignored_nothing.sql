@@ -6,7 +6,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: reading
--- needs: staging.ignored
 SELECT
     NULL AS trace_id,
     count(*) AS count,

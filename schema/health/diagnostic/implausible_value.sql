@@ -5,7 +5,6 @@
 -- grain: one row per field of an event
 -- severity: data_loss
 -- phase: reading
--- needs: staging.implausible
 SELECT
     NULL AS trace_id,
     value_count AS count,

@@ -8,7 +8,6 @@
 -- grain: one row per run
 -- severity: info
 -- phase: links
--- needs: derive.annotation_firing
 SELECT
     run_id,
     NULL AS trace_id,

@@ -6,7 +6,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: model
--- needs: diagnostic.unseen_object
 SELECT NULL AS trace_id, count, detail
 FROM unseen_object
 WHERE kind = 'publisher'

@@ -3,8 +3,6 @@
 -- description: Latencies of messages on the common time axis, and whether sender and receiver have
 --     one clock.
 -- grain: one row per link
--- needs: store.link_transport, store.publication, store.take, derive.process_clock,
---     derive.corrected_ns
 SELECT
     l.run_id,
     bc.clock_id = tc.clock_id AS has_one_clock,

@@ -5,7 +5,6 @@
 -- grain: one row per run
 -- severity: warning
 -- phase: links
--- needs: store.diagnostic, diagnostic.latency
 SELECT
     run_id,
     NULL AS trace_id,

@@ -6,8 +6,6 @@
 -- grain: one row, if there are any
 -- severity: info
 -- phase: reading
--- needs: staging.network_packet, staging.trace, staging.host, staging.single_packet, staging.clock,
---     staging.link_packet
 WITH packet_use AS (
     SELECT
         count(*) AS number,

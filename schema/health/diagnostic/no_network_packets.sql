@@ -7,7 +7,6 @@
 -- grain: one row per trace
 -- severity: info
 -- phase: reading
--- needs: staging.source, staging.network_packet, staging.clock
 SELECT
     s.trace_index + 1 AS trace_id,
     1 AS count,

@@ -7,7 +7,6 @@
 -- grain: one row per trace
 -- severity: info
 -- phase: model
--- needs: staging.callback_pair, staging.callback_number
 SELECT
     trace_index + 1 AS trace_id,
     count(*) AS count,

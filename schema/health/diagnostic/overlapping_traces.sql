@@ -6,7 +6,6 @@
 -- grain: one row per pair of traces
 -- severity: warning
 -- phase: reading
--- needs: staging.left_out, staging.source
 SELECT
     o.trace_index + 1 AS trace_id,
     o.event_count AS count,

@@ -8,7 +8,6 @@
 -- severity: warning
 -- phase: links
 -- param: run_id BIGINT  Run
--- needs: main.flow_path
 SELECT
     NULL AS trace_id,
     count(*) AS count,

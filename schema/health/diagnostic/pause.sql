@@ -5,7 +5,6 @@
 -- grain: one row per trace
 -- severity: warning
 -- phase: reading
--- needs: staging.gap
 SELECT
     trace_id,
     count(*) AS count,

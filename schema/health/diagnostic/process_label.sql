@@ -2,7 +2,6 @@
 -- kind: inline
 -- description: How processes are named in details.
 -- grain: one row per process
--- needs: staging.process, staging.host
 SELECT
     p.process_id, p.life,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS label

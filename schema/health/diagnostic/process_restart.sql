@@ -6,7 +6,6 @@
 -- grain: one row, if there are any
 -- severity: info
 -- phase: model
--- needs: diagnostic.process_label
 SELECT
     NULL AS trace_id,
     count(*) AS count,

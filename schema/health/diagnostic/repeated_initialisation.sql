@@ -7,7 +7,6 @@
 -- grain: one row, if there are any
 -- severity: info
 -- phase: model
--- needs: staging.publisher_known, staging.subscription_known
 WITH initialised AS (
     SELECT
         process_id, publisher_handle AS handle, topic_name,

@@ -6,7 +6,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: reading
--- needs: staging.packet_read_once
 SELECT
     NULL AS trace_id,
     sum(packet_count) AS count,

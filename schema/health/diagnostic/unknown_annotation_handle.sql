@@ -9,7 +9,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: model
--- needs: staging.annotation, staging.annotation_object, diagnostic.process_label
 SELECT
     NULL AS trace_id,
     count(*) AS count,

@@ -7,7 +7,6 @@
 -- grain: one row per trace with such events
 -- severity: info
 -- phase: reading
--- needs: staging.event_count, staging.source
 SELECT
     e.trace_index + 1 AS trace_id,
     sum(e.event_count) AS count,

@@ -5,7 +5,6 @@
 -- grain: one row, if there are any
 -- severity: warning
 -- phase: model
--- needs: staging.callback, staging.callback_number, diagnostic.process_label
 SELECT
     NULL AS trace_id,
     count(*) AS count,

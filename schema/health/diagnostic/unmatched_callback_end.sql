@@ -6,7 +6,6 @@
 -- grain: one row per trace
 -- severity: warning
 -- phase: model
--- needs: staging.callback_left_over
 SELECT
     trace_index + 1 AS trace_id,
     count(*) AS count,

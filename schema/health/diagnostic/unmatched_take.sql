@@ -8,7 +8,6 @@
 -- grain: one row per trace, for messages with a stamp and without
 -- severity: warning
 -- phase: links
--- needs: store.take, store.subscription, store.link_transport
 SELECT
     run_id,
     trace_id,

@@ -3,8 +3,6 @@
 -- description: Objects that were used, but were not seen to be created, by kind. Publishers of ROS
 --     itself do not count: /rosout is published on handles never initialised.
 -- grain: one row per kind with such objects
--- needs: staging.node, staging.publisher, staging.subscription, staging.timer, staging.callback,
---     staging.client, staging.service, diagnostic.process_label
 WITH unseen AS (
     SELECT 'node' AS kind, process_id FROM staging.node WHERE is_inferred
     UNION ALL

@@ -6,7 +6,6 @@
 -- grain: one row per audit
 -- severity: error
 -- phase: database
--- needs: main.diagnostic
 SELECT run_id, 'database' AS subject, count, detail
 FROM main.diagnostic
 WHERE name = 'check_failed'

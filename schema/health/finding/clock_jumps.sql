@@ -8,7 +8,6 @@
 -- grain: one row per host
 -- severity: warning
 -- phase: clocks
--- needs: derive.stamp_shift, main.host, derive.counted
 WITH step AS (
     SELECT
         run_id, host_id,

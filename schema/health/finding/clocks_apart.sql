@@ -8,7 +8,6 @@
 -- grain: one row per pair of hosts
 -- severity: warning
 -- phase: clocks
--- needs: main.link_transport, main.publication, main.take, main.process, main.host, derive.counted
 SELECT
     l.run_id,
     fh.hostname || ' → ' || th.hostname AS subject,

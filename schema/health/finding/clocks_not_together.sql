@@ -8,7 +8,6 @@
 -- grain: one row per pair of hosts
 -- severity: warning
 -- phase: clocks
--- needs: main.remote_latency, main.host, main.clock, derive.clock_group_id, derive.counted
 SELECT
     l.run_id,
     f.hostname || ' → ' || t.hostname AS subject,

@@ -9,7 +9,6 @@
 -- grain: one row per damage, the first twenty of each trace, then one for the rest
 -- severity: error
 -- phase: reading
--- needs: main.diagnostic, main.trace
 SELECT
     d.run_id,
     coalesce(t.path, 'the input') AS subject,

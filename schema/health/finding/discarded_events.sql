@@ -13,7 +13,6 @@
 -- grain: one row per trace
 -- severity: error
 -- phase: reading
--- needs: main.gap, main.trace, store.packet, store.diagnostic, derive.counted
 WITH damaged AS (
     SELECT DISTINCT trace_id FROM store.diagnostic WHERE name = 'damaged_trace'
 ),

@@ -10,7 +10,6 @@
 -- grain: one row per trace
 -- severity: warning
 -- phase: reading
--- needs: main.diagnostic, main.trace
 SELECT
     t.run_id,
     t.path AS subject,

@@ -7,7 +7,6 @@
 -- grain: one row per run
 -- severity: warning
 -- phase: reading
--- needs: main.diagnostic, main.run
 SELECT
     d.run_id,
     r.name AS subject,

@@ -12,7 +12,6 @@
 -- grain: one row per trace
 -- severity: error
 -- phase: reading
--- needs: main.gap, main.trace, derive.counted
 SELECT
     t.run_id,
     t.path AS subject,

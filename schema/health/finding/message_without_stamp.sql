@@ -10,7 +10,6 @@
 -- grain: one row per topic
 -- severity: warning
 -- phase: links
--- needs: main.stat_orphan, main.subscription, main.take, derive.counted
 SELECT
     o.run_id,
     coalesce(s.topic_name, 'unknown topic') AS subject,

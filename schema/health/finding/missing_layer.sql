@@ -9,7 +9,6 @@
 -- grain: one row per run and kind
 -- severity: warning
 -- phase: model
--- needs: main.run, main.publication, main.take, main.callback_instance, main.executor_state
 WITH layer AS (
     SELECT run_id, 'publication' AS kind FROM main.publication
     UNION ALL

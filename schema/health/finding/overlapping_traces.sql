@@ -7,7 +7,6 @@
 -- grain: one row per pair of traces
 -- severity: warning
 -- phase: reading
--- needs: main.diagnostic, main.trace
 SELECT
     d.run_id,
     coalesce(t.path, 'the input') AS subject,

@@ -8,8 +8,6 @@
 -- grain: one row per process
 -- severity: warning
 -- phase: model
--- needs: main.process, main.host, main.node, main.publisher, main.subscription, main.callback,
---     main.timer, main.service, main.client
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,

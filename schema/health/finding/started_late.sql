@@ -10,7 +10,6 @@
 -- grain: one row per process
 -- severity: warning
 -- phase: model
--- needs: derive.unseen_creation, main.process, main.host
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,

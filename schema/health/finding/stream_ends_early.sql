@@ -10,7 +10,6 @@
 -- grain: one row per recording, by the trace that ends last
 -- severity: warning
 -- phase: reading
--- needs: store.packet, main.trace, derive.recording, derive.counted
 WITH packet AS (
     SELECT
         t.run_id, r.recording_id, t.path, p.cpu_id, p.stream_class_id, p.stream_instance_id,

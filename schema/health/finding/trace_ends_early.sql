@@ -9,8 +9,6 @@
 -- grain: one row per topic
 -- severity: warning
 -- phase: links
--- needs: main.stat_orphan, main.subscription, main.publisher, main.process, main.host, main.take,
---     derive.counted
 WITH late AS (
     SELECT o.run_id, s.topic_name, count(*) AS number, max(t.taken_ns) AS last_ns
     FROM main.stat_orphan AS o

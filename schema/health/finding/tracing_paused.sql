@@ -8,7 +8,6 @@
 -- grain: one row per trace
 -- severity: warning
 -- phase: reading
--- needs: main.gap, main.trace, derive.counted
 SELECT
     t.run_id,
     t.path AS subject,

@@ -10,7 +10,6 @@
 -- grain: one row per process
 -- severity: warning
 -- phase: model
--- needs: main.callback_instance, main.thread_break, main.process, main.host, derive.counted
 WITH run AS (
     SELECT
         *,

@@ -9,7 +9,6 @@
 -- grain: one row per way in which it is uncertain
 -- severity: warning
 -- phase: model
--- needs: main.diagnostic
 SELECT run_id, 'the input' AS subject, count, detail
 FROM main.diagnostic
 WHERE name IN ('eliminated_owner', 'unknown_owner', 'ambiguous_buffer')

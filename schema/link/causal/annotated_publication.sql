@@ -5,8 +5,6 @@
 --     start of that instance, else that of the publication itself.
 -- grain: one row per annotation and publication by one of its outputs
 -- param: only_run BIGINT  Run to look at
--- needs: derive.link_causal_direct, derive.annotated_run, store.annotation,
---     store.annotation_output, store.publication, store.callback_instance
 CREATE OR REPLACE MACRO derive.annotated_publication(only_run) AS TABLE
 SELECT
     a.run_id,

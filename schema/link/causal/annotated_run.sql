@@ -3,7 +3,6 @@
 -- description: Instances of the callbacks of subscriptions that are inputs of annotations.
 -- grain: one row per instance of such a callback
 -- param: only_run BIGINT  Run to look at
--- needs: store.annotation_input, store.callback_instance, store.callback, store.take
 CREATE OR REPLACE MACRO derive.annotated_run(only_run) AS TABLE
 SELECT
     i.run_id,

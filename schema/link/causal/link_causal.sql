@@ -5,8 +5,6 @@
 -- grain: one row per callback instance, or take outside of any, and publication that it led to, and
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
--- needs: derive.link_causal_direct, derive.link_causal_take_adjacent,
---     derive.link_causal_indirect, store.callback_instance, store.take, store.publication
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
 WITH link AS (
     SELECT

@@ -7,7 +7,6 @@
 --     not over.
 -- grain: one row per publication made inside a callback instance
 -- param: only_run BIGINT  Run to look at
--- needs: store.publication, store.callback_instance
 CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE
 WITH RECURSIVE around AS (
     SELECT

@@ -15,9 +15,6 @@
 --     the record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
--- needs: derive.annotated_publication, derive.annotated_run, derive.partial_sync_firing,
---     store.annotation, store.annotation_input, store.callback_instance, store.thread_break,
---     derive.exposed_trace, derive.recording_gap
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
 WITH nesting AS (
     SELECT DISTINCT parent_id

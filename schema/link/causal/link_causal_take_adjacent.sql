@@ -6,9 +6,6 @@
 --     callback instance is caused by that instance instead.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
--- needs: derive.link_causal_direct, store.publication, store.take, store.request, store.response,
---     store.callback_instance, store.executor_state, derive.exposed_trace,
---     derive.recording_gap
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH handled AS (
     SELECT take_id

@@ -8,7 +8,6 @@
 --     published when this one began; what came after it may have been kept.
 -- grain: one row per annotation and callback instance of one of its inputs that fires it
 -- param: only_run BIGINT  Run to look at
--- needs: derive.annotated_publication, store.annotation_input
 CREATE OR REPLACE MACRO derive.partial_sync_firing(only_run) AS TABLE
 WITH published AS (
     SELECT

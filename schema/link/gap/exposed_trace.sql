@@ -1,7 +1,6 @@
 -- name: derive.exposed_trace
 -- description: Traces whose recording has gaps.
 -- grain: one row per such trace
--- needs: derive.recording, store.gap
 SELECT run_id, trace_id, recording_id
 FROM (
     SELECT

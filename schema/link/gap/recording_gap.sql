@@ -3,7 +3,6 @@
 --     take the last gap that starts before the end of the window. One touches it if `start_ns` or
 --     `covered_until_ns` of that gap is at or after the begin of the window.
 -- grain: one row per gap in a recording
--- needs: store.gap, derive.exposed_trace
 SELECT
     l.run_id,
     x.recording_id,

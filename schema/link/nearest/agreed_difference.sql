@@ -7,7 +7,6 @@
 --     shortest delays are short.
 -- grain: one row per clock, stretch of time and stretch of differences
 -- param: intervals VARCHAR  Name of rows of clock_id, stretch, least_ns, greatest_ns
--- needs: derive.clock_limit
 CREATE OR REPLACE MACRO derive.agreed_difference(intervals) AS TABLE
 WITH edge AS (
     SELECT clock_id, stretch, least_ns AS from_ns, 1 AS step FROM query_table(intervals)

@@ -6,7 +6,6 @@
 --     constant. Slopes too steep for any clock come from jumps, and are left out.
 -- grain: one row per clock and stretch
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
--- needs: derive.clock_limit
 CREATE OR REPLACE MACRO derive.clock_drift(course) AS TABLE
 WITH slope AS (
     SELECT

@@ -6,7 +6,6 @@
 -- grain: one row per pair
 -- param: pairs VARCHAR  Name of rows as of derive.stamp_pair
 -- param: course VARCHAR  Name of rows of clock_id, stretch, stretch_ns, offset_ns
--- needs: derive.clock_limit
 CREATE OR REPLACE MACRO derive.close_pair(pairs, course) AS TABLE
 SELECT p.clock_id, p.stretch, p.written_ns, p.least_ns, p.greatest_ns
 FROM (

@@ -12,7 +12,6 @@
 --     publications, the clock may have jumped by a period, and nothing is known.
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
 -- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns
--- needs: derive.clock_limit
 CREATE OR REPLACE MACRO derive.followed_difference(regions) AS TABLE
 WITH RECURSIVE told AS (
     SELECT

@@ -5,7 +5,6 @@
 --     event that says who sent the message may be lost.
 -- grain: one row per such publication
 -- param: publications VARCHAR  Name of rows of publication_id
--- needs: store.publication, derive.exposed_trace, derive.recording_gap, derive.clock_limit
 CREATE OR REPLACE MACRO derive.publication_beside_gap(publications) AS TABLE
 SELECT p.publication_id
 FROM (

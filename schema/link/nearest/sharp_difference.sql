@@ -8,7 +8,6 @@
 -- param: pairs VARCHAR  Name of rows of clock_id, stretch, written_ns, least_ns, greatest_ns
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
 -- param: reach BIGINT  How many stretches before and behind count too
--- needs: derive.agreed_difference, derive.clock_drift, derive.clock_limit
 CREATE OR REPLACE MACRO derive.sharp_difference(pairs, course, reach) AS TABLE
 WITH drift AS MATERIALIZED (
     FROM derive.clock_drift(course)

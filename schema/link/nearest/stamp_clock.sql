@@ -8,9 +8,6 @@
 -- grain: one row per clock and stretch of time with messages; message_count is 0 where the
 --     difference is not known
 -- param: only_run BIGINT  Run to look at
--- needs: derive.stamp_pair, derive.clock_drift, derive.agreed_difference,
---     derive.followed_difference, derive.close_pair, derive.sharp_difference,
---     derive.clock_limit
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (
     FROM derive.stamp_pair(only_run)

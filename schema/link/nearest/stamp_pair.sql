@@ -9,7 +9,6 @@
 --     publications.
 -- grain: one row per clock, message in the sample and publication that it may be of
 -- param: only_run BIGINT  Run to look at
--- needs: derive.unstamped_publication, derive.unstamped_message, derive.clock_limit
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
 WITH published AS MATERIALIZED (
     SELECT

@@ -4,8 +4,6 @@
 --     publication with their stamp is known. All takes of one message have its topic and stamp.
 -- grain: one row per message, and clock of a process that took it
 -- param: only_run BIGINT  Run to look at
--- needs: derive.unstamped_publication, store.publication, store.publisher, store.take,
---     store.subscription, store.process, store.host
 CREATE OR REPLACE MACRO derive.unstamped_message(only_run) AS TABLE
 WITH topic AS (
     SELECT DISTINCT topic_name FROM derive.unstamped_publication(only_run)

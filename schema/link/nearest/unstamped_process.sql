@@ -4,7 +4,6 @@
 -- grain: one row per such process
 -- param: only_run BIGINT  Run to look at
 -- note: gate
--- needs: store.publication
 CREATE OR REPLACE MACRO derive.unstamped_process(only_run) AS TABLE
 SELECT process_id
 FROM store.publication

@@ -5,8 +5,6 @@
 --     lost an event.
 -- grain: one row per publication on a known topic, written by a process without stamps
 -- param: only_run BIGINT  Run to look at
--- needs: store.publication, store.publisher, store.process, store.host,
---     store.thread_break, derive.unstamped_process
 CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
 SELECT
     b.run_id,

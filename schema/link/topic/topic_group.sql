@@ -8,8 +8,6 @@
 --     learned. A pair that hardly any message of both sides speaks for is chance.
 -- grain: one row per publisher or subscription without a topic of its own that messages join
 -- param: only_run BIGINT  Run to look at
--- needs: store.publication, store.publisher, store.take, store.subscription,
---     store.ring_buffer_event
 CREATE OR REPLACE MACRO derive.topic_group(only_run) AS TABLE
 WITH RECURSIVE endpoint AS (
     SELECT

@@ -4,7 +4,6 @@
 --     not traced.
 -- grain: one row per publisher or subscription without a topic of its own
 -- param: only_run BIGINT  Run to look at
--- needs: derive.topic_group
 CREATE OR REPLACE MACRO derive.topic_learned(only_run) AS TABLE
 SELECT run_id, kind, id, topic_name, is_internal
 FROM derive.topic_group(only_run)

@@ -11,10 +11,6 @@
 --     reader of the buffer.
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at
--- needs: derive.link_transport_exact, derive.link_transport_nearest,
---     derive.link_transport_ring_buffer, derive.recording_gap, derive.exposed_trace,
---     store.publication, store.publisher, store.take, store.subscription, store.node,
---     store.process, store.host, store.callback, store.callback_instance
 CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
 WITH link AS (
     SELECT

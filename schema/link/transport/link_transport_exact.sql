@@ -9,7 +9,6 @@
 --     may seem to come before its publication.
 -- grain: one row per take whose publication is known by its stamp
 -- param: only_run BIGINT  Run to look at
--- needs: derive.topic_group, store.publication, store.publisher, store.take, store.subscription
 CREATE OR REPLACE MACRO derive.link_transport_exact(only_run) AS TABLE
 WITH unnamed AS (
     SELECT kind, id, 'group ' || group_id AS topic_name

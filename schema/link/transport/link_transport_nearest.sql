@@ -5,8 +5,6 @@
 --     publishing.
 -- grain: one row per take whose publication is known by time
 -- param: only_run BIGINT  Run to look at
--- needs: store.nearest_message, store.take, store.subscription, store.publication,
---     derive.publication_beside_gap
 CREATE OR REPLACE MACRO derive.link_transport_nearest(only_run) AS TABLE
 WITH received AS (
     SELECT

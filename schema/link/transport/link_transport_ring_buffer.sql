@@ -7,8 +7,6 @@
 --     gap, messages are assumed to come no faster than where nothing is missing.
 -- grain: one row per dequeue whose publication is known
 -- param: only_run BIGINT  Run to look at
--- needs: store.ring_buffer_event, derive.exposed_trace, derive.recording_gap, store.publication,
---     store.take
 CREATE OR REPLACE MACRO derive.link_transport_ring_buffer(only_run) AS TABLE
 WITH slot_use AS (
     SELECT

@@ -4,7 +4,6 @@
 --     none of them could be chosen.
 -- grain: one row per take without a link and publication
 -- param: only_run BIGINT  Run to look at
--- needs: store.take, store.link_transport, store.subscription, store.publication, store.publisher
 CREATE OR REPLACE MACRO derive.take_candidate(only_run) AS TABLE
 WITH orphan AS (
     SELECT t.run_id, t.take_id, t.source_timestamp_ns, s.topic_name

@@ -1,7 +1,6 @@
 -- name: staging.annotation_input
 -- description: Subscriptions of annotations, as far as they are known.
 -- grain: one row per subscription of an annotation
--- needs: staging.annotation, staging.annotation_object
 SELECT DISTINCT a.annotation_id, o.object_id AS subscription_id
 FROM staging.annotation AS a
 JOIN staging.annotation_object AS o ON a.event_id = o.event_id

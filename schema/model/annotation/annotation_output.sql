@@ -1,7 +1,6 @@
 -- name: staging.annotation_output
 -- description: Publishers of annotations, as far as they are known.
 -- grain: one row per publisher of an annotation
--- needs: staging.annotation, staging.annotation_object
 SELECT DISTINCT a.annotation_id, o.object_id AS publisher_id
 FROM staging.annotation AS a
 JOIN staging.annotation_object AS o ON a.event_id = o.event_id

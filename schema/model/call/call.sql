@@ -3,7 +3,6 @@
 -- description: The events of one tracepoint that is a stage of calls, with what directly precedes
 --     each on its thread, unless a gap lies between the two.
 -- grain: one row per event of the tracepoint
--- needs: staging.behind_gap, raw
 CREATE OR REPLACE MACRO staging.call(tracepoint) AS TABLE
 SELECT
     e.*,

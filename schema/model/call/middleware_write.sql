@@ -2,7 +2,6 @@
 -- description: What instrumented middleware says of one write: begin and end, in either order, or
 --     only one of them.
 -- grain: one row per write
--- needs: staging.call
 WITH write_begin AS (
     SELECT * FROM staging.call('dds_write_pre')
 ),

@@ -2,8 +2,6 @@
 -- kind: inline
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
--- needs: staging.publication_call, staging.publication_number, staging.callback_left_over,
---     staging.callback_pair, staging.beside_gap, staging.callback_gap, staging.publication_next
 
 -- An end without a begin says nothing of where its thread is; what came before it does.
 WITH stray AS (

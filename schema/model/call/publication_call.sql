@@ -3,7 +3,7 @@
 -- description: All publish() calls: whole ones, as they were put together while they were read, and
 --     the rest.
 -- grain: one row per publish() call
--- needs: staging.publication_rest, staging.taken_apart, staging.context, raw
+-- after: staging.taken_apart
 WITH whole AS (
     SELECT
         rclcpp_publish_event_id AS start_event_id,

@@ -3,7 +3,6 @@
 --     stamped later is another message. Not known where the thread did nothing more, or where a
 --     gap may hide what it did.
 -- grain: one row per publish() call without a stamp after which the thread went on
--- needs: staging.publication_call, staging.predecessor, staging.executor_event, staging.behind_gap
 WITH unstamped AS (
     SELECT start_event_id, end_event_id, thread_id
     FROM staging.publication_call

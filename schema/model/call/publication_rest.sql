@@ -5,7 +5,7 @@
 --     directly follows it for the same publisher are one call. Messages enqueued without such a
 --     publication before them are the replay of a transient-local buffer, not a call.
 -- grain: one row per such publish() call
--- needs: staging.taken_apart, staging.call, staging.middleware_write, staging.context
+-- after: staging.taken_apart
 WITH client AS (
     SELECT
         coalesce(u.event_id, r.event_id) AS start_event_id,

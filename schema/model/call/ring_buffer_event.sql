@@ -3,8 +3,6 @@
 --     call is the replay of a message that was kept for a subscription that joined late. A buffer
 --     that is made anew at an address is empty.
 -- grain: one row per enqueue, dequeue or clearing of a ring buffer
--- needs: staging.located, staging.publication_call, staging.publication_number,
---     staging.take_number
 WITH enqueue AS (
     SELECT
         event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten

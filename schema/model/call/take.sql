@@ -2,8 +2,6 @@
 -- kind: inline
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
--- needs: staging.take_chain, staging.take_number, staging.callback_pair, staging.beside_gap,
---     staging.callback_gap, staging.take_remnant
 WITH every_take AS NOT MATERIALIZED (
     SELECT
         n.take_id, c.trace_index, n.subscription_id, c.process_id, c.thread_id, c.taken_ns,

@@ -2,7 +2,6 @@
 -- kind: inline
 -- description: All takes that were successful, the whole ones and the rest.
 -- grain: one row per successful take or dequeue
--- needs: staging.take_whole, staging.take_rest
 FROM staging.take_whole
 UNION ALL
 FROM staging.take_rest

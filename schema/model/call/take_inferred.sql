@@ -4,7 +4,6 @@
 --     the message without a traced take. A callback that none was traced for is a subscription of
 --     its own, a placeholder by its first instance.
 -- grain: one row per such take or callback instance
--- needs: staging.take_subscription, staging.callback_binding, staging.buffer_owner
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, o.subscription_event_id, o.is_inferred
     FROM staging.take_subscription AS t

@@ -3,7 +3,6 @@
 --     that it led to, known or not. A subscription callback that ran without any take traced was
 --     handed its message all the same.
 -- grain: one row per message handed over to a subscription
--- needs: staging.take_subscription, staging.take_inferred, staging.callback_binding
 SELECT
     c.start_event_id,
     c.process_id,

@@ -1,7 +1,6 @@
 -- name: staging.take_remnant
 -- description: Callbacks right behind the last layer of a take whose others are in a gap.
 -- grain: one row per such begin of a callback
--- needs: staging.beside_gap, staging.predecessor, raw
 SELECT p.event_id
 FROM staging.predecessor AS p
 JOIN staging.beside_gap AS g ON p.previous_event_id = g.event_id AND g.is_behind

@@ -4,8 +4,7 @@
 --     without rcl layer is the middleware's own, where its reader belongs to no rcl subscription
 --     and never had an rcl layer either, although rcl takes are traced.
 -- grain: one row per such successful take, or dequeue
--- needs: staging.taken_apart, staging.call, staging.context, staging.located,
---     staging.subscription_known, staging.take_whole, raw
+-- after: staging.taken_apart
 WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,

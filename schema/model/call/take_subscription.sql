@@ -3,8 +3,6 @@
 --     before the take; NULL where that was not traced. Of a ring buffer, which one it belongs to
 --     may be known (`is_known`), but not the subscription.
 -- grain: one row per successful take or dequeue
--- needs: staging.take_chain, staging.subscription_known, staging.buffer_subscription,
---     staging.with_latest
 WITH used AS NOT MATERIALIZED (
     SELECT start_event_id AS event_id, end_event_id, process_id, rmw_handle AS handle, method
     FROM staging.take_chain

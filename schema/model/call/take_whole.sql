@@ -3,7 +3,7 @@
 -- description: Successful takes of which all layers are there, as they were put together while they
 --     were read.
 -- grain: one row per such take
--- needs: staging.taken_apart, staging.context, raw
+-- after: staging.taken_apart
 SELECT
     w.rmw_take_event_id AS start_event_id,
     w.rclcpp_take_event_id AS end_event_id,

@@ -4,7 +4,6 @@
 --     gap or the end of a life decides what belongs together; and those next to an event that may
 --     be one more layer, behind the last or before the first.
 -- grain: one row per thread, or per event that such a call ends with
--- needs: staging.interrupted_thread, raw
 WITH behind AS (
     SELECT previous_call_event_id AS event_id FROM raw.dds_write_pre
     UNION ALL

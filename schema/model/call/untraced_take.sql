@@ -5,8 +5,6 @@
 --     the same round. An executor runs all timers that were ready at the end of its wait first, if
 --     it has one thread.
 -- grain: one row per such process
--- needs: staging.callback_announced, staging.callback_trigger, staging.callback_binding,
---     staging.callback_run, staging.callback_gap, staging.located, raw
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
     FROM staging.callback_trigger AS t

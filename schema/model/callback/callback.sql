@@ -3,9 +3,6 @@
 --     learns its subscription or service from the messages that it was called with (the most
 --     frequent), else what it belongs to from the executor.
 -- grain: one row per callback object
--- needs: staging.callback_known, staging.callback_binding, staging.callback_owner,
---     staging.subscription, staging.take_number, staging.timer, staging.service,
---     staging.service_event, staging.request_callback
 WITH learned AS (
     SELECT
         b.process_id,

@@ -4,8 +4,6 @@
 --     Without a handle (NULL) the executor named none. And which tracepoints were enabled
 --     meanwhile.
 -- grain: one row per such callback
--- needs: staging.callback_trigger, staging.located, staging.subscription_known,
---     staging.timer_use, staging.declared
 WITH enabled AS (
     SELECT
         trace_index,

@@ -4,8 +4,6 @@
 --     of the executor between the two; an rmw take is not for an intra-process call, nor a dequeue
 --     for another; the subscriptions agree where both are known.
 -- grain: one row per callback_start
--- needs: staging.callback_run, staging.callback_known, staging.take_subscription,
---     staging.with_latest
 WITH begun AS NOT MATERIALIZED (
     SELECT
         start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,

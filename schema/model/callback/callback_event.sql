@@ -3,7 +3,7 @@
 --     their thread: directly, of callbacks, and of the executor (not across a gap). `segment`
 --     counts the gaps that their thread has seen.
 -- grain: one row per such callback_start or callback_end
--- needs: staging.taken_apart, staging.behind_gap, staging.callback_segment, staging.context, raw
+-- after: staging.taken_apart
 WITH event AS (
     SELECT
         event_id, ts_ns, trace_index, cpu_id, thread_index, callback AS callback_handle,

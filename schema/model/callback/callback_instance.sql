@@ -3,8 +3,6 @@
 -- description: Callback instances, numbered in the order in which they began, with the one that
 --     each is nested in.
 -- grain: one row per callback instance
--- needs: staging.callback_run, staging.callback_number, staging.callback_parent,
---     staging.callback_loss, staging.request_origin
 SELECT
     n.callback_instance_id,
     r.trace_index + 1 AS trace_id,

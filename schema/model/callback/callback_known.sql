@@ -3,7 +3,6 @@
 --     event that initialised it. A callback that was only registered has a symbol but no owner; a
 --     service that was not seen to be initialised is known by its handle.
 -- grain: one row per callback object
--- needs: staging.located, staging.subscription_object, staging.timer_use, staging.service_known
 WITH added AS (
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'subscription' AS kind,

@@ -3,7 +3,6 @@
 --     callback and the take that it was called with. A step of its own: looked up for the whole
 --     instances at once, all three would stay in memory beside them.
 -- grain: one row per callback instance
--- needs: staging.callback_binding, staging.callback, staging.take_number
 WITH never_added AS (
     SELECT process_id, callback_handle, min(callback_id) AS callback_id
     FROM staging.callback

@@ -2,7 +2,6 @@
 -- description: Callback instances that were never seen to end. Apart, since they are few, which
 --     decides how what closes them is best looked for.
 -- grain: one row per such callback instance
--- needs: staging.callback_pair
 SELECT start_event_id, thread_id, previous_executor_event_id
 FROM staging.callback_pair
 WHERE end_event_id IS NULL

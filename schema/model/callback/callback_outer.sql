@@ -4,8 +4,6 @@
 --     until the first event of their thread that cannot be inside: the next begin or end of a
 --     callback, executor event, or event behind a gap of any CPU.
 -- grain: one row per such callback instance
--- needs: staging.callback_event, staging.callback_pair, staging.callback_open,
---     staging.executor_event, staging.executor_first, staging.callback_gap, staging.thread
 WITH closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
     FROM staging.callback_open AS o

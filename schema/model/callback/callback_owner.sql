@@ -6,8 +6,6 @@
 --     service, where the requests that services take were not enabled. Where this was decided by
 --     elimination, or the service was not seen to be initialised, the owner is a placeholder.
 -- grain: one row per callback whose owner is decided
--- needs: staging.callback_announced, staging.untraced_take, staging.callback_known,
---     staging.request_callback, staging.callback_binding
 WITH decided AS (
     SELECT
         a.process_id, a.callback_handle, a.callback_event_id, a.start_event_id, a.handle,

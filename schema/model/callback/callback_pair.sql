@@ -3,7 +3,7 @@
 -- description: Begins of callbacks with their end: whole ones, as they were put together while they
 --     were read, and the rest. `is_plain` where no other begin or end of a callback lies between.
 -- grain: one row per callback_start
--- needs: staging.callback_rest, staging.taken_apart, staging.context, raw
+-- after: staging.taken_apart
 SELECT
     w.callback_start_event_id AS start_event_id,
     w.callback_end_event_id AS end_event_id,

@@ -2,7 +2,6 @@
 -- description: Begins of callbacks, not whole yet, whose end is the next begin or end of any
 --     callback on their thread. No gap lies between.
 -- grain: one row per such begin and end
--- needs: staging.callback_event
 SELECT s.event_id AS start_event_id, e.event_id AS end_event_id, e.ts_ns AS end_ns
 FROM staging.callback_event AS e
 JOIN staging.callback_event AS s

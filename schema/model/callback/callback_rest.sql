@@ -2,7 +2,6 @@
 -- description: Begins of callbacks with their end, of those that are not whole; `is_plain` where no
 --     other begin or end of a callback lies between.
 -- grain: one row per such callback_start
--- needs: staging.callback_event, staging.callback_plain, staging.callback_left_over
 WITH found AS (
     SELECT start_event_id, end_event_id, end_ns, true AS is_plain
     FROM staging.callback_plain

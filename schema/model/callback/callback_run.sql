@@ -2,7 +2,6 @@
 -- kind: inline
 -- description: Callback instances with their extent and nesting.
 -- grain: one row per callback_start
--- needs: staging.callback_pair, staging.callback_outer, staging.callback_depth
 SELECT
     p.start_event_id,
     p.end_event_id,

@@ -4,7 +4,6 @@
 --     names the handle of what it executes, if that is a timer or a subscription; else it only
 --     looks for what is ready. Where something else comes in between, it is neither.
 -- grain: one row per such callback instance in the trace of which an executor event precedes it
--- needs: staging.callback_binding, staging.callback_pair, staging.request_callback, raw
 WITH unowned AS (
     SELECT start_event_id, process_id, callback_handle, callback_event_id, is_intra_process,
         take_event_id

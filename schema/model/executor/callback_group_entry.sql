@@ -2,8 +2,6 @@
 -- description: Callbacks in callback groups (CARET). A group usually is filled before it is added
 --     to an executor; else it was added to it last.
 -- grain: one row per callback in a callback group
--- needs: staging.located, staging.callback_group_owner, staging.timer, staging.subscription,
---     staging.service, staging.callback
 WITH entry AS (
     SELECT event_id, process_id, callback_group_addr, 'timer' AS kind, timer_handle AS handle
     FROM staging.located('ros2_caret_callback_group_add_timer')

@@ -3,7 +3,6 @@
 --     collector of entities of an executor. An address means what was there last before; what is
 --     reported late may come in any order, then what was there first after.
 -- grain: one row per callback group and executor
--- needs: staging.located, staging.executor_named
 WITH collected AS (
     SELECT event_id, process_id, executor_addr, entities_collector_addr
     FROM staging.located('ros2_caret_construct_static_executor')

@@ -4,7 +4,6 @@
 --     before `from_event_id` that was another life of the process. These are most of the events of
 --     many traces, which is why they are not copied.
 -- grain: one row per executor event
--- needs: staging.context, raw
 WITH event AS (
     SELECT
         event_id, ts_ns, thread_index, 'process' AS kind, previous_executor_event_id,

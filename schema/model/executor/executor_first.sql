@@ -1,7 +1,6 @@
 -- name: staging.executor_first
 -- description: Where the executor of each thread is first heard of.
 -- grain: one row per thread with executor events
--- needs: staging.executor_event
 SELECT thread_id, min(event_id) AS event_id
 FROM staging.executor_event
 GROUP BY thread_id

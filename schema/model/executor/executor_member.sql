@@ -4,9 +4,6 @@
 --     smallest thread of such a group stands for it. A thread that serves several executors by
 --     name belongs to the one of which it ran most.
 -- grain: one row per thread that runs callbacks or emits executor events
--- needs: staging.callback_run, staging.callback_pair, staging.callback_number,
---     staging.callback_group_entry, staging.callback_group_owner, staging.executor_first,
---     staging.thread
 WITH RECURSIVE served AS (
     SELECT e.callback_id, g.executor_event_id
     FROM staging.callback_group_entry AS e

@@ -2,7 +2,6 @@
 -- description: Executors that name themselves (CARET), and those of which only the address is
 --     known, their construction not being traced.
 -- grain: one row per executor
--- needs: staging.located
 WITH constructed AS (
     SELECT event_id, process_id, executor_addr, executor_type_name AS kind
     FROM staging.located('ros2_caret_construct_executor')

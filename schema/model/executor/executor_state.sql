@@ -3,8 +3,6 @@
 -- description: The literal reading of the executor's three events: a state lasts until the next
 --     such event of the thread; the last one of a thread, or before a gap, has no end.
 -- grain: one row per executor event
--- needs: staging.executor_event, staging.behind_gap, staging.executor_thread,
---     staging.executor_callback
 WITH state AS (
     SELECT
         e.thread_id,

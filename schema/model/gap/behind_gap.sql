@@ -5,7 +5,6 @@
 --     what executors say of themselves, a loss on any CPU. Nothing else tells that a state lasted,
 --     while a callback that begins and ends is most likely one instance, and marked.
 -- grain: one row per event and sequence that a gap interrupts
--- needs: staging.near_gap
 SELECT event_id, thread_index, sequence
 FROM staging.near_gap
 WHERE is_between OR sequence = 'executor'

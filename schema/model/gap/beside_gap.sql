@@ -4,8 +4,6 @@
 --     CPU came before, once its process was there. What such an event belongs to may have lost a
 --     part.
 -- grain: one row per such event and side
--- needs: staging.callback_gap, staging.predecessor, staging.event, staging.thread,
---     staging.process, staging.recording_gap, staging.exposed_trace
 WITH last_gap AS (
     SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
     FROM staging.recording_gap

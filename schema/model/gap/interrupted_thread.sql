@@ -2,7 +2,6 @@
 -- description: Threads with a gap between events of theirs, and those of several lives of their
 --     process.
 -- grain: one row per such thread, as events name it
--- needs: staging.near_gap, staging.context
 WITH interrupted AS (
     SELECT thread_index FROM staging.near_gap
     UNION

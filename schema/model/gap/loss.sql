@@ -7,7 +7,6 @@
 --     number tells; and behind the last, where others have later events: stopping flushes a packet
 --     into every stream.
 -- grain: one row per stretch of time in which a stream lost something
--- needs: staging.stream_packet, staging.source
 WITH lossy_packet AS (
     SELECT
         *,

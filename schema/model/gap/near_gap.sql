@@ -4,8 +4,6 @@
 --     that the record of the thread is interrupted. Else on other CPUs only, which the thread may
 --     have visited meanwhile.
 -- grain: one row per event and sequence
--- needs: staging.predecessor, staging.event, staging.exposed_trace, staging.recording_gap,
---     staging.gap, staging.recording
 WITH exposed AS (
     SELECT
         e.event_id, e.thread_index, e.trace_index, e.sequence, e.ts_ns, e.cpu_id,

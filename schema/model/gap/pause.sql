@@ -6,8 +6,6 @@
 --     or a second before and after. Nor is it one where the numbers of all streams skip packets
 --     meanwhile: those are lost.
 -- grain: one row per pause of a recording
--- needs: staging.silence, staging.stream_packet, staging.recording, staging.source, staging.event,
---     staging.pause_limit
 
 -- When packets were ended before they were full.
 WITH ending AS (

@@ -4,7 +4,6 @@
 --     the tracer; the next ones begin with their first events. What comes after the last packet
 --     with events is left out.
 -- grain: one row per silence of a recording
--- needs: staging.stream_packet, staging.pause_limit
 WITH covered AS (
     SELECT
         trace_id,

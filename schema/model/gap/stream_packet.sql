@@ -2,7 +2,6 @@
 -- description: Packets in the order of their stream, with when the one before ended. Kernel traces
 --     are left out: what they lost is missing from no process.
 -- grain: one row per packet of a trace of user space
--- needs: staging.packet, staging.recording, staging.source
 SELECT
     *,
     lag(known_end_ns) OVER (

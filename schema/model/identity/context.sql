@@ -1,7 +1,6 @@
 -- name: staging.context
 -- description: Which thread and process an event is of, by where it says that it happened.
 -- grain: one row per thread of a process life
--- needs: staging.thread_life, staging.process, staging.thread
 SELECT
     l.thread_index,
     l.from_event_id,

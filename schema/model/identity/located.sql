@@ -2,7 +2,6 @@
 -- kind: macro
 -- description: The events of one tracepoint with the thread and process that they happened in.
 -- grain: one row per event of the tracepoint
--- needs: staging.context, raw
 CREATE OR REPLACE MACRO staging.located(tracepoint) AS TABLE
 SELECT e.*, c.thread_id, c.process_id
 FROM query_table('raw.' || tracepoint) AS e

@@ -2,7 +2,6 @@
 -- description: Nodes. A handle that objects name but that was never initialised in the trace gets
 --     a row without a name.
 -- grain: one row per ROS node
--- needs: staging.located, staging.node_use
 WITH known AS (
     SELECT
         event_id,

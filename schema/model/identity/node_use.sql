@@ -3,7 +3,6 @@
 --     it, except that an object created inside its node belongs to the one right after, and that
 --     any later one is better than none.
 -- grain: one row per object or timer link that names a node
--- needs: staging.located, staging.construction
 WITH use AS (
     SELECT event_id, process_id, node_handle FROM staging.located('ros2_rcl_publisher_init')
     UNION ALL

@@ -2,7 +2,6 @@
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
 --     thread seen; the version is what rcl_init stated, for display only.
 -- grain: one row per process life
--- needs: staging.thread_life, raw
 WITH life AS (
     SELECT
         host_id,

@@ -5,7 +5,6 @@
 --     that seem to go on prove nothing in the first case: containers number them alike in every
 --     life.)
 -- grain: one row per host, PID namespace, pid and life
--- needs: staging.thread_presence, staging.thread_seen, raw
 WITH initialisation AS (
     SELECT
         p.host_id,

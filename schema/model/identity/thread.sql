@@ -1,7 +1,6 @@
 -- name: staging.thread
 -- description: Threads of all processes.
 -- grain: one row per thread
--- needs: staging.thread_life, staging.process
 SELECT
     row_number() OVER (ORDER BY t.first_event_id) AS thread_id,
     p.process_id,

@@ -1,7 +1,6 @@
 -- name: staging.thread_presence
 -- description: When each thread was seen, by the name that it had then. A name may come again.
 -- grain: one row per stretch of events of a thread under one name
--- needs: raw, staging.thread_seen
 SELECT
     s.thread_index,
     s.host_id,

@@ -4,7 +4,6 @@
 --     which may be known; else it is a placeholder by the first dequeue. Where several callbacks
 --     follow on one buffer, or one on several, nobody can tell (NULL).
 -- grain: one row per process and ring buffer without a known subscription
--- needs: staging.take_subscription, staging.callback_binding
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, t.buffer_handle
     FROM staging.take_subscription AS t

@@ -3,7 +3,6 @@
 --     before Jazzy /rosout is. Where a node handle is used again, what came first on the handle
 --     tells the two orders apart.
 -- grain: one row per initialisation event that names a node
--- needs: staging.located
 WITH initialisation AS (
     SELECT event_id, process_id, thread_id, 'node' AS kind, node_handle
     FROM staging.located('ros2_rcl_node_init')

@@ -1,7 +1,6 @@
 -- name: staging.is_internal_service
 -- kind: macro
 -- description: Whether a service is infrastructure of ROS: parameters, lifecycle, type description.
--- needs: raw
 CREATE OR REPLACE MACRO staging.is_internal_service(service_name) AS
 coalesce(
     regexp_extract(service_name, '[^/]*$') IN (

@@ -1,7 +1,6 @@
 -- name: staging.is_internal_topic
 -- kind: macro
 -- description: Whether a topic is infrastructure of ROS rather than of the application.
--- needs: raw
 CREATE OR REPLACE MACRO staging.is_internal_topic(topic_name) AS
 coalesce(
     topic_name IN ('/rosout', '/parameter_events', 'ros_discovery_info')

@@ -3,8 +3,6 @@
 --     (first 16 bytes; all zeros: none) and, where DDS is instrumented, their writer: by GID, or
 --     where one of the two has none, by topic. A writer is that of one publisher.
 -- grain: one row per rcl_publisher_init
--- needs: staging.located, staging.object_node, staging.gid_bytes,
---     staging.is_internal_topic
 WITH rmw_init AS (
     SELECT
         event_id, ts_ns, process_id, rmw_publisher_handle,

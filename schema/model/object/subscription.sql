@@ -2,7 +2,6 @@
 -- description: Subscriptions. A handle that messages were taken with but that was never
 --     initialised in the trace gets a row without topic, as does the reader of a ring buffer.
 -- grain: one row per subscription
--- needs: staging.subscription_known, staging.take_origin, staging.take_inferred
 WITH every_subscription AS (
     SELECT
         event_id, process_id, node_id, topic_name, subscription_handle, rmw_handle, gid,

@@ -1,7 +1,6 @@
 -- name: staging.subscription_known
 -- description: Subscriptions whose rcl initialisation was traced, with rmw handle and GID.
 -- grain: one row per rcl_subscription_init
--- needs: staging.located, staging.object_node, staging.gid_bytes, staging.is_internal_topic
 WITH rmw_init AS (
     SELECT
         event_id, ts_ns, process_id, rmw_subscription_handle,

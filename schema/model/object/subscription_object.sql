@@ -4,7 +4,6 @@
 --     to its initialisation in the same construction (since the thread's last
 --     rcl_subscription_init), before or after; else to the latest before, else to the first after.
 -- grain: one row per event that names an rclcpp subscription object
--- needs: staging.located, staging.subscription_known
 WITH construction AS (
     SELECT event_id AS construction_event_id, thread_id FROM staging.subscription_known
 ),

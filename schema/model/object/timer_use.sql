@@ -2,7 +2,6 @@
 -- description: Which timer each event means that names an rcl timer handle: the one initialised
 --     last before, else a placeholder by the first use of the handle.
 -- grain: one row per event that attaches a callback or a node to a timer
--- needs: staging.located
 WITH use AS (
     SELECT event_id, process_id, timer_handle
     FROM staging.located('ros2_rclcpp_timer_callback_added')

@@ -2,7 +2,6 @@
 -- description: Clocks by uuid (LTTng: the boot). A trace without one has a clock of its own, by
 --     hostname. No correction is known at ingest.
 -- grain: one row per clock
--- needs: staging.source
 SELECT
     row_number() OVER (ORDER BY min(trace_index)) AS clock_id,
     any_value(clock_uuid) AS uuid,

@@ -1,7 +1,6 @@
 -- name: staging.packet
 -- description: Packets as read. What opens without a begin is taken to begin with its trace.
 -- grain: one row per packet of a trace
--- needs: raw, staging.source
 SELECT
     p.trace_index,
     p.trace_index + 1 AS trace_id,

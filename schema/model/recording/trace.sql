@@ -1,7 +1,6 @@
 -- name: staging.trace
 -- description: Traces read, with what their packets and events say of their extent.
 -- grain: one row per CTF trace
--- needs: staging.source, staging.clock, staging.host, staging.packet
 WITH extent AS (
     SELECT
         trace_index,

@@ -2,8 +2,6 @@
 -- description: Service clients. A handle that was used but never initialised in the trace gets a
 --     row without node, and the name of the service that it turned out to call.
 -- grain: one row per client
--- needs: staging.client_known, staging.client_event, staging.client_gid, staging.service_use,
---     staging.service_known, staging.is_internal_service
 WITH learned AS (
     SELECT u.client_event_id, mode(s.service_name ORDER BY s.service_name) AS service_name
     FROM staging.service_use AS u

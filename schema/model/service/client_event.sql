@@ -1,7 +1,6 @@
 -- name: staging.client_event
 -- description: Requests that clients sent and responses that they took, each with its client.
 -- grain: one row per rmw_send_request or successful rmw_take_response
--- needs: staging.of_endpoint, staging.client_known, raw
 WITH event AS NOT MATERIALIZED (
     SELECT
         event_id, ts_ns, thread_index, true AS is_request, rmw_client_handle AS handle,

@@ -2,8 +2,6 @@
 -- description: The GID of each client. One whose initialisation was not traced learns it from the
 --     responses that it took: the number and stamp of a response tell which was sent to it.
 -- grain: one row per client with a GID
--- needs: staging.client_known, staging.client_event, staging.client_gid_init,
---     staging.service_event
 WITH inferred AS (
     SELECT client_event_id AS event_id, process_id, rmw_handle
     FROM staging.client_event

@@ -2,7 +2,6 @@
 -- description: Service clients whose initialisation was traced, with the GID by which servers know
 --     them (since Kilted).
 -- grain: one row per rcl_client_init
--- needs: staging.located, staging.object_node, staging.client_gid_init
 SELECT
     c.event_id,
     c.process_id,

@@ -5,7 +5,6 @@
 --     Both are the names of tables: events as recorded, with the rmw `handle` they are of, and the
 --     initialised objects.
 -- grain: one row per event
--- needs: staging.context, staging.with_latest
 CREATE OR REPLACE MACRO staging.of_endpoint(events, objects) AS TABLE
 WITH located AS NOT MATERIALIZED (
     SELECT e.*, c.thread_id, c.process_id

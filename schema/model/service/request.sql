@@ -1,7 +1,6 @@
 -- name: staging.request
 -- description: Requests; a side that was not traced is NULL.
 -- grain: one row per request and service that took it; one per request that no service took
--- needs: staging.request_origin, staging.client, staging.service, staging.callback_number
 SELECT
     q.request_id,
     c.client_id,

@@ -2,8 +2,6 @@
 -- description: Every request with what was traced of it, numbered in the order of sending: both
 --     ends, or only one, and the instance of the service callback.
 -- grain: one row per request and service that took it; one per request that no service took
--- needs: staging.request_pair, staging.client_event, staging.service_event,
---     staging.request_callback, staging.client_gid
 WITH found AS (
     SELECT send_event_id, take_event_id FROM staging.request_pair
     UNION ALL

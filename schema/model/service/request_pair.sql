@@ -4,8 +4,6 @@
 --     the response tells which request it was, else the order, if as many were taken by a service
 --     as were sent.
 -- grain: one row per request and service that took it, of which both ends were traced
--- needs: staging.service_event, staging.client_event, staging.client_gid, staging.response_pair,
---     staging.response_request
 WITH sent AS (
     SELECT e.event_id, g.gid, e.sequence_number
     FROM staging.client_event AS e

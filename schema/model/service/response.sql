@@ -1,7 +1,6 @@
 -- name: staging.response
 -- description: Responses; a side that was not traced is NULL.
 -- grain: one row per response
--- needs: staging.response_origin, staging.client, staging.service, staging.callback_number
 SELECT
     r.response_id,
     c.client_id,

@@ -2,8 +2,6 @@
 -- description: Every response with what was traced of it, numbered in the order of sending, and the
 --     request that it answers.
 -- grain: one row per response
--- needs: staging.response_pair, staging.response_request, staging.request_origin,
---     staging.client_event, staging.service_event, staging.client_gid
 WITH found AS (
     SELECT send_event_id, take_event_id FROM staging.response_pair
     UNION ALL

@@ -3,7 +3,6 @@
 --     request, and the stamp; without a stamp on one of the sides, where only one comes into
 --     question. Of equal ones the k-th sent is the k-th taken.
 -- grain: one row per response of which both ends were traced
--- needs: staging.service_event, staging.client_event, staging.client_gid
 WITH sent AS (
     SELECT
         event_id, gid, sequence_number, source_timestamp_ns,

@@ -2,8 +2,6 @@
 -- description: Callback instances that requests and responses were sent in: the innermost on the
 --     thread that had begun and was not over.
 -- grain: one row per request or response sent inside a callback instance
--- needs: staging.client_event, staging.service_event, staging.callback_run,
---     staging.callback_number, staging.callback_parent
 WITH send AS (
     SELECT event_id, thread_id FROM staging.client_event WHERE is_request
     UNION ALL

@@ -2,9 +2,6 @@
 -- description: Services. One that was used but never initialised in the trace gets a row without
 --     node, and the name that its clients call it by.
 -- grain: one row per service
--- needs: staging.service_known, staging.service_event, staging.service_use,
---     staging.client_known, staging.is_internal_service, staging.callback_owner,
---     staging.callback_known, staging.callback_binding, staging.request_callback
 WITH learned AS (
     SELECT u.service_event_id, mode(c.service_name ORDER BY c.service_name) AS service_name
     FROM staging.service_use AS u

@@ -1,7 +1,6 @@
 -- name: staging.service_known
 -- description: Services whose initialisation was traced. No tracepoint tells their GID.
 -- grain: one row per rcl_service_init
--- needs: staging.located, staging.object_node
 SELECT
     s.event_id,
     s.process_id,

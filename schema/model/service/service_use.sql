@@ -1,8 +1,6 @@
 -- name: staging.service_use
 -- description: Which clients called which services, as requests and responses show.
 -- grain: one row per client and service
--- needs: staging.request_pair, staging.response_pair, staging.client_event,
---     staging.service_event
 SELECT DISTINCT c.client_event_id, s.service_event_id
 FROM (
     SELECT send_event_id AS client_end, take_event_id AS service_end FROM staging.request_pair

@@ -12,7 +12,6 @@
 -- column: drift_uncertainty_ppb BIGINT [1e-9]  Not known
 -- column: reference_clock_id BIGINT  None
 -- column: method VARCHAR  none
--- needs: store.clock, store.host, store.trace
 SELECT
     c.clock_id,
     0::BIGINT AS offset_ns,

@@ -8,7 +8,6 @@
 -- column: hosts VARCHAR  Its hosts
 -- column: least_ms DOUBLE [ms]  Bound where it is known best; NULL: a file gave the correction
 -- column: greatest_ms DOUBLE [ms]  Bound where it is known worst
--- needs: main.clock, main.clock_uncertainty, program.clock_host
 WITH known AS (
     SELECT clock_id, min(uncertainty_ns) AS least_ns, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty

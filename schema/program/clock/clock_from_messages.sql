@@ -5,7 +5,6 @@
 --     and how far it can be wrong at some moments, a list.
 -- grain: one row per clock
 -- param: run_id BIGINT  Run
--- needs: derive.clock_sync
 SELECT
     clock_id,
     offset_ns,

@@ -9,8 +9,6 @@
 -- column: clocks BIGINT  How many
 -- column: greatest_ms DOUBLE [ms]  Most by which two of them can differ; NULL: not known
 -- column: is_tried BOOLEAN  Messages did not suffice to bring the clocks of the run together
--- needs: main.clock, main.clock_uncertainty, main.diagnostic, derive.clock_group_id,
---     program.clock_host
 WITH known AS (
     SELECT clock_id, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty

@@ -5,7 +5,6 @@
 -- kind: inline
 -- column: clock_id BIGINT  Clock
 -- column: hosts VARCHAR  Its hosts
--- needs: main.host
 SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
 FROM main.host
 GROUP BY clock_id

@@ -7,7 +7,6 @@
 -- column: clock_id BIGINT  Clock
 -- column: uuid VARCHAR  Its UUID
 -- column: hostnames VARCHAR[]  Hosts
--- needs: main.clock, main.host
 SELECT c.clock_id, c.uuid, list(h.hostname ORDER BY h.host_id) AS hostnames
 FROM main.clock AS c
 JOIN main.host AS h ON c.clock_id = h.clock_id

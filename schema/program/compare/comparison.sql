@@ -19,7 +19,6 @@
 -- param: max_depth INTEGER {1..} = 32  Longest path, in topics
 -- param: max_paths INTEGER {1..} = 1000  Maximum number of paths, shortest first; also the limit on
 --     chains of each length
--- needs: main.comparison
 FROM main.comparison(
     $what, $run_a, $run_b, from_topic := $from, to_topic := $to, wanted_case := $case,
     skip_ns := round($skip_first * 1e9)::BIGINT, confidence := $confidence,

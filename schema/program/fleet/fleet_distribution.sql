@@ -14,8 +14,6 @@
 -- column: is_internal BOOLEAN  Infrastructure of ROS
 -- column: bucket BIGINT  Bucket of the times, in their order
 -- column: count BIGINT  Times in it
--- needs: main.callback_instance, main.callback_label, main.executor_wait, main.take,
---     main.link_transport, main.subscription, main.node, main.process
 WITH instance AS (
     SELECT
         run_id,

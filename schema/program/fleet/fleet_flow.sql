@@ -22,7 +22,6 @@
 -- column: is_last BOOLEAN  Last arrival of the root
 -- column: is_newest BOOLEAN  Newest root of the arrival
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
--- needs: main.end_to_end, main.flow_path
 SELECT
     e.run_id,
     p.path,

@@ -5,7 +5,6 @@
 -- grain: one row
 -- param: runs BIGINT[]  One run
 -- column: run VARCHAR  Key of the run; NULL: it has no packets
--- needs: store.packet, store.trace
 SELECT
     left(sha256(string_agg(packet, chr(10) ORDER BY packet)), 20) AS run
 FROM (

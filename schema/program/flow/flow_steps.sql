@@ -12,7 +12,6 @@
 --     requests and responses
 -- param: internal BOOLEAN = false  Follow effects on topics and services of ROS itself too
 -- param: run_id BIGINT  Its run
--- needs: main.executor_wait, main.flow_step
 SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
     s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
     s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,

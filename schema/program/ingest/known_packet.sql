@@ -2,7 +2,6 @@
 -- title: Runs with packets that were just read
 -- description: Runs of the database that hold packets of `packet_batch`, which were just read.
 -- grain: one row per such run
--- needs: store.trace, store.packet, store.run
 SELECT DISTINCT r.run_id, r.name
 FROM packet_batch AS b
 JOIN staging.source AS s ON b.trace_index = s.trace_index

@@ -8,7 +8,6 @@
 -- column: process_id BIGINT  Process that declares it
 -- column: inputs BIGINT[]  Subscriptions, in order; NULL: none
 -- column: outputs BIGINT[]  Publishers, in order; NULL: none
--- needs: store.annotation, store.annotation_input, store.annotation_output
 SELECT
     a.kind,
     a.process_id,

@@ -5,7 +5,6 @@
 -- param: run_id BIGINT  Run
 -- column: of_file BIGINT  Links that a file declares
 -- column: of_trace BIGINT  Links that the trace declares
--- needs: store.link_causal, store.annotation
 SELECT
     count(*) FILTER (WHERE a.source = 'file') AS of_file,
     count(*) FILTER (WHERE a.source = 'trace') AS of_trace

@@ -7,7 +7,6 @@
 -- column: parent BIGINT  Track of its process
 -- column: name VARCHAR  What Perfetto calls it
 -- column: unit VARCHAR  What its values are in
--- needs: main.publisher, main.subscription
 SELECT publisher_id * 8 + 4 AS track, process_id * 8 + 1 AS parent,
     'rate of ' || coalesce(topic_name, '?') AS name, 'Hz' AS unit
 FROM main.publisher

@@ -11,7 +11,6 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 -- column: event_count BIGINT  Events lost, where the tracer counted them
--- needs: main.host, main.gap, main.trace
 WITH gap AS (
     SELECT
         t.host_id, g.kind, g.event_count,

@@ -6,7 +6,6 @@
 -- column: code INTEGER  What kind of slice has it
 -- column: id BIGINT  Of the callback, publisher, subscription, client, service or state
 -- column: name VARCHAR  The name
--- needs: main.callback_label, main.client, main.publisher, main.service, main.subscription
 SELECT 0 AS code, callback_id AS id, node || ' ' || label AS name
 FROM main.callback_label
 WHERE run_id = $run_id

@@ -1,5 +1,6 @@
 -- name: program.perfetto_process
 -- title: Processes in Perfetto
+-- kind: inline
 -- description: The tracks of processes. Two processes (of two hosts, or lives) may have one pid;
 --     Perfetto would take them for one.
 -- grain: one row per process
@@ -7,7 +8,6 @@
 -- column: track BIGINT  Its track
 -- column: pid BIGINT  Its pid, or a number of its own where several have that pid
 -- column: name VARCHAR  What Perfetto calls it
--- needs: main.host, main.process
 SELECT
     p.process_id * 8 + 1 AS track,
     CASE WHEN count(*) OVER (PARTITION BY p.pid) = 1 THEN p.pid

@@ -16,8 +16,6 @@
 -- column: symbol_id BIGINT  Callback whose symbol it has; NULL: none
 -- column: outgoing UBIGINT[]  Links that begin there
 -- column: incoming UBIGINT[]  Links that end there
--- needs: main.callback, main.callback_instance, main.executor_state, main.flow_edge,
---     main.publication, main.request, main.response, main.take
 WITH slice AS MATERIALIZED (
     SELECT
         i.thread_id * 8 + 2 AS track, i.start_ns, coalesce(i.end_ns, i.start_ns) AS end_ns,

@@ -5,7 +5,6 @@
 -- param: run_id BIGINT  Run
 -- column: id BIGINT  Callback
 -- column: name VARCHAR  Its symbol
--- needs: main.callback
 SELECT callback_id AS id, symbol AS name
 FROM main.callback
 WHERE run_id = $run_id AND symbol IS NOT NULL

@@ -10,7 +10,6 @@
 -- column: name VARCHAR  What Perfetto calls it
 -- column: has_states BOOLEAN  States of an executor were recorded on it
 -- column: state_track BIGINT  Their track
--- needs: main.executor_state, main.thread, program.perfetto_process
 SELECT
     t.thread_id * 8 + 2 AS track,
     p.track AS parent,

@@ -10,7 +10,6 @@
 -- column: at_ns BIGINT [epoch ns]  When
 -- column: value DOUBLE  In the unit of the track
 -- column: place BIGINT  Order of what is at one moment
--- needs: main.link_transport, main.publication, main.take
 WITH rate AS (
     SELECT
         publisher_id * 8 + 4 AS track, start_ns AS at_ns,

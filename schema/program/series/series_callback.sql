@@ -9,7 +9,6 @@
 -- column: at_ns BIGINT [epoch ns]  Its start
 -- column: subject VARCHAR  Node and label of the callback
 -- column: value_ns BIGINT [ns]  Duration
--- needs: main.callback_instance, main.callback_label
 SELECT i.start_ns AS at_ns, l.node || ' ' || l.label || CASE
     WHEN min(i.callback_id) OVER (PARTITION BY l.node, l.label)
         <> max(i.callback_id) OVER (PARTITION BY l.node, l.label)

@@ -9,7 +9,6 @@
 -- column: at_ns BIGINT [epoch ns]  Start of the flow
 -- column: subject VARCHAR  Nodes and topics of the path
 -- column: value_ns BIGINT [ns]  Latency
--- needs: main.end_to_end, main.flow_path
 SELECT e.root_ns AS at_ns, p.path || CASE WHEN count(*) OVER (PARTITION BY p.path)
     > count(*) OVER (PARTITION BY p.path_id) THEN ' #' || p.path_id ELSE '' END AS subject,
     e.latency_ns AS value_ns

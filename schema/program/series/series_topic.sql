@@ -9,7 +9,6 @@
 -- column: at_ns BIGINT [epoch ns]  The take
 -- column: subject VARCHAR  Topic and node of the subscription
 -- column: value_ns BIGINT [ns]  Latency
--- needs: main.link_transport, main.node, main.subscription, main.take
 SELECT t.taken_ns AS at_ns, coalesce(s.topic_name, '?') || ' → ' || coalesce(n.full_name, '?')
     || CASE WHEN min(t.subscription_id) OVER (PARTITION BY s.topic_name, n.full_name)
         <> max(t.subscription_id) OVER (PARTITION BY s.topic_name, n.full_name)

@@ -9,7 +9,6 @@
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity
 -- column: kind VARCHAR  What it is: 'callback_instance'
--- needs: main.callback_instance
 SELECT
     end_ns - start_ns AS duration_ns,
     start_ns AS at_ns,

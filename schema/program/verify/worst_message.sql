@@ -10,7 +10,6 @@
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity
 -- column: kind VARCHAR  What it is: 'take'
--- needs: main.link_transport, main.take
 SELECT l.latency_ns AS duration_ns, t.taken_ns AS at_ns, t.take_id AS id, 'take' AS kind
 FROM main.link_transport AS l
 JOIN main.take AS t ON l.take_id = t.take_id

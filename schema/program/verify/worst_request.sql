@@ -10,7 +10,6 @@
 -- column: at_ns BIGINT [epoch ns]  When it began
 -- column: id BIGINT  Its identity
 -- column: kind VARCHAR  What it is: 'request'
--- needs: main.request, main.response
 SELECT
     p.taken_ns - q.sent_ns AS duration_ns,
     q.sent_ns AS at_ns,

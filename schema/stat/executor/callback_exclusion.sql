@@ -3,8 +3,6 @@
 --     of a mutually exclusive callback group, where the trace tells of groups. Elsewhere a
 --     callback is assumed to exclude only itself, unless it was seen to run beside itself.
 -- grain: one row per callback that something excludes
--- needs: derive.executor_run, derive.executor_size, store.callback_group,
---     store.callback_group_member
 WITH run AS (
     SELECT r.run_id, r.callback_id, r.start_ns, r.end_ns, r.callback_instance_id
     FROM derive.executor_run AS r

@@ -10,8 +10,6 @@
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
--- needs: derive.callback_release, derive.executor_poll, derive.executor_size,
---     store.executor_thread, store.executor_state, store.thread_break
 CREATE OR REPLACE MACRO derive.callback_ready(executors) AS TABLE
 WITH sized AS (
     SELECT e.executor_id, e.until_ns, s.thread_count

@@ -9,9 +9,6 @@
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
--- needs: store.callback_instance, store.executor_thread, store.callback, store.timer,
---     store.subscription, store.take, store.link_transport, store.publication, store.request,
---     store.thread, derive.clock_comparable, derive.process_clock, derive.corrected_ns
 CREATE OR REPLACE MACRO derive.callback_release(executors) AS TABLE
 -- A callback may have run elsewhere before.
 WITH every_run AS (

@@ -3,7 +3,6 @@
 --     executor was free, because a callback of one excludes that of the other. With the sum of
 --     all such time before.
 -- grain: one row per callback instance in an executor of several threads that excludes some
--- needs: derive.executor_run, derive.callback_exclusion, derive.executor_full, derive.executor_size
 WITH run AS (
     SELECT
         r.run_id, r.executor_id, e.kind, e.exclusion_id, r.callback_instance_id, r.start_ns,

@@ -3,7 +3,6 @@
 --     each of them ran one. With the sum of all such time before. Of an executor of one
 --     thread each is one callback instance.
 -- grain: one row per stretch in which all threads of an executor ran callbacks
--- needs: derive.executor_full, derive.executor_run, derive.executor_size
 SELECT
     run_id, executor_id, start_ns, end_ns, NULL::BIGINT AS callback_instance_id,
     NULL::BIGINT AS previous_end_ns, before_ns

@@ -2,7 +2,6 @@
 -- description: Stretches of time in which all threads of an executor of several ran callbacks. With
 --     the sum of all such time before.
 -- grain: one row per such stretch
--- needs: derive.executor_run, derive.executor_size
 WITH edge AS (
     SELECT r.run_id, r.executor_id, r.start_ns AS at_ns, 1 AS step
     FROM derive.executor_run AS r

@@ -5,7 +5,6 @@
 --     are few.
 -- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
--- needs: derive.executor_run, store.executor_thread
 CREATE OR REPLACE MACRO derive.executor_meanwhile(waits) AS TABLE
 WITH waiting AS (
     SELECT

@@ -8,7 +8,6 @@
 -- grain: one row per wait of an executor that was seen to end
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Waits that
 --     began after the last of these moments are left out (where all are NULL: none)
--- needs: store.executor_state, store.callback_instance, derive.executor_run
 CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
 WITH wait AS (
     SELECT run_id, executor_id, thread_id, start_ns, end_ns

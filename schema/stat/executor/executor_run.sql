@@ -4,7 +4,6 @@
 --     overlap on one thread, and the sum over any stretch of time takes only two look-ups. Times
 --     are those of the executor's clock.
 -- grain: one row per callback instance that is not nested in another
--- needs: store.callback_instance, store.executor_thread
 SELECT
     i.run_id,
     x.executor_id,

@@ -4,9 +4,6 @@
 --     main.executor_wait.
 -- grain: one row per waiting callback instance
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
--- needs: derive.executor_busy, derive.executor_poll,
---     derive.executor_blocked, derive.callback_exclusion, store.thread,
---     derive.process_clock, derive.corrected_ns
 CREATE OR REPLACE MACRO derive.executor_waits(waits) AS TABLE
 WITH stretch AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns, callback_instance_id, previous_end_ns
