@@ -91,7 +91,7 @@ def command(
             envvar="MSGFLOW_MEMORY_LIMIT",
             metavar="SIZE",
             help="Maximum memory for the database, such as 2GB; more makes large traces faster",
-            show_default="grows with need",
+            show_default="a quarter of the machine's, 500MB to 4GB",
         ),
     ] = None,
     quiet: Annotated[

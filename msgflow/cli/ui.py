@@ -33,7 +33,7 @@ def command(
             envvar="MSGFLOW_MEMORY_LIMIT",
             metavar="SIZE",
             help="Maximum memory for queries",
-            show_default="250MB, more while a query needs it",
+            show_default="a quarter of the machine's, 500MB to 4GB",
         ),
     ] = None,
     lake: LakePageOption = None,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def connect(
-    path: Path, *, read_only: bool, memory_limit: str | None = None, may_grow: bool = False
+    path: Path, *, read_only: bool, memory_limit: str | None = None
 ) -> duckdb.DuckDBPyConnection:
     """Open an existing, current msgflow database.
 
@@ -27,14 +27,13 @@ def connect(
         path: the database file.
         read_only: open it for reading only; several processes can do so at once.
         memory_limit: most memory that DuckDB takes, such as '2GB'; DuckDB's default when None.
-        may_grow: the limit can be changed later: only where nobody else's SQL is run.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
-    con = open_file(path, read_only=read_only, memory_limit=memory_limit, may_grow=may_grow)
+    con = open_file(path, read_only=read_only, memory_limit=memory_limit)
     try:
         require_current(con, path)
     except BaseException:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.db.memory import limit_threads, set_memory_limit
-from msgflow.db.spill import most_spilled, remove_abandoned, spill_directory
+from msgflow.db.spill import remove_abandoned, spill_directory
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import in_words
@@ -23,12 +23,11 @@ STORAGE_VERSION = "v1.5.0"
 
 
 def open_file(
-    path: Path, *, read_only: bool, memory_limit: str | None = None, may_grow: bool = False
+    path: Path, *, read_only: bool, memory_limit: str | None = None
 ) -> duckdb.DuckDBPyConnection:
     """Open a DuckDB file, or create it, whatever is in it.
 
-    The connection reaches no other file and no network, and its settings cannot be changed,
-    but for the memory limit where that may grow.
+    The connection reaches no other file and no network, and its settings cannot be changed.
 
     Raises:
         DatabaseError: it is locked by another process, or no DuckDB file; or `memory_limit` is no
@@ -48,10 +47,8 @@ def open_file(
                 limit_threads(con)
                 _prepare(con)
                 con.execute("SET temp_directory = ?", [str(spill_directory(path))])
-                con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(path)}B"])
                 shut_in(con)
-                if not may_grow:
-                    con.execute("SET lock_configuration = true")
+                con.execute("SET lock_configuration = true")
             except BaseException:
                 con.close()  # nobody may meet it half prepared
                 raise

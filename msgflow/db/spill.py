@@ -14,18 +14,11 @@ from pathlib import Path
 from msgflow.owner import is_abandoned, mark
 
 _SUFFIX = ".spill"
-# Of what the disk has free: the rest is for what else goes on there.
-_MOST = 0.8
 
 
 def spill_directory(database: Path) -> Path:
     """Return where a connection of this process to `database` spills to; nothing is created."""
     return _place(database) / f"{_prefix(database)}{mark()}{_SUFFIX}"
-
-
-def most_spilled(database: Path) -> int:
-    """Return how many bytes may be spilled."""
-    return int(_MOST * shutil.disk_usage(_place(database)).free)
 
 
 def remove_abandoned(database: Path, *, is_ours_alone: bool) -> None:

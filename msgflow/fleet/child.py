@@ -193,7 +193,7 @@ def _failed(error: Exception, stage: str, seconds: float) -> Outcome:
 
 
 def _needs_memory(message: str) -> bool:
-    return "out of memory" in message.lower() or "more memory is needed" in message
+    return "out of memory" in message.lower() or "more memory" in message
 
 
 def _is_full(error: Exception, message: str) -> bool:

@@ -18,16 +18,19 @@ from msgflow.db import migrate
 from msgflow.db.check import run_checks
 from msgflow.db.connection import attach
 from msgflow.db.derive import derivation_hash, derive
-from msgflow.db.memory import Memory
+from msgflow.db.memory import (
+    default_limit,
+    ingest_memory_errors,
+    limit_threads,
+    set_memory_limit,
+)
 from msgflow.db.noted import note
 from msgflow.db.opening import open_memory, shut_in
 from msgflow.db.runs import require_run_name
-from msgflow.db.spill import most_spilled
 from msgflow.db.store import delete, store
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import judge, model, staging
-from msgflow.ingest.allocator import keep_freed_memory
 from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.names import fallback_name, free_name, hostnames_of, require_free_name
 from msgflow.links import declare_links, read_links
@@ -43,13 +46,6 @@ if TYPE_CHECKING:
     from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress
 
-# Where more is asked for at once, as for the table of a join, what statements before it freed goes
-# back to the system first. By default that is half a gigabyte, more than an ingest ever asks for.
-_MOST_BESIDE_FREED = "8MB"
-
-# As many events as another thread of the database is worth: below, statements take less time to run
-# than to be shared out.
-_EVENTS_PER_THREAD = 500_000
 # Below, the model is hardly more work than its planning, which one thread does for each statement.
 # Ctrl-C waits for what the second connection runs: a tenth of a second at most.
 _EVENTS_SIDE_BY_SIDE = 2_000_000
@@ -144,13 +140,14 @@ def ingest(
         reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
         strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
-        memory_limit: most memory that the database takes, such as '4GB'; when None it starts small
-            and grows where a statement needs more.
+        memory_limit: most memory that the database takes, such as '4GB'; when None a quarter of
+            that of the machine, at least 500 MB and at most 4 GB.
         progress: called every now and then.
 
     Raises:
         TraceError: a path holds no trace, or none that can be read and used.
-        DatabaseError: the database is locked, foreign, or of another schema revision.
+        DatabaseError: the database is locked, foreign, or of another schema revision; or the
+            traces need more memory.
         UsageError: the packets are in the database already, the name of the run is taken or means
             something else, a path is empty, or `links` or the file of `clock_sync` does not fit
             the traces.
@@ -161,8 +158,12 @@ def ingest(
     clocks = read_clock_sync(clock_sync)
     if database.is_symlink():
         database = Path(os.path.realpath(database))
-    keep_freed_memory()
-    with noted_interrupts() as interrupts, database_errors(database):
+    limit = memory_limit or default_limit()
+    with (
+        noted_interrupts() as interrupts,
+        database_errors(database),
+        ingest_memory_errors(limit),
+    ):
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
         with trace_package.open(paths, reader=reader, strict=strict) as traces:
@@ -175,27 +176,17 @@ def ingest(
                 _target(database, directory) as target,
                 contextlib.closing(open_memory()) as con,
             ):
-                memory = Memory(con, memory_limit)
-                memory.keep_freed()
-                con.execute(
-                    "SET allocator_bulk_deallocation_flush_threshold = ?", [_MOST_BESIDE_FREED]
-                )
+                set_memory_limit(con, limit)
+                limit_threads(con)
                 con.execute("SET temp_directory = ?", [str(directory)])
-                con.execute("SET max_temp_directory_size = ?", [f"{most_spilled(database)}B"])
-                con.execute("SET preserve_insertion_order = false")
-                # A checkpoint would fill up row groups of threads that ended early, and write most
-                # of what was just written once more.
-                con.execute("SET max_vacuum_tasks = 0")
                 if not target.is_new:
                     attach(con, target.path)
                     if name is not None and not replace:
                         require_free_name(con, name)
                 staging.attach(con, directory)
-                # Its settings stay open, for more memory, which nothing but our own SQL can reach.
                 shut_in(con, beside=[directory, *([keep_staging] if keep_staging else [])])
                 watch.enter("reading the traces")
-                # One inserts faster than the reader reads.
-                with memory.loading(), memory.threads(1), staging.writing(con):
+                with staging.writing(con):
                     loaded = load_traces(
                         con,
                         traces,
@@ -209,23 +200,19 @@ def ingest(
                 judge.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
                 events = sum(loaded.event_counts.values())
-                memory.make_room(events)
-                memory.keep_freed(events)
-                with memory.threads(1 + events // _EVENTS_PER_THREAD):
-                    run = interruptible(
+                run = interruptible(
+                    con,
+                    lambda: _write(
                         con,
-                        lambda: _write(
-                            con,
-                            memory,
-                            target,
-                            names,
-                            loaded,
-                            (declared, clocks),
-                            keep_staging,
-                            watch,
-                            interrupts,
-                        ),
-                    )
+                        target,
+                        names,
+                        loaded,
+                        (declared, clocks),
+                        keep_staging,
+                        watch,
+                        interrupts,
+                    ),
+                )
                 watch.enter("closing the database")
                 staging.leave(con)
                 warnings = _finished(con, database, target)
@@ -251,7 +238,6 @@ def _finished(con: duckdb.DuckDBPyConnection, database: Path, target: _Target) -
 
 def _write(
     con: duckdb.DuckDBPyConnection,
-    memory: Memory,
     target: _Target,
     names: tuple[str | None, str],
     loaded: Loaded,
@@ -263,13 +249,13 @@ def _write(
     watch.enter("building the model")
     with staging.writing(con), _created_meanwhile(target):
         is_small = sum(loaded.event_counts.values()) < _EVENTS_SIDE_BY_SIDE
-        model.build(con, memory, keep=keep_staging is not None, is_small=is_small)
+        model.build(con, keep=keep_staging is not None, is_small=is_small)
     if target.is_new:
         attach(con, target.path, is_new=True)
     if keep_staging is not None:
         watch.enter("writing the staged events")
         staging.export(con, keep_staging)
-    return memory.run(lambda: _write_run(con, names, loaded, given, watch, interrupts))
+    return _write_run(con, names, loaded, given, watch, interrupts)
 
 
 def _write_run(
@@ -311,8 +297,6 @@ def _store(
         replaced |= {number for (number,) in named}
     store(con, run_id)
     delete(con, sorted(replaced))
-    if replaced:
-        con.execute("RESET max_vacuum_tasks")  # their room is used again
     run_name = name or free_name(con, fallback)
     con.execute(
         "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, "

@@ -23,13 +23,11 @@ from msgflow.sql.parsed import parsed
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from msgflow.db.memory import Memory
     from msgflow.sql.header import Header
 
 
 def build(
     con: duckdb.DuckDBPyConnection,
-    memory: Memory,
     *,
     keep: bool = False,
     is_small: bool = False,
@@ -38,7 +36,6 @@ def build(
 
     Args:
         con: connection with `raw` and `staging` attached and filled.
-        memory: the memory limit of `con`.
         keep: keep what was read and what only other objects of the model need; else it goes once
             they are built.
         is_small: of so few events that most of the time DuckDB plans, in one thread: two
@@ -46,7 +43,7 @@ def build(
     """
     restore(con)
     headers = objects.load("model")
-    growing = Growing(con, memory.run)
+    growing = Growing(con)
     staging.narrow(con, growing.empty)
     created = _create_side_by_side(con, headers, growing) if is_small else set()
     dropped: set[str] = set()

@@ -7,7 +7,6 @@ the host is still this machine.
 
 from __future__ import annotations
 
-import ctypes
 import hmac
 import html
 import ipaddress
@@ -17,7 +16,6 @@ import socket
 import threading
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 import anyio
@@ -29,7 +27,7 @@ from starlette.responses import JSONResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Route
 
 from msgflow.db.connection import connect
-from msgflow.db.memory import Memory
+from msgflow.db.memory import default_limit
 from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 from msgflow.query.run import first_line
 from msgflow.view import assets
@@ -44,11 +42,6 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
-# Enough for most of what pages ask of ten million events. What needs more gets it, alone.
-USUAL_MEMORY = "160MB"
-# By how much its limit grows: a little at first, as that mostly suffices and decides how large the
-# server gets; then a lot, as each try works nearly to its end before it fails.
-_GROWTH = (1.25, 1.3, 2.6)
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1
@@ -85,14 +78,9 @@ class Identity:
 
 
 class Turns:
-    """Lets questions run together; one that then has too little memory is asked again, alone.
+    """Lets questions run together; one that then has too little memory is asked again, alone."""
 
-    Then one thread works for it, which needs less: each thread keeps partitions of its own. Where
-    that does not suffice, the memory limit grows, as far as it may.
-    """
-
-    def __init__(self, memory: Memory) -> None:
-        self._memory = memory
+    def __init__(self) -> None:
         self._changed = threading.Condition()
         self._running = 0
         self._is_alone = False
@@ -107,20 +95,13 @@ class Turns:
             answer = _if_memory_suffices(question)
         if answer is not None:
             return answer
-        # Each thread takes memory of its own.
-        with self._turn(alone=True), self._memory.threads(1):
-            try:
-                give_back_freed_memory()
-                steps = chain(_GROWTH, repeat(_GROWTH[-1]))
-                while (answer := _if_memory_suffices(question)) is None:
-                    if not self._memory.grow(next(steps)):
-                        raise QueryError(
-                            "this takes more memory than the server may use",
-                            "start it with more: msgflow ui --memory-limit 2GB",
-                        )
-                    give_back_freed_memory()
-            finally:
-                self._memory.reset()
+        with self._turn(alone=True):
+            answer = _if_memory_suffices(question)
+        if answer is None:
+            raise QueryError(
+                "this takes more memory than the server may use",
+                "start it with more: msgflow ui --memory-limit 8GB",
+            )
         return answer
 
     @contextmanager
@@ -136,12 +117,6 @@ class Turns:
                 self._running -= 1
                 self._is_alone = False
                 self._changed.notify_all()
-
-
-def give_back_freed_memory() -> None:
-    """Let the C library return what it keeps of freed memory, where it can."""
-    with suppress(AttributeError, OSError, TypeError):  # no glibc, or Windows
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 class Ahead:
@@ -198,10 +173,9 @@ class Shared:
     def _open(self) -> None:
         # Each request has a connection of its own to the same database, made of this one.
         self._base = connect(
-            self.path, read_only=True, memory_limit=self._memory_limit or USUAL_MEMORY,
-            may_grow=True,
-        )  # fmt: skip
-        self.turns = Turns(Memory(self._base.cursor(), self._memory_limit, default=USUAL_MEMORY))
+            self.path, read_only=True, memory_limit=self._memory_limit or default_limit()
+        )
+        self.turns = Turns()
         self.pages = Pages()
         self._ahead = Ahead(self.turns, self.pages, self._base.cursor())
 
@@ -520,8 +494,8 @@ def serve(
     Args:
         path: the database.
         port: of 127.0.0.1; 0 takes any that is free, None the usual one or else any.
-        memory_limit: most memory that DuckDB takes, such as '1GB'; when None it takes little, and
-            more for a question that needs it, as long as that runs.
+        memory_limit: most memory that DuckDB takes, such as '1GB'; when None a quarter of that of
+            the machine, at least 500 MB and at most 4 GB.
         started: called with the address, which has the token, once it can be opened.
 
     Raises:

@@ -342,7 +342,12 @@ def test_what_may_pass_is_tried_again(
 
 @pytest.mark.parametrize(
     "error",
-    [MemoryError(), duckdb.OutOfMemoryException("Out of Memory Error: no"), out_of_memory("q")],
+    [
+        MemoryError(),
+        duckdb.OutOfMemoryException("Out of Memory Error: no"),
+        out_of_memory("q"),
+        DatabaseError("the traces need more memory than 1GB", ""),
+    ],
 )
 def test_too_little_memory_is_told_from_other_errors(error: Exception) -> None:
     assert child._failed(error, "answers", 1.0).reason == "too_large"

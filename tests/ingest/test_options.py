@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import signal
-import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import duckdb
 import pytest
 
-from msgflow.db.memory import Memory
-from msgflow.errors import DatabaseError
 from msgflow.ingest import IngestProgress, ingest
-from msgflow.ingest.load import Loaded, load_traces
 from msgflow.ingest.names import hostnames_of
 from msgflow.trace import open as open_traces
 
@@ -170,33 +164,3 @@ def test_the_deepest_of_several_paths_names_a_host(
             for trace in traces.traces
         }
     assert found == expected
-
-
-def test_a_thread_of_the_database_is_worth_half_a_million_events(
-    trace: Path, new_database: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """So many may build the model, one loads; who asks for the former ends the ingest here."""
-    threads = Memory.threads
-    has_loaded = False
-
-    def ask(self: Memory, count: int) -> AbstractContextManager[None]:
-        if has_loaded:
-            raise DatabaseError(str(count), "")
-        assert count == 1
-        return threads(self, count)
-
-    counts = {1: 1, 499_999: 1, 500_000: 2, 1_000_000: 3}
-    left = list(counts)
-
-    def load(*args: Any, **options: Any) -> Loaded:
-        nonlocal has_loaded
-        loaded = load_traces(*args, **options)
-        has_loaded = True
-        return replace(loaded, event_counts={(0, "ros2:rcl_init"): left.pop(0)})
-
-    monkeypatch.setattr(Memory, "threads", ask)
-    monkeypatch.setattr(sys.modules[ingest.__module__], "load_traces", load)
-    for most in counts.values():
-        has_loaded = False
-        with pytest.raises(DatabaseError, match=f"^{most}"):
-            ingest([trace], new_database)

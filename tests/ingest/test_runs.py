@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -105,50 +104,6 @@ def test_a_replacement_keeps_other_runs(both: Path, trace: Path) -> None:
     assert of_run(both, 2) == other
     assert of_run(both, 3) == before
     assert not any(of_run(both, 1).values())
-
-
-@pytest.mark.parametrize("replace", [True, False])
-def test_a_file_is_tidied_up_where_rows_were_deleted(
-    database: Path,
-    trace: Path,
-    other_trace: Path,
-    replace: bool,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Else a checkpoint would write most of what was just written once more."""
-    module = sys.modules[ingest.__module__]
-    finished = vars(module)["_finished"]
-    tasks: list[int] = []
-
-    def noted(connection: duckdb.DuckDBPyConnection, *others: Any) -> Any:
-        tasks.extend(*connection.execute("SELECT current_setting('max_vacuum_tasks')").fetchall())
-        return finished(connection, *others)
-
-    monkeypatch.setattr(module, "_finished", noted)
-    ingest([trace if replace else other_trace], database, replace=replace)
-    assert [number > 0 for number in tasks] == [replace]
-
-
-def test_what_is_kept_of_freed_memory_is_bounded(
-    tmp_path: Path, trace: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Some of what DuckDB keeps of it comes on top of its limit."""
-    module = sys.modules[ingest.__module__]
-    finished = vars(module)["_finished"]
-    kept: list[tuple[str, str]] = []
-
-    def noted(connection: duckdb.DuckDBPyConnection, *others: Any) -> Any:
-        kept.extend(
-            connection.execute(
-                "SELECT current_setting('block_allocator_memory'), "
-                "current_setting('allocator_bulk_deallocation_flush_threshold')"
-            ).fetchall()
-        )
-        return finished(connection, *others)
-
-    monkeypatch.setattr(module, "_finished", noted)
-    ingest([trace], tmp_path / "new.duckdb")
-    assert kept == [("183.1 MiB", "7.6 MiB")]
 
 
 def test_one_ingest_may_replace_several_runs(both: Path, trace: Path, other_trace: Path) -> None:

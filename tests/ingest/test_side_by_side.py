@@ -250,24 +250,13 @@ def test_a_full_disk_is_said_at_once(
         ingest([lossy], tmp_path / "new.duckdb")
 
 
-def test_as_much_is_dropped_and_less_memory_is_for_more_events(
-    lossy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_as_much_is_dropped(lossy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module: Any = sys.modules[ingest.__module__]
     load, build = module.load_traces, model.build
     events = 0
     tables: list[set[tuple[str, str]]] = []
-    settings: list[Any] = []
-
-    def note_settings(con: duckdb.DuckDBPyConnection) -> None:
-        settings.append(
-            con.execute(
-                "SELECT current_setting('memory_limit'), current_setting('block_allocator_memory')"
-            ).fetchone()
-        )
 
     def loaded(con: duckdb.DuckDBPyConnection, *args: Any, **options: Any) -> Any:
-        note_settings(con)
         return dataclasses.replace(
             load(con, *args, **options), event_counts={(0, "ros2:rcl_init"): events}
         )
@@ -282,7 +271,6 @@ def test_as_much_is_dropped_and_less_memory_is_for_more_events(
                 ).fetchall()
             )
         )
-        note_settings(con)
 
     monkeypatch.setattr(module, "load_traces", loaded)
     monkeypatch.setattr(model, "build", noted)
@@ -290,8 +278,6 @@ def test_as_much_is_dropped_and_less_memory_is_for_more_events(
         ingest([lossy], tmp_path / f"{events}.duckdb")
     small, large = tables
     assert small == large
-    reading = ("41.9 MiB", "91.5 MiB")
-    assert settings == [reading, ("185.6 MiB", "181.7 MiB"), reading, ("176.7 MiB", "128.1 MiB")]
 
 
 @pytest.mark.parametrize(("events", "is_small"), [(1_999_999, True), (2_000_000, False)])

@@ -21,7 +21,6 @@ import pytest
 from served import Served
 from tables import decoded
 
-from msgflow.db.memory import Memory
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.ingest import ingest
 from msgflow.view.pages import Pages
@@ -253,7 +252,7 @@ def test_memory_that_others_took_is_waited_for() -> None:
         finally:
             memory.release()
 
-    turns = Turns(Memory(duckdb.connect(), "100MB"))
+    turns = Turns()
     with ThreadPoolExecutor(3) as pool:
         answers = [pool.submit(turns.ask, ask) for _ in range(3)]
     assert [answer.result() for answer in answers] == [b"answer"] * 3
@@ -268,31 +267,9 @@ def test_what_needs_too_much_memory_alone_says_what_to_do() -> None:
         raise duckdb.OutOfMemoryException("no memory")
 
     with pytest.raises(QueryError) as error:
-        Turns(Memory(duckdb.connect(), "100MB")).ask(ask)
+        Turns().ask(ask)
     assert "--memory-limit" in str(error.value.hint)
     assert len(tries) == 2
-
-
-def test_what_needs_more_memory_alone_gets_it_while_it_runs() -> None:
-    """First of all it gets one thread, which needs less."""
-    tries: list[tuple[str, int]] = []
-    with duckdb.connect(config={"threads": 2}) as con:
-        memory = Memory(con, None, default="100MB")
-
-        def limit() -> tuple[str, int]:
-            settings = "current_setting('memory_limit'), current_setting('threads')"
-            return con.execute(f"SELECT {settings}").fetchall()[0]
-
-        def ask() -> bytes:
-            tries.append(limit())
-            if len(tries) < 4:
-                raise QueryError("the query failed") from duckdb.OutOfMemoryException("no memory")
-            return b"answer"
-
-        usual = limit()
-        assert Turns(memory).ask(ask) == b"answer"
-        assert tries == [usual, ("95.3 MiB", 1), ("119.1 MiB", 1), ("154.8 MiB", 1)]
-        assert limit() == usual == ("95.3 MiB", 2)
 
 
 def test_other_failures_are_not_tried_again() -> None:
@@ -303,7 +280,7 @@ def test_other_failures_are_not_tried_again() -> None:
         raise QueryError("the query failed") from duckdb.BinderException("no such column")
 
     with pytest.raises(QueryError):
-        Turns(Memory(duckdb.connect(), None)).ask(ask)
+        Turns().ask(ask)
     assert len(tries) == 1
 
 
@@ -330,7 +307,7 @@ def test_the_timeline_is_counted_before_the_page_asks(statement: str) -> None:
     """It is ended with the server, however long it takes; of what fails the page will be told."""
     with duckdb.connect() as connection:
         pages = Asked(f"SELECT count(*) FROM ({statement})")
-        turns = Turns(Memory(connection, None))
+        turns = Turns()
         ahead = Ahead(turns, pages, connection.cursor())
         assert pages.is_asked.wait(10)
         ahead.stop()
