@@ -10,7 +10,7 @@ import duckdb
 
 from msgflow.db.connection import connect
 from msgflow.db.objects import public_names
-from msgflow.db.reading import reading_statements, require_condition
+from msgflow.db.sql_guard import guarded_query, require_condition
 from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
@@ -714,23 +714,22 @@ class Database:
         )
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
-        """Run SQL that only reads, without access to other files, and return the last result.
+        """Run SQL that only reads, without access to other files.
 
         Args:
-            text: one or more queries, or EXPLAIN of such.
+            text: one query, or EXPLAIN of one.
             limit: most rows returned, all when None; a note says when there were more.
 
         Raises:
-            QueryError: a statement might do more than read, or the database could not run it.
+            UsageError: there is no SQL.
+            QueryError: the statement might do more than read, there are several, or the database
+                could not run it.
             DatabaseError: the file cannot be opened.
         """
         connection = self.connection
         try:
-            statements = reading_statements(connection, text)
-            if not statements:
-                raise UsageError("there is no SQL to run", 'msgflow sql "SELECT * FROM run"')
-            joined = "\n;\n".join(statements)
-            return interruptible(connection, lambda: capped(connection.sql(joined), limit))
+            query = guarded_query(connection, text, 'msgflow sql "SELECT * FROM run"')
+            return interruptible(connection, lambda: capped(connection.sql(query), limit))
         except duckdb.Error as error:
             raise in_words(error, self.path) or sql_error(error) from error
 
@@ -928,12 +927,8 @@ class Database:
         return self._ask(export)
 
 
-def capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> QueryResult:
-    """Return the rows of SQL that somebody gave, `limit` at most."""
-    import pyarrow
-
-    if relation is None:
-        return QueryResult(pyarrow.table({}))
+def capped(relation: duckdb.DuckDBPyRelation, limit: int | None) -> QueryResult:
+    """Return the rows of a query that a user gave, `limit` at most."""
     if limit is None:
         return QueryResult(relation.to_arrow_table())
     table = relation.limit(limit + 1).to_arrow_table()
@@ -944,7 +939,7 @@ def capped(relation: duckdb.DuckDBPyRelation | None, limit: int | None) -> Query
 
 
 def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
-    """Return what DuckDB says about SQL that somebody gave."""
+    """Return what DuckDB says about SQL that a user gave."""
     if isinstance(error, duckdb.OutOfMemoryException):
         return out_of_memory("the SQL", *more_memory)
     # DuckDB says what is wrong, sometimes what it could have been, and points at the place.

@@ -19,9 +19,9 @@ from msgflow.cli.options import (
 from msgflow.cli.sql import (
     DEFAULT_LIMIT,
     PrintedRowsOption,
-    StatementsArgument,
-    StatementsFileOption,
-    statements_of,
+    SqlArgument,
+    SqlFileOption,
+    sql_of,
 )
 from msgflow.errors import UsageError
 
@@ -146,10 +146,10 @@ def query(
 
 
 def sql(
-    text: StatementsArgument = None,
+    text: SqlArgument = None,
     lake: LakeOption = "",
     where: LakeWhereOption = None,
-    file: StatementsFileOption = None,
+    file: SqlFileOption = None,
     limit: PrintedRowsOption = DEFAULT_LIMIT,
     form: FormatOption = None,
     wide: WideOption = False,
@@ -164,9 +164,9 @@ def sql(
     from msgflow.fleet.asking import fleet_sql
     from msgflow.fleet.lake import Lake
 
-    statements = statements_of(text, file, "msgflow fleet sql 'FROM run'")
+    query = sql_of(text, file, "msgflow fleet sql 'FROM run'")
     require_lake(lake)
-    result = fleet_sql(Lake.open(lake), statements, where=where, limit=limit or None)
+    result = fleet_sql(Lake.open(lake), query, where=where, limit=limit or None)
     print_result(result, form, output, wide=wide)
 
 

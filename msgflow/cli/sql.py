@@ -1,4 +1,4 @@
-"""`msgflow sql`: any SQL, read-only."""
+"""`msgflow sql`: any query in SQL, read-only."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from msgflow.errors import UsageError
 from msgflow.text_file import read_text
 
 DEFAULT_LIMIT = 1_000
-StatementsArgument = Annotated[
-    str | None, typer.Argument(metavar="[SQL]", help="Statements; - reads them from stdin")
+SqlArgument = Annotated[
+    str | None, typer.Argument(metavar="[SQL]", help="A query; - reads it from stdin")
 ]
-StatementsFileOption = Annotated[
+SqlFileOption = Annotated[
     Path | None,
-    typer.Option("-f", "--file", metavar="FILE", help="Read the statements from FILE"),
+    typer.Option("-f", "--file", metavar="FILE", help="Read the query from FILE"),
 ]
 PrintedRowsOption = Annotated[
     int,
@@ -36,8 +36,8 @@ PrintedRowsOption = Annotated[
 
 
 def command(
-    text: StatementsArgument = None,
-    file: StatementsFileOption = None,
+    text: SqlArgument = None,
+    file: SqlFileOption = None,
     limit: PrintedRowsOption = DEFAULT_LIMIT,
     form: FormatOption = None,
     wide: WideOption = False,
@@ -53,14 +53,14 @@ def command(
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
-    statements = statements_of(text, file, 'msgflow sql "SELECT * FROM run"')
+    query = sql_of(text, file, 'msgflow sql "SELECT * FROM run"')
     import_meanwhile(ARROW)
     with Database(database, memory_limit=memory_limit) as opened:
-        result = opened.sql(statements, limit=limit or None)
+        result = opened.sql(query, limit=limit or None)
     print_result(result, form, output, wide=wide)
 
 
-def statements_of(text: str | None, file: Path | None, example: str) -> str:
+def sql_of(text: str | None, file: Path | None, example: str) -> str:
     """Return the SQL that was given, on the command line, in a file or on stdin.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Opens databases, and refuses what is not a current one of msgflow."""
+"""Connections to databases of msgflow, and the errors of files that are none, or no current one."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.definition import remember, require_ours
+from msgflow.db.definition_check import require_ours
 from msgflow.db.objects import definition_hash, head_revision, is_before_release, known_revisions
-from msgflow.db.opening import open_file, opening, require_file
+from msgflow.db.sandbox import open_file, opening, require_file
 from msgflow.db.spill import remove_abandoned
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import database_errors
@@ -29,13 +29,16 @@ def connect(
         memory_limit: most memory that DuckDB takes, such as '2GB'; DuckDB's default when None.
 
     Raises:
-        DatabaseError: the file is missing, locked, foreign, or of another schema revision.
+        DatabaseError: the file is missing, locked, foreign, or of another schema revision; or it is
+            opened for writing and its definitions are not those of this msgflow.
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
     con = open_file(path, read_only=read_only, memory_limit=memory_limit)
     try:
         require_current(con, path)
+        if not read_only:
+            require_ours(con, path)
     except BaseException:
         con.close()
         raise
@@ -48,9 +51,9 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
     Args:
         con: a connection to another database.
         path: the file.
-        is_new: this process has just created it: nobody else can have put anything into it. It
-            has no log, as it takes its place only when it is whole: what is committed lasts only
-            after a CHECKPOINT.
+        is_new: this process has just created it, so that its definitions need no check. It has no
+            log, as it takes its place only when it is whole: a commit lasts only after a
+            CHECKPOINT.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or of another schema revision.
@@ -64,41 +67,42 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
         con.execute(f"ATTACH '{quoted}' AS target{mode}")
     con.execute("USE target")
     if is_new:
-        remember(con)
         return
     require_current(con, path)
+    require_ours(con, path)
     remove_abandoned(path, is_ours_alone=True)
 
 
 def recorded_revision(con: duckdb.DuckDBPyConnection) -> str | None:
     """Return the schema revision of a database, or None where it is not msgflow's."""
-    row = con.execute(
+    # Not fetchone: DuckDB refuses the next query as long as this one may have more rows.
+    ((count,),) = con.execute(
         "SELECT count(*) FROM duckdb_tables() WHERE database_name = current_database() "
         "AND schema_name = 'store' AND table_name IN ('alembic_version', 'definition', 'run')"
-    ).fetchone()
-    if row is None or row[0] != 3:
+    ).fetchall()
+    if count != 3:
         return None
     try:
-        revision = con.execute("SELECT version_num FROM store.alembic_version").fetchone()
+        revisions = con.execute("SELECT version_num FROM store.alembic_version").fetchall()
     except duckdb.BinderException:  # another table of that name
         return None
-    return None if revision is None or revision[0] is None else str(revision[0])
+    return None if not revisions or revisions[0][0] is None else str(revisions[0][0])
 
 
 def is_empty(con: duckdb.DuckDBPyConnection) -> bool:
     """Tell whether a database has no tables and no views of its own."""
-    row = con.execute(
+    ((count,),) = con.execute(
         "SELECT (SELECT count(*) FROM duckdb_tables() WHERE database_name = current_database()) + "
         "(SELECT count(*) FROM duckdb_views() WHERE NOT internal "
         "AND database_name = current_database())"
-    ).fetchone()
-    return row is not None and row[0] == 0
+    ).fetchall()
+    return bool(count == 0)
 
 
 def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-    """Raise unless the database has the schema revision and the views of this msgflow.
+    """Raise unless the database says that it has the schema and the views of this msgflow.
 
-    Neither views nor macros are used for that: what is in a foreign file might do anything.
+    This reads tables only. `require_ours` compares the definitions themselves.
 
     Raises:
         DatabaseError: it is foreign, damaged, newer, or has to be upgraded.
@@ -112,17 +116,21 @@ def require_current(con: duckdb.DuckDBPyConnection, path: Path) -> None:
             hint,
         )
     with database_errors(path):
-        row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
-        if row is None or row[0] != definition_hash():
+        if not has_current_views(con):
             raise DatabaseError(f"database has the views of another msgflow version — {path}", hint)
-        require_ours(con, path)
+
+
+def has_current_views(con: duckdb.DuckDBPyConnection) -> bool:
+    """Tell whether a database says that it has the views of this msgflow."""
+    found = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchall()
+    return found == [(definition_hash(),)]
 
 
 def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
     """Return the revision of a database that this msgflow can read or upgrade.
 
     Raises:
-        DatabaseError: it is foreign, newer, or of before the first release.
+        DatabaseError: it is foreign, newer, or older than the first release.
     """
     with database_errors(path):
         revision = recorded_revision(con)

@@ -11,7 +11,7 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from msgflow.db import cache, objects
-from msgflow.db.opening import STORAGE_VERSION, open_file
+from msgflow.db.sandbox import STORAGE_VERSION, open_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,10 +11,16 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.db import objects
-from msgflow.db.connection import is_empty, recorded_revision, require_current, require_known
+from msgflow.db.connection import (
+    connect,
+    has_current_views,
+    is_empty,
+    recorded_revision,
+    require_known,
+)
 from msgflow.db.create import write_new
-from msgflow.db.definition import require_ours
-from msgflow.db.opening import open_file
+from msgflow.db.definition_check import require_ours
+from msgflow.db.sandbox import open_file
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
@@ -85,11 +91,7 @@ def require_ingestable(path: Path) -> None:
                 f"no such directory — {path.parent}", "give a file in an existing directory"
             )
         return
-    con = open_file(path, read_only=False)
-    try:
-        require_current(con, path)
-    finally:
-        con.close()
+    connect(path, read_only=False).close()
 
 
 def upgrade(path: Path) -> Upgrade:
@@ -110,15 +112,13 @@ def upgrade(path: Path) -> Upgrade:
             # One of our own, as its format depends on who made it.
             _replace_by_new(path)
             return Upgrade(None, objects.head_revision(), True, ())
-        # Definitions read from the file can be compared, those just written cannot.
-        with contextlib.closing(open_file(path, read_only=False)) as con:
-            require_current(con, path)
+        # DuckDB renders definitions that it has just written in another way than those of a file.
+        with contextlib.closing(connect(path, read_only=False)) as con:
             return Upgrade(before, objects.head_revision(), views_changed, _rederive(con))
 
 
 def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
-    row = con.execute("SELECT hash FROM store.definition WHERE name = 'views'").fetchone()
-    if row is None or row[0] != objects.definition_hash():
+    if not has_current_views(con):
         return False
     try:
         require_ours(con, path)

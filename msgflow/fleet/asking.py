@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 
 from msgflow.database import capped, sql_error
-from msgflow.db.reading import reading_statements
+from msgflow.db.sql_guard import guarded_query
 from msgflow.errors import QueryError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.layout import VIEWS
@@ -154,30 +154,27 @@ def fleet_query(
 def fleet_sql(
     lake: Lake, text: str, *, where: str | None = None, limit: int | None = None
 ) -> QueryResult:
-    """Run SQL that only reads on the tables of a lake, and return the last result.
+    """Run SQL that only reads on the tables of a lake.
 
     Args:
         lake: the lake.
-        text: one or more queries. Tables are `run` and the answers, with the rows of the chosen
-            runs that count; public views are in the schema `view`.
+        text: one query, or EXPLAIN of one. Tables are `run` and the answers, with the rows of the
+            chosen runs that count; public views are in the schema `view`.
         where: a condition on runs and their labels, see `choose`; all runs when None.
         limit: most rows returned, all when None; a note says when there were more.
 
     Raises:
-        UsageError: a label that there is not, or no run fits.
-        QueryError: a statement might do more than read, or failed.
+        UsageError: there is no SQL, a label that no run has, or no run fits.
+        QueryError: the statement might do more than read, there are several, or it failed.
         DatabaseError: the lake cannot be read.
     """
     choice = choose(lake, where)
     try:
         with Reading(choice, _named_tables(text)) as reading:
             con = reading.connection
-            found = reading_statements(con, text, schemas=("main", VIEWS))
-            if not found:
-                raise UsageError("there is no SQL to run", "msgflow fleet sql 'FROM run'")
+            query = guarded_query(con, text, "msgflow fleet sql 'FROM run'")
             with lake_errors(lake, is_query=True):
-                joined = "\n;\n".join(found)
-                return interruptible(con, lambda: capped(con.sql(joined), limit))
+                return interruptible(con, lambda: capped(con.sql(query), limit))
     except duckdb.Error as error:
         raise sql_error(error, "ask about fewer runs with --where") from error
 

@@ -14,7 +14,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
-from msgflow.db.opening import open_memory
+from msgflow.db.sandbox import open_memory
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.layout import (
     ABOUT,

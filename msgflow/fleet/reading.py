@@ -11,13 +11,12 @@ from __future__ import annotations
 import re
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import duckdb
 
-from msgflow.db.opening import open_memory, shut_in
-from msgflow.db.reading import require_condition
+from msgflow.db.sandbox import open_memory, shut_in
+from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import PACK
@@ -73,6 +72,7 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
     """
     with open_memory() as con:
         shut_in(con)
+        con.execute("SET lock_configuration = true")
         runs = visible(lake.rows(), con)
         if not len(runs):
             raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
@@ -167,6 +167,7 @@ class Reading:
         """
         self.choice = choice
         self.tables: set[str] = set()
+        self._local_files: list[str] = []
         store = choice.lake.store
         if tables is None:
             tables = [answer.table for answer in answers()]
@@ -176,7 +177,8 @@ class Reading:
         try:
             with lake_errors(choice.lake):
                 self._fill(tables)
-            shut_in(self.connection, beside=[Path(store.url)] if store.is_local else [])
+            self.connection.execute("SET allowed_paths = ?", [self._local_files])
+            shut_in(self.connection)
             self.connection.execute("SET lock_configuration = true")
         except BaseException:
             self.close()
@@ -254,6 +256,7 @@ class Reading:
         parts = [part for alike in found.values() for part in alike]
         paths = [store.full(part_path(table, part)) for part in parts]
         if store.is_local:
+            self._local_files += paths
             self.connection.execute(f"SET VARIABLE {quoted(name)} = $paths", {"paths": paths})
             return (
                 f"read_parquet(getvariable('{name}'), union_by_name = true,"

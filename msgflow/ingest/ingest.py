@@ -25,8 +25,8 @@ from msgflow.db.memory import (
     set_memory_limit,
 )
 from msgflow.db.noted import note
-from msgflow.db.opening import open_memory, shut_in
 from msgflow.db.runs import require_run_name
+from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.store import delete, store
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, UsageError

@@ -44,6 +44,8 @@ _COLUMN = re.compile(r'Referenced column "([^"]*)"')
 # What a condition may be at fault for; the queries themselves are tested.
 _OF_CONDITIONS = (
     duckdb.BinderException,
+    duckdb.CatalogException,
+    duckdb.PermissionException,
     duckdb.ParserException,
     duckdb.ConversionException,
     duckdb.OutOfRangeException,

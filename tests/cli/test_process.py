@@ -21,7 +21,6 @@ from thorough import few, thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
-from msgflow.db.definition import expected
 from msgflow.errors import ExitCode
 from msgflow.ingest import ingest
 from msgflow.sim import Recording, simulate
@@ -139,8 +138,6 @@ def test_help_imports_neither_the_database_stack_nor_what_prints_other_help() ->
 
 
 def test_a_query_imports_what_it_needs_and_no_more(small_database: Path) -> None:
-    # The first command of a version renders what a database has to be like, and keeps it.
-    expected()
     modules = imported(("query", "info-topics", "--db", small_database))
     assert {"duckdb", "pyarrow"} <= modules
     assert not modules & set(NEVER_IN_QUERY)

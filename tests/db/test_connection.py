@@ -10,7 +10,7 @@ import pytest
 
 from msgflow.db.connection import attach
 from msgflow.db.create import write_new
-from msgflow.db.opening import open_file, open_memory
+from msgflow.db.sandbox import open_file, open_memory
 
 
 def test_asof_joins_compare_in_order_however_few_rows_are_expected(tmp_path: Path) -> None:

@@ -12,9 +12,10 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from msgflow.db import cache, create, definition, derive, migrate, objects
+from msgflow.db import cache, create, derive, migrate, objects
 from msgflow.db.connection import connect, recorded_revision
-from msgflow.db.opening import STORAGE_VERSION, open_file
+from msgflow.db.definition_check import expected_definitions
+from msgflow.db.sandbox import STORAGE_VERSION, open_file
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
 
@@ -66,7 +67,7 @@ def next_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
     def directory(name: str) -> Path:
         return later if name == "migrations" else resource_directory(name)
 
-    caches = (objects.head_revision, objects.known_revisions, definition.expected)
+    caches = (objects.head_revision, objects.known_revisions, expected_definitions)
     with monkeypatch.context() as patched:
         patched.setattr(objects, "resource_directory", directory)
         patched.setattr(migrate, "resource_directory", directory)
@@ -131,7 +132,7 @@ def test_other_tables_without_another_revision_are_refused(database: Path) -> No
     """As databases of between two releases have them."""
     with duckdb.connect(str(database)) as con:
         con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
-    for action in (lambda: connect(database, read_only=True), lambda: migrate.upgrade(database)):
+    for action in (lambda: connect(database, read_only=False), lambda: migrate.upgrade(database)):
         with pytest.raises(DatabaseError, match=r"another table store\.take") as told:
             action()
         assert told.value.hint == "ingest the traces into a new file"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
 import pytest
 from object_store import KEYS, ObjectStore, object_store
+from sql_attack import ALLOWED, SECRET, answered, attack, content
 
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.asking import fleet_query, fleet_sql, fleet_worst
@@ -15,6 +17,7 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.opening import open_run
 from msgflow.fleet.reading import choose, open_runs
 from msgflow.fleet.store import Store
+from msgflow.query.result import QueryResult
 
 
 def chosen(lake: Lake, where: str | None) -> list[str]:
@@ -47,7 +50,7 @@ def test_a_condition_chooses_by_labels_and_columns(
         ("robot", "cannot be evaluated"),
         ("true); DROP TABLE run; --", "no condition"),
         ("robot = 'r1' LIMIT 1", "no condition"),
-        ("exists (FROM read_csv('/etc/passwd'))", "may only read"),
+        ("exists (FROM read_csv('/etc/passwd'))", "Cannot access file"),
         ("robot = $x", "takes no parameters"),
     ],
 )
@@ -103,6 +106,33 @@ def test_the_connection_reaches_nothing_else(night: Lake, tmp_path: Path) -> Non
             with pytest.raises(duckdb.Error):
                 con.execute(sql)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.csv"]
+
+
+def test_sql_on_a_lake_reads_its_tables_and_changes_no_file(night: Lake, tmp_path: Path) -> None:
+    lake = tmp_path / "lake"
+    shutil.copytree(night.store.url, lake)
+    (tmp_path / "other.csv").write_text(f"text\n{SECRET}\n")
+    # Files of the lake that no table has.
+    (lake / "flow" / "other.csv").write_text(f"text\n{SECRET}\n")
+    before = content(tmp_path)
+    one = next(path for path in before if path.match("flow/*/*.parquet"))
+    files = [one, tmp_path / "other.csv", lake / "flow" / "new.csv"]
+    copied = Lake.open(lake)
+    runs = fleet_sql(copied, "FROM run").table
+
+    def sql(text: str, *, limit: int | None) -> QueryResult:
+        return fleet_sql(copied, text, limit=limit)
+
+    with open_runs(copied) as reading:
+        ((count,),) = reading.connection.execute("SELECT count(*) FROM flow").fetchall()
+        assert count > 0
+        for file in (tmp_path / "other.csv", lake / "flow" / "other.csv"):
+            with pytest.raises(duckdb.PermissionException):
+                reading.connection.execute(f"FROM read_text('{file}')")
+    passed = answered(sql, attack(files, lake, "run", ("SELECT", "EXPLAIN", "COPY")))
+    assert {each for each in passed if f"'{one}" not in each} == ALLOWED
+    assert content(tmp_path) == before
+    assert fleet_sql(copied, "FROM run").table.equals(runs)
 
 
 def test_all_tables_are_there_and_rows_of_runs_that_count(night: Lake) -> None:

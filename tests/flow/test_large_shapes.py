@@ -12,7 +12,7 @@ from ros_system import RosSystem
 from staged_events import Thread
 
 from msgflow.db.derive import derive
-from msgflow.db.opening import open_memory
+from msgflow.db.sandbox import open_memory
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
 

@@ -48,9 +48,11 @@ def test_sql_is_read_only_and_shut_in(small_database: Path, tmp_path: Path) -> N
     assert not target.exists()
 
 
-def test_sql_returns_the_last_result_and_says_what_it_cut(small_database: Path) -> None:
+def test_sql_takes_one_query_and_says_what_it_cut(small_database: Path) -> None:
     with msgflow.open_db(small_database) as database:
-        assert database.sql("SELECT 1 AS a; SELECT 2 AS b").to_arrow().to_pylist() == [{"b": 2}]
+        assert database.sql("SELECT 1 AS a; -- end").to_arrow().to_pylist() == [{"a": 1}]
+        with pytest.raises(QueryError, match="one query at a time"):
+            database.sql("SELECT 1 AS a; SELECT 2 AS b")
         assert database.sql("FROM range(10)", limit=10).notes == []
         cut = database.sql("FROM range(10)", limit=9)
         assert len(cut) == 9

@@ -15,7 +15,7 @@ from staged_events import StagedEvents
 from msgflow.db import objects
 from msgflow.db.connection import attach
 from msgflow.db.derive import derive, derive_table, derived_tables, learn_topics
-from msgflow.db.opening import open_memory
+from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.tables import TABLES
 from msgflow.ingest import model, staging

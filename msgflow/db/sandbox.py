@@ -78,8 +78,8 @@ def shut_in(con: duckdb.DuckDBPyConnection, *, beside: Sequence[Path] = ()) -> N
 
 def _is_shut_in(con: duckdb.DuckDBPyConnection) -> bool:
     # This cannot be taken back, whether the configuration is locked or not.
-    row = con.execute("SELECT NOT current_setting('enable_external_access')").fetchone()
-    return row is not None and bool(row[0])
+    found = con.execute("SELECT current_setting('enable_external_access')").fetchall()
+    return found == [(False,)]
 
 
 def require_file(path: Path) -> None:

@@ -1,10 +1,8 @@
-"""A database from elsewhere: none of its SQL runs before it has been compared with ours."""
+"""A database from elsewhere: commands that write compare its definitions with ours first."""
 
 from __future__ import annotations
 
-import json
 import re
-import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +13,7 @@ from thorough import few
 
 import msgflow
 from msgflow.clocks import apply_clocks, read_clock_sync
-from msgflow.db import definition, migrate, objects
+from msgflow.db import definition_check, migrate, objects
 from msgflow.db.connection import connect
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
@@ -48,23 +46,22 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return simulate("pipeline", tmp_path_factory.mktemp("trace") / "t", factor=0.01).directory
 
 
-def readers(trace: Path) -> dict[str, Callable[[Path], object]]:
-    """Everything that opens a database, in the same state."""
-    return {
-        "runs": lambda path: msgflow.open_db(path).runs(),
-        "sql": lambda path: msgflow.open_db(path).sql("SELECT 1"),
-        "query": lambda path: msgflow.open_db(path).query("info-runs"),
-        "check": lambda path: msgflow.open_db(path).check(),
-        "links": lambda path: apply_links(path, LinksFile(Path("x"), ()), run="all"),
-        "clocks": lambda path: apply_clocks(path, read_clock_sync("none"), run="all"),
-        "ingest": lambda path: ingest([trace], path),
-    }
+def writers(trace: Path) -> tuple[Callable[[Path], object], ...]:
+    """Return all that writes into a database."""
+    return (
+        lambda path: apply_links(path, LinksFile(Path("x"), ()), run="all"),
+        lambda path: apply_clocks(path, read_clock_sync("none"), run="all"),
+        lambda path: ingest([trace], path),
+        lambda path: msgflow.open_db(path).rename_run("noon", "evening"),
+        lambda path: msgflow.open_db(path).label_runs("noon", robot="r1"),
+        lambda path: msgflow.open_db(path).remove_runs("noon"),
+    )
 
 
 @pytest.mark.parametrize(
     "name", few(CHANGES, "view main.run", "macro derive.corrected_ns", "macro main.sum")
 )
-def test_a_changed_database_is_neither_read_nor_written(
+def test_a_changed_database_is_not_written(
     small_database: Path, trace: Path, tmp_path: Path, name: str
 ) -> None:
     secret = tmp_path / "secret.txt"
@@ -72,7 +69,7 @@ def test_a_changed_database_is_neither_read_nor_written(
     with duckdb.connect(str(small_database)) as con:
         con.execute(CHANGES[name].format(secret=secret))
     before = small_database.read_bytes()
-    for use in readers(trace).values():
+    for use in writers(trace):
         with pytest.raises(
             DatabaseError, match=f"not as msgflow makes it: it .* {name} — "
         ) as raised:
@@ -152,11 +149,17 @@ def test_an_ingest_reaches_other_files_only_while_it_opens_its_own(
     assert list((tmp_path / "deep" / "staging").glob("*.parquet"))
 
 
-def test_the_definitions_are_those_of_a_new_file(tmp_path: Path) -> None:
-    path = tmp_path / "new.duckdb"
-    migrate.create(path)
-    with duckdb.connect(str(path), read_only=True) as con:
-        assert definition.rendered(con) == definition._made()
+def test_a_database_of_this_msgflow_is_written_and_read(
+    small_database: Path, tmp_path: Path
+) -> None:
+    """Also where there is no cache, which only saves time."""
+    with connect(small_database, read_only=False) as con:
+        assert set(definition_check.definitions(con)) > {"view main.run", "table store.run"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path / "none"))
+        (tmp_path / "none").write_text("a file")
+        migrate.create(tmp_path / "new.duckdb")
+        connect(tmp_path / "new.duckdb", read_only=False).close()
 
 
 def test_what_is_materialized_is_so_in_a_file_as_well(tmp_path: Path) -> None:
@@ -181,42 +184,3 @@ def test_what_is_materialized_is_so_in_a_file_as_well(tmp_path: Path) -> None:
     }
     assert sum(said.values()) > 30
     assert said == {name: stored[name].count("MATERIALIZED (") for name in said}
-
-
-def test_the_cache_is_used_and_not_needed(
-    small_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    definition.expected.cache_clear()
-    msgflow.open_db(small_database).runs()
-    (cached,) = (tmp_path / "cache" / "msgflow").glob("definitions-*")
-    assert json.loads(cached.read_bytes().split(b"\n", 1)[1]) == definition.expected()
-
-    made, again = definition.expected(), []
-    monkeypatch.setattr(definition, "_made", lambda: pytest.fail("made again"))
-    definition.expected.cache_clear()
-    msgflow.open_db(small_database).runs()
-
-    monkeypatch.setattr(definition, "_made", lambda: again.append(made) or made)
-    damages = ("", "[]", '{"a": 1}', "\0")
-    for damage in damages:
-        cached.write_text(damage)
-        definition.expected.cache_clear()
-        msgflow.open_db(small_database).runs()
-    assert len(again) == len(damages)
-    shutil.rmtree(tmp_path / "cache")
-    (tmp_path / "cache").write_text("a file")
-    definition.expected.cache_clear()
-    msgflow.open_db(small_database).runs()
-    definition.expected.cache_clear()
-
-
-def test_an_ingest_into_a_new_file_fills_the_cache(
-    trace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(definition, "_made", lambda: pytest.fail("made for nothing"))
-    definition.expected.cache_clear()
-    ingest([trace], tmp_path / "new.duckdb")
-    assert msgflow.open_db(tmp_path / "new.duckdb").runs()
-    definition.expected.cache_clear()

@@ -1,8 +1,8 @@
-"""What a database says its tables, views and macros are, compared with what they have to be.
+"""The check that the tables, views and macros in a database are those of this msgflow.
 
-A file from elsewhere can hold any SQL under our names, which would run with the first query. DuckDB
-renders definitions its own way, and what it read from a file not as what was just created: hence
-they are compared with those of a new file, which are kept in the user's cache.
+Commands that write make it first: they run the SQL of views, macros and triggers in the file, which
+somebody else may have changed. DuckDB renders definitions its own way, and those read from a file
+not as those just created. Hence they are compared with those of a new file.
 """
 
 from __future__ import annotations
@@ -15,30 +15,24 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db import cache as cache_of_user
 from msgflow.db.create import write_new
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# By kind and name: the SHA-256 of the definition.
-Definitions = dict[str, str]
-
-_KIND = "definitions"
-
-# Keys are left out: where they stand in the statement differs, and none has SQL in it.
+# Keys are left out: their place in the statement differs, and they hold no SQL.
 _RENDERED = r"""
-SELECT 'view ' || schema_name || '.' || view_name AS name, sha256(sql) AS hash
+SELECT 'view ' || schema_name || '.' || view_name AS name, sql
 FROM duckdb_views()
 WHERE NOT internal AND database_name = current_database() AND schema_name IN ('main', 'derive')
 UNION ALL
 SELECT
     'macro ' || schema_name || '.' || function_name,
-    sha256(string_agg(
+    string_agg(
         concat_ws(chr(0), function_type, parameters::VARCHAR, macro_definition), chr(0)
         ORDER BY function_type, parameters::VARCHAR, macro_definition
-    ))
+    )
 FROM duckdb_functions()
 WHERE NOT internal AND database_name = current_database()
     AND schema_name IN ('store', 'main', 'derive')
@@ -46,12 +40,12 @@ GROUP BY schema_name, function_name
 UNION ALL
 SELECT
     'table ' || schema_name || '.' || table_name,
-    sha256(regexp_replace(sql, ',? PRIMARY KEY(\([^)]*\))?', '', 'g'))
+    regexp_replace(sql, ',? PRIMARY KEY(\([^)]*\))?', '', 'g')
 FROM duckdb_tables()
 WHERE database_name = current_database() AND schema_name = 'store'
     AND table_name <> 'alembic_version'
 UNION ALL
-SELECT 'trigger ' || schema_name || '.' || trigger_name, sha256(coalesce(sql, ''))
+SELECT 'trigger ' || schema_name || '.' || trigger_name, coalesce(sql, '')
 FROM duckdb_triggers()
 WHERE database_name = current_database()
 UNION ALL
@@ -62,8 +56,8 @@ WHERE NOT internal AND database_name = current_database()
 """
 
 
-def rendered(con: duckdb.DuckDBPyConnection) -> Definitions:
-    """Return the definitions in the current database, without reading any of its tables."""
+def definitions(con: duckdb.DuckDBPyConnection) -> dict[str, str]:
+    """Return the definitions in the current database by kind and name; read none of its tables."""
     return dict(con.execute(_RENDERED).fetchall())
 
 
@@ -78,7 +72,7 @@ def require_ours(con: duckdb.DuckDBPyConnection, path: Path, *, only_tables: boo
     Raises:
         DatabaseError: one is missing, changed, or not ours.
     """
-    found, wanted = rendered(con), dict(expected())
+    found, wanted = definitions(con), dict(expected_definitions())
     if only_tables:
         found, wanted = (
             {name: text for name, text in each.items() if not name.startswith(("view", "macro"))}
@@ -91,7 +85,7 @@ def require_ours(con: duckdb.DuckDBPyConnection, path: Path, *, only_tables: boo
     how = (
         "lacks a" if name not in found else "has a foreign" if name not in wanted else "has another"
     )
-    # Views and macros are made anew by an upgrade, the rest is not.
+    # An upgrade makes views and macros anew, but not the rest.
     can_upgrade = name.startswith(("view", "macro"))
     raise DatabaseError(
         f"the database is not as msgflow makes it: it {how} {name} — {path}",
@@ -101,21 +95,11 @@ def require_ours(con: duckdb.DuckDBPyConnection, path: Path, *, only_tables: boo
     )
 
 
-def remember(con: duckdb.DuckDBPyConnection) -> None:
-    """Keep the definitions of a database that this process has just made, and opened again."""
-    cache_of_user.made_once(_KIND, _RENDERED, lambda: rendered(con))
-
-
 @cache
-def expected() -> Mapping[str, str]:
-    """Return the definitions that a database of this msgflow has."""
-    found: Definitions = cache_of_user.made_once(_KIND, _RENDERED, _made)
-    return found
-
-
-def _made() -> Definitions:
+def expected_definitions() -> Mapping[str, str]:
+    """Return the definitions that a database of this msgflow has, by kind and name."""
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
         path = Path(directory) / "new.duckdb"
         write_new(path)
         with duckdb.connect(str(path), read_only=True) as con:
-            return rendered(con)
+            return definitions(con)

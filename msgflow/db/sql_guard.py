@@ -1,0 +1,154 @@
+"""The guard of SQL that users write: one query, or EXPLAIN of one, which cannot change anything.
+
+DuckDB's parser tells what kind of statement a text is. That is not enough: `WITH x AS (COPY … TO
+'file') FROM x` is a SELECT, and DuckDB lets it write to the log beside a read-only database. DuckDB
+allows such a WITH at the top of a statement only. Hence a query runs as a subquery. Which files a
+query can read is up to the sandbox of its connection (`msgflow/db/sandbox.py`).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+
+import duckdb
+
+from msgflow.errors import QueryError, UsageError
+
+_CONDITION_HINT = "such as --where \"p99_ns > 80e6 AND node LIKE '%planner'\""
+_HINT = "SELECT, FROM, WITH, VALUES, DESCRIBE, SUMMARIZE, SHOW and EXPLAIN of such read"
+_PARSED = "SELECT json_serialize_sql(?, skip_null := true, skip_empty := true)"
+
+
+def guarded_query(con: duckdb.DuckDBPyConnection, text: str, example: str) -> str:
+    """Return the SQL to run in place of the query in `text`, with the same rows.
+
+    Args:
+        con: any connection; it parses.
+        text: one query, or EXPLAIN of one.
+        example: a command with SQL.
+
+    Raises:
+        UsageError: `text` is empty.
+        QueryError: it is another kind of statement, or more than one.
+        duckdb.Error: it is not SQL.
+    """
+    statements = _statements(con, text)
+    if not statements:
+        raise UsageError("there is no SQL to run", example)
+    if len(statements) > 1:
+        raise QueryError(
+            f"one query at a time — {len(statements)} statements", "run them one after the other"
+        )
+    ((kind, statement),) = statements
+    # DuckDB counts bytes.
+    code = statement.encode()
+    tokens = [at for at, token in duckdb.tokenize(statement) if token.name != "comment"]
+    end = next((at for at in tokens if code.startswith(b";", at)), len(code))
+    if kind == "SELECT":
+        return _as_subquery(code[:end])
+    start = _start_of_explained(con, code[:end], tokens) if kind == "EXPLAIN" else None
+    if start is not None:
+        return f"{code[:start].decode()} {_as_subquery(code[start:end])}"
+    if kind == "MULTI":
+        raise QueryError(
+            "PIVOT has to find its columns first, by creating a type",
+            "name them: PIVOT … ON column IN ('a', 'b') USING …",
+        )
+    raise _refused(kind.replace("_", " "))
+
+
+def require_condition(
+    con: duckdb.DuckDBPyConnection, text: str, hint: str = _CONDITION_HINT
+) -> None:
+    """Raise unless `text` is one expression of SQL.
+
+    `1) OR (1=1` would be a condition as well, once it stands in parentheses. Only the syntax tree
+    shows that it is none.
+
+    Args:
+        con: any connection; it parses.
+        text: the condition that a user gave.
+        hint: an example of one.
+
+    Raises:
+        UsageError: it is something else, or has parameters.
+        QueryError: it is nested too deeply.
+    """
+    sql = f"SELECT {text}\n"
+    try:
+        statements = con.extract_statements(sql)
+    except duckdb.Error as error:
+        raise UsageError(
+            f"--where is no condition in SQL: {str(error).splitlines()[0]}", hint
+        ) from error
+    if len(statements) != 1 or not _is_expression(con, sql):
+        raise UsageError(f"--where is no condition in SQL — {text}", hint)
+    if statements[0].named_parameters:
+        raise UsageError(f"--where takes no parameters — {text}", hint)
+
+
+def _statements(con: duckdb.DuckDBPyConnection, text: str) -> list[tuple[str, str]]:
+    """Return the kind and the text of each statement."""
+    try:
+        return [
+            (statement.type.name, statement.query) for statement in con.extract_statements(text)
+        ]
+    except ValueError as error:  # a kind of statement that Python has no name for
+        raise _refused("a kind of statement that msgflow does not know") from error
+
+
+def _as_subquery(query: bytes) -> str:
+    # A comment at the end of the query ends with the line.
+    return f"FROM (\n{query.decode()}\n)"
+
+
+def _start_of_explained(
+    con: duckdb.DuckDBPyConnection, code: bytes, tokens: list[int]
+) -> int | None:
+    """Return where the query begins that an EXPLAIN explains; None: it explains something else."""
+
+    def is_query(start: int) -> bool:
+        try:
+            found = _statements(con, code[start:].decode())
+        except duckdb.Error:
+            return False
+        return [kind for kind, _ in found] == ["SELECT"]
+
+    words = iter([*(at for at in tokens if at < len(code)), len(code)])
+    next(words)
+    start = next(words)
+    if re.match(rb"ANALYZE\b", code[start:], re.IGNORECASE):
+        start = next(words)
+    if code.startswith(b"(", start) and not is_query(start):
+        # Options, such as (FORMAT json).
+        while not code.startswith(b")", next(words)):
+            pass
+        start = next(words)
+    return start if is_query(start) else None
+
+
+def _is_expression(con: duckdb.DuckDBPyConnection, sql: str) -> bool:
+    """Tell whether a query is a SELECT of one expression and nothing else."""
+    try:
+        tree = json.loads(con.execute(_PARSED, [sql]).fetchall()[0][0])
+    except RecursionError as error:
+        raise QueryError("the statement is nested too deeply", "use WITH") from error
+    if tree["error"]:
+        return False
+    node = tree["statements"][0]["node"]
+    return (
+        node["type"] == "SELECT_NODE"
+        and len(node["select_list"]) == 1
+        and not node["select_list"][0].get("alias")
+        and node["from_table"]["type"] == "EMPTY"
+        and not any(
+            node.get(key)
+            for key in ("where_clause", "group_expressions", "having", "qualify", "modifiers")
+        )
+        and not node.get("cte_map", {}).get("map")
+    )
+
+
+def _refused(what: str) -> QueryError:
+    return QueryError(f"not a statement that only reads — {what}", _HINT)
