@@ -20,7 +20,6 @@ def main() -> None:
     STOP.install()
     from msgflow.cli.app import app
 
-    gc.freeze()
     gc.enable()
     app()
 

@@ -1,8 +1,7 @@
-"""The names that a database has, for completion in a shell: quickly, silently, and nothing else.
+"""Names in a database, for completion in a shell: few, quick and silent.
 
-A shell asks again at every key. Hence this reads a few names and checks no schema; whatever goes
-wrong, there are no names. DuckDB's own module is opened without the Python around it, which takes
-five times as long to import.
+A shell asks again at every key. Hence this checks no schema and reports no error: there are just no
+names then.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
     """Return the names in a database that begin with `prefix`, sorted, at most 1000.
 
     Args:
-        path: the database; missing, in use, damaged or foreign ones have no names.
+        path: the database; one that is missing, in use, damaged or foreign has no names.
         kind: 'run', 'topic', 'node', 'callback', 'host', 'view', or 'place' for topics, nodes and
             services.
         prefix: how they begin.
@@ -50,10 +49,10 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
     # DuckDB would wait for a pipe.
     if not path.is_file():
         return ()
-    import _duckdb
+    import duckdb
 
     try:
-        connection = _duckdb.connect(
+        connection = duckdb.connect(
             str(path),
             read_only=True,
             config={
@@ -63,7 +62,7 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
                 "threads": 1,
             },
         )
-        # What a foreign file has under these names could take for ever.
+        # Views of a foreign file could run for ever.
         timer = Timer(_SECONDS, connection.interrupt)
         timer.daemon = True
         timer.start()
@@ -73,8 +72,7 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
         finally:
             timer.cancel()
             connection.close()
-            # It would keep the connection until after the program has ended, which DuckDB's
-            # binding complains of on stderr, amid the line that somebody types.
+            # A timer that outlives the program makes DuckDB's binding write to stderr.
             timer.join()
-    except (_duckdb.Error, UnicodeError):
+    except (duckdb.Error, UnicodeError):
         return ()

@@ -293,7 +293,7 @@ def test_completion_imports_no_more_than_it_needs(small_database: Path, tmp_path
     )
     assert done.stdout.split() == ["/chatter"]
     heavy = {
-        "duckdb", "pyarrow", "numpy", "sqlalchemy", "alembic", "pydantic", "rich.markdown",
+        "pyarrow", "numpy", "sqlalchemy", "alembic", "pydantic", "rich.markdown",
         "msgflow.database", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
     }  # fmt: skip
     assert heavy & set(done.stderr.split()) == set()
