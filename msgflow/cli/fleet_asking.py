@@ -114,8 +114,8 @@ def query(
     than 1 %; they are never averages of those of runs.
     """
     from msgflow.cli.output import print_list, print_result
-    from msgflow.fleet.asking import fleet_query, header_of, names
     from msgflow.fleet.lake import Lake
+    from msgflow.fleet.lake_query import fleet_query, header_of, names
     from msgflow.query.selection import values_of
     from msgflow.query.show.present import MOST_ROWS
 
@@ -161,8 +161,8 @@ def sql(
     runs that count; public views are view.publication and so on.
     """
     from msgflow.cli.output import print_result
-    from msgflow.fleet.asking import fleet_sql
     from msgflow.fleet.lake import Lake
+    from msgflow.fleet.lake_query import fleet_sql
 
     query = sql_of(text, file, "msgflow fleet sql 'FROM run'")
     require_lake(lake)
@@ -187,8 +187,8 @@ def worst(
 ) -> None:
     """Show the flows of a path that took longest, with what opens each."""
     from msgflow.cli.output import print_result
-    from msgflow.fleet.asking import fleet_worst
     from msgflow.fleet.lake import Lake
+    from msgflow.fleet.lake_query import fleet_worst
 
     result = fleet_worst(Lake.open(lake), path, where=where, limit=limit)
     print_result(result, form, output, wide=wide, columns=columns, most_rows=limit)
@@ -213,7 +213,7 @@ def open_(
     """Bring one run of a lake back as an ordinary database, for flow, ui and all other commands."""
     from msgflow.cli.output import print_status
     from msgflow.fleet.lake import Lake
-    from msgflow.fleet.opening import open_run
+    from msgflow.fleet.run_database import open_run
 
     done = open_run(Lake.open(lake), run, output)
     more = f", upgraded from schema revision {done.before}" if done.before else ""

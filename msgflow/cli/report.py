@@ -91,7 +91,7 @@ def command(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
         from msgflow.fleet.lake import Lake
-        from msgflow.fleet.page import write_lake_page
+        from msgflow.fleet.lake_page import write_lake_page
 
         page = write_lake_page(Lake.open(lake), output, where=where, max_size=size)
         for note in page.notes:

@@ -62,7 +62,7 @@ def command(
         serve(database, port=port, memory_limit=memory_limit, started=started)
         return
     from msgflow.fleet.lake import Lake
-    from msgflow.fleet.page import lake_page
+    from msgflow.fleet.lake_page import lake_page
 
     opened = Lake.open(lake)
     # Once before anybody looks: what cannot be shown is said here.

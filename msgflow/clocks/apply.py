@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.db.change import change_runs
 from msgflow.db.derive import derive_from_clocks
 from msgflow.db.noted import forget, note
+from msgflow.db.runs import change_runs
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:

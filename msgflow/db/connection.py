@@ -9,8 +9,7 @@ import duckdb
 
 from msgflow.db.definition_check import require_ours
 from msgflow.db.objects import definition_hash, head_revision, is_before_release, known_revisions
-from msgflow.db.sandbox import open_file, opening, require_file
-from msgflow.db.spill import remove_abandoned
+from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, require_file
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import database_errors
 
@@ -70,7 +69,7 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
         return
     require_current(con, path)
     require_ours(con, path)
-    remove_abandoned(path, is_ours_alone=True)
+    remove_abandoned_spills(path, is_ours_alone=True)
 
 
 def recorded_revision(con: duckdb.DuckDBPyConnection) -> str | None:

@@ -1,25 +1,71 @@
-"""Removes, renames and labels runs of a database: all that was asked for, or nothing."""
+"""Changes to runs of a database, each in one transaction: remove, rename, label, and others."""
 
 from __future__ import annotations
 
+import contextlib
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from msgflow.db.change import change_runs
+import duckdb
+
+from msgflow.db.connection import connect
 from msgflow.db.store import delete
 from msgflow.errors import UsageError
-from msgflow.run.choice import is_run_name
+from msgflow.query.run import read_runs
+from msgflow.run.choice import choose_runs, is_run_name
+from msgflow.sql.failure import database_errors
+from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
-
-    import duckdb
 
     from msgflow.run.choice import Run
 
+_T = TypeVar("_T")
 _KEY = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 _LONGEST_VALUE = 1_000
+
+
+def change_runs(
+    path: Path,
+    run: str | int | None,
+    change: Callable[[duckdb.DuckDBPyConnection, tuple[Run, ...]], _T],
+    *,
+    memory_limit: str | None = None,
+) -> _T:
+    """Change runs of a database in one transaction, which Ctrl-C undoes.
+
+    Args:
+        path: the database.
+        run: 'all', a name or an id; the latest run when None.
+        change: does it, inside the open transaction; what it returns is returned.
+        memory_limit: most memory that the database takes, such as '2GB'.
+
+    Raises:
+        UsageError: no such run, or of `change`.
+        DatabaseError: the database is missing, locked, foreign, or of another schema revision.
+    """
+    with (
+        database_errors(path),
+        contextlib.closing(connect(path, read_only=False, memory_limit=memory_limit)) as con,
+    ):
+        runs = choose_runs(read_runs(con), run)
+        if not runs:
+            raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")
+        return interruptible(con, lambda: _in_transaction(con, lambda: change(con, runs)))
+
+
+def _in_transaction(con: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:
+    con.begin()
+    try:
+        result = work()
+        con.commit()
+    except BaseException:
+        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
+            con.rollback()
+        raise
+    return result
 
 
 def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:

@@ -1,33 +1,40 @@
-"""Opens DuckDB files, whatever is in them, shut in: without other files, network or settings."""
+"""The sandbox: connections of DuckDB without other files, the network or changes to settings.
+
+A connection spills into a directory beside its database. DuckDB makes it when it first needs it,
+and removes it when the connection is closed. Processes that read one file have one directory each,
+and a later command removes those of killed processes.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import duckdb
 
 from msgflow.db.memory import limit_threads, set_memory_limit
-from msgflow.db.spill import remove_abandoned, spill_directory
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
+from msgflow.owner import is_abandoned, mark
 from msgflow.sql.failure import in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
 # Older clients (DBeaver, Grafana, notebooks) read files of this storage version. One before it
 # would lose which parts of stored statements are MATERIALIZED.
 STORAGE_VERSION = "v1.5.0"
+_SPILL = ".spill"
 
 
 def open_file(
     path: Path, *, read_only: bool, memory_limit: str | None = None
 ) -> duckdb.DuckDBPyConnection:
-    """Open a DuckDB file, or create it, whatever is in it.
-
-    The connection reaches no other file and no network, and its settings cannot be changed.
+    """Open any DuckDB file, or create it, in the sandbox.
 
     Raises:
         DatabaseError: it is locked by another process, or no DuckDB file; or `memory_limit` is no
@@ -48,42 +55,83 @@ def open_file(
                 _prepare(con)
                 con.execute("SET temp_directory = ?", [str(spill_directory(path))])
                 shut_in(con)
-                con.execute("SET lock_configuration = true")
             except BaseException:
-                con.close()  # nobody may meet it half prepared
+                con.close()  # a later call must not find it half prepared
                 raise
-    remove_abandoned(path, is_ours_alone=not read_only)
+    remove_abandoned_spills(path, is_ours_alone=not read_only)
     remove_abandoned_workspaces(path.absolute().parent)
     return con
 
 
 def open_memory() -> duckdb.DuckDBPyConnection:
-    """Open a new database in memory, which may still attach files: see `shut_in`."""
+    """Open a new database in memory, outside of the sandbox until `shut_in`."""
     con = duckdb.connect(":memory:")
     _prepare(con)
     return con
 
 
-def shut_in(con: duckdb.DuckDBPyConnection, *, beside: Sequence[Path] = ()) -> None:
-    """Close the file system and the network to a connection, but for what it has open.
+def shut_in(
+    con: duckdb.DuckDBPyConnection,
+    *,
+    directories: Sequence[Path] = (),
+    files: Sequence[str] = (),
+    lock: bool = True,
+) -> None:
+    """Put a connection into the sandbox, for ever: it keeps the databases that it has attached.
 
     Args:
-        con: the connection; this cannot be taken back.
-        beside: directories that it may write to all the same.
+        con: the connection.
+        directories: it may read and write them all the same.
+        files: likewise.
+        lock: no setting of it can be changed any more.
     """
-    if beside:
-        con.execute("SET allowed_directories = ?", [[str(path.absolute()) for path in beside]])
+    con.execute("SET allowed_directories = ?", [[str(path.absolute()) for path in directories]])
+    con.execute("SET allowed_paths = ?", [list(files)])
     con.execute("SET enable_external_access = false")
+    if lock:
+        con.execute("SET lock_configuration = true")
 
 
 def _is_shut_in(con: duckdb.DuckDBPyConnection) -> bool:
-    # This cannot be taken back, whether the configuration is locked or not.
     found = con.execute("SELECT current_setting('enable_external_access')").fetchall()
     return found == [(False,)]
 
 
+def spill_directory(database: Path) -> Path:
+    """Return the directory that connections of this process to `database` spill to."""
+    return _place(database) / f"{_prefix(database)}{mark()}{_SPILL}"
+
+
+def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
+    """Remove the spill directories of processes that have ended.
+
+    Args:
+        database: the file.
+        is_ours_alone: it is open for writing, so that no other process can have it open.
+    """
+    prefix = _prefix(database)
+    try:
+        entries = [entry.name for entry in os.scandir(_place(database))]
+    except OSError:
+        return
+    for name in entries:
+        if name.startswith(prefix) and name.endswith(_SPILL):
+            owner = name[len(prefix) : -len(_SPILL)]
+            if owner != mark() and (is_ours_alone or is_abandoned(owner)):
+                shutil.rmtree(_place(database) / name, ignore_errors=True)
+
+
+def _place(database: Path) -> Path:
+    parent = database.absolute().parent
+    return parent if os.access(parent, os.W_OK) else Path(tempfile.gettempdir())
+
+
+def _prefix(database: Path) -> str:
+    return f".{database.name}."
+
+
 def require_file(path: Path) -> None:
-    """Raise where a path is something else than a file.
+    """Raise unless a path is a file, or nothing yet.
 
     Raises:
         DatabaseError: it is a directory, pipe, socket or device.
@@ -97,22 +145,22 @@ def require_file(path: Path) -> None:
 def _prepare(con: duckdb.DuckDBPyConnection) -> None:
     con.execute("SET autoinstall_known_extensions = false")
     con.execute("SET autoload_known_extensions = false")
-    # stdout is for data: DuckDB would draw its bar there when a statement takes long.
-    # In a notebook without ipywidgets there is none, and the setting cannot be touched.
+    # DuckDB would draw its progress bar on stdout, which is for data. A notebook without
+    # ipywidgets has no bar, and DuckDB refuses the setting there.
     if con.execute("SELECT current_setting('enable_progress_bar')").fetchall() == [(True,)]:
         con.execute("SET enable_progress_bar = false")
-    # What is set for a connection is set for those made of it, too, only where it is global.
+    # A cursor of the connection has its global settings only.
     for scope in ("", "GLOBAL"):
-        # A name that is no table is no variable of Python either.
+        # Names in SQL are tables, never variables of Python.
         con.execute(f"SET {scope} python_enable_replacements = false")
-        # Where it expects few rows on the left of an ASOF join, DuckDB compares each of them with
-        # all on the right. Behind filters it expects few where there are thousands.
+        # DuckDB compares each row on the left of an ASOF join with all on the right if it expects
+        # few on the left. Behind filters it expects few where there are thousands.
         con.execute(f"SET {scope} asof_loop_join_threshold = 0")
 
 
 @contextlib.contextmanager
 def opening(path: Path) -> Iterator[None]:
-    """Raise what opening a file raises as a DatabaseError."""
+    """Turn errors of opening a file into a DatabaseError."""
     try:
         yield
     except duckdb.IOException as error:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.fleet.store import Entry
+    from msgflow.fleet.file_store import Entry
 
 PACK = "pack"
 # Of one pack: what is held in memory at once, and written again when a run of it is removed.

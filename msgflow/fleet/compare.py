@@ -9,7 +9,7 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
-from msgflow.fleet.reading import Choice, Reading, choose
+from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.nearest import nearest
 from msgflow.query.compare import STATISTICS, Failure, failures
 from msgflow.query.result import QueryResult

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.failure import forget_failure, read_failures, write_failure
+from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake, visible
 from msgflow.fleet.recording import is_archive_name, look_at
 from msgflow.fleet.sources import find_recordings
-from msgflow.fleet.store import S3, normal_url
 from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.db.runs import require_label
 from msgflow.errors import UsageError
+from msgflow.fleet.file_store import Store, normal_url
 from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.recording import Recording
-from msgflow.fleet.store import Store, normal_url
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

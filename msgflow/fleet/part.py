@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.fleet.store import Store
+    from msgflow.fleet.file_store import Store
 
 KEY = "run"
 _ROWS_AT_ONCE = 100_000

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.fleet.store import Store
+from msgflow.fleet.file_store import Store
 from msgflow.trace.archive import SUFFIXES
 
 if TYPE_CHECKING:

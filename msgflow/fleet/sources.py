@@ -8,9 +8,9 @@ import os
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.fleet.file_store import S3, Store, normal_url
 from msgflow.fleet.manifest import is_manifest, read_manifest
 from msgflow.fleet.recording import Recording
-from msgflow.fleet.store import S3, Store, normal_url
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from msgflow.errors import UsageError
 from msgflow.fleet.task import Outcome, Reason, Task
-from msgflow.fleet.work import run_task
+from msgflow.fleet.task_process import run_task
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -184,7 +184,8 @@ def ingest(
                     if name is not None and not replace:
                         require_free_name(con, name)
                 staging.attach(con, directory)
-                shut_in(con, beside=[directory, *([keep_staging] if keep_staging else [])])
+                written = [directory, *([keep_staging] if keep_staging else [])]
+                shut_in(con, directories=written, lock=False)
                 watch.enter("reading the traces")
                 with staging.writing(con):
                     loaded = load_traces(

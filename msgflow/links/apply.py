@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.db.change import change_runs
 from msgflow.db.derive import derive
+from msgflow.db.runs import change_runs
 from msgflow.links.match import match_links
 from msgflow.sql.statement import program
 

@@ -12,8 +12,8 @@ import pytest
 import msgflow
 from msgflow import owner
 from msgflow.atomic import replacing
-from msgflow.db import spill
 from msgflow.db.connection import connect
+from msgflow.db.sandbox import spill_directory
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
@@ -65,7 +65,7 @@ def test_a_query_spills_beside_the_database_and_leaves_nothing(small_database: P
             "SELECT count(*) AS n FROM (SELECT hash(range) AS h FROM range(4000000) ORDER BY h)"
         )
         inside = {*os.listdir(small_database.parent)} - before
-        assert inside <= {spill.spill_directory(small_database).name}
+        assert inside <= {spill_directory(small_database).name}
     assert set(os.listdir(small_database.parent)) == before
 
 

@@ -17,13 +17,13 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
 from msgflow.fleet import ingest as ingesting
-from msgflow.fleet import work, workers
+from msgflow.fleet import task_process, workers
 from msgflow.fleet.compact import compact
 from msgflow.fleet.failure import read_failures
+from msgflow.fleet.file_store import Store
 from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.recording import look_at
-from msgflow.fleet.store import Store
 from msgflow.fleet.task import Outcome, Task
 
 BROKEN = "broken"
@@ -243,7 +243,7 @@ def test_compaction_keeps_what_counts(place: Path) -> None:
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
     Path("file").write_text("")
     task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
-    found = Outcome(**work.run_task(task.as_dict()))
+    found = Outcome(**task_process.run_task(task.as_dict()))
     assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
 
 

@@ -22,7 +22,7 @@ from typer.testing import CliRunner, Result
 from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet import child, work
+from msgflow.fleet import child_process, task_process
 from msgflow.fleet.compact import compact
 from msgflow.fleet.failure import read_failures
 from msgflow.fleet.ingest import Options, fleet_ingest
@@ -183,7 +183,7 @@ def test_what_was_mended_is_tried_again(
 ) -> None:
     def here(given: dict[str, Any]) -> dict[str, Any]:
         with TemporaryDirectory() as directory:
-            return child.do(Task(**given), Path(directory)).as_dict()
+            return child_process.do(Task(**given), Path(directory)).as_dict()
 
     # That each has a process of its own is shown by the other tests.
     monkeypatch.setattr("msgflow.fleet.workers.run_task", here)
@@ -228,7 +228,7 @@ def task(filled: Filled) -> Task:
 
 
 def outcome(task: Task, **more: Any) -> Outcome:
-    return Outcome(**work.run_task({**task.as_dict(), **more}))
+    return Outcome(**task_process.run_task({**task.as_dict(), **more}))
 
 
 def test_what_hangs_or_grows_is_ended(task: Task, tmp_path: Path) -> None:
@@ -275,7 +275,9 @@ def test_a_source_that_changes_while_it_is_read(
 
     monkeypatch.setattr(recording, "look_at", then_it_grows)
     (tmp_path / "scratch").mkdir()
-    changed = child.do(Task(**{**task.as_dict(), "source": str(source)}), tmp_path / "scratch")
+    changed = child_process.do(
+        Task(**{**task.as_dict(), "source": str(source)}), tmp_path / "scratch"
+    )
     assert (changed.reason, changed.stage) == ("changed", "looking at the source again")
 
 
@@ -287,7 +289,7 @@ def test_a_disk_that_fills_is_said(
 
     before = Lake.open(task.lake).rows()
     monkeypatch.setattr(Database, "ingest", fill)
-    full = child.do(task, tmp_path)
+    full = child_process.do(task, tmp_path)
     assert (full.reason, full.stage, full.values) == ("no_space", "ingesting", None)
     assert full.reason in PASSING
     assert Lake.open(task.lake).rows().equals(before)
@@ -350,8 +352,8 @@ def test_what_may_pass_is_tried_again(
     ],
 )
 def test_too_little_memory_is_told_from_other_errors(error: Exception) -> None:
-    assert child._failed(error, "answers", 1.0).reason == "too_large"
-    assert child._failed(UsageError("no such query"), "answers", 1.0).reason != "too_large"
+    assert child_process._failed(error, "answers", 1.0).reason == "too_large"
+    assert child_process._failed(UsageError("no such query"), "answers", 1.0).reason != "too_large"
 
 
 def test_what_no_worker_has_is_not_tried(filled: Filled, tmp_path: Path) -> None:
@@ -402,7 +404,7 @@ def test_a_lake_where_nobody_may_write(filled: Filled) -> None:
 
 def test_a_lake_that_cannot_be_reached(filled: Filled, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setattr("msgflow.fleet.store._MOST_ATTEMPTS", 1)
+    monkeypatch.setattr("msgflow.fleet.file_store._MOST_ATTEMPTS", 1)
     result = run("ingest", filled.recordings / "r0", "--lake", "s3://fleet/lake")
     assert result.exit_code == 4
     assert "cannot read the store" in result.stderr

@@ -15,10 +15,10 @@ from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import compact
+from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import run_schema
 from msgflow.fleet.part import Content, Part, part_name, write_part
-from msgflow.fleet.store import Store
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
 PAGE = DOCS.read_text(encoding="utf-8")

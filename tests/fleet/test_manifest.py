@@ -12,10 +12,10 @@ import pytest
 from object_store import KEYS, ObjectStore, object_store
 
 from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet.file_store import Store
 from msgflow.fleet.manifest import read_manifest
 from msgflow.fleet.recording import fetch, look_at
 from msgflow.fleet.sources import find_recordings
-from msgflow.fleet.store import Store
 
 pytest.importorskip("moto.moto_server", reason="moto[server] is not installed")
 
@@ -151,9 +151,9 @@ def test_a_store_that_is_not_there(bucket: ObjectStore, monkeypatch: pytest.Monk
         Store("s3://nobodys-bucket/lake").put("x", b"y")
     assert not any(secret in str(raised.value) for secret in KEYS.values() if "-1" not in secret)
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setattr("msgflow.fleet.store._MOST_ATTEMPTS", 1)
+    monkeypatch.setattr("msgflow.fleet.file_store._MOST_ATTEMPTS", 1)
     # Where nobody answers nothing but the client of AWS tries again.
-    monkeypatch.setattr("msgflow.fleet.store._PAUSES", (1e6,))
+    monkeypatch.setattr("msgflow.fleet.file_store._PAUSES", (1e6,))
     with pytest.raises(DatabaseError, match="cannot read the store"):
         Store("s3://fleet/lake").read("lake.json")
 

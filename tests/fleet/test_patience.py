@@ -9,8 +9,8 @@ import pytest
 from pyarrow.fs import FileInfo, FileType
 
 from msgflow.errors import DatabaseError
-from msgflow.fleet import store as store_module
-from msgflow.fleet.store import Store
+from msgflow.fleet import file_store as store_module
+from msgflow.fleet.file_store import Store
 
 LOOKS: list[Callable[[Store], Any]] = [Store.entries, Store.folders, Store.entry]
 

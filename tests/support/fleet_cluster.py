@@ -18,9 +18,9 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from msgflow.fleet.answers import answers
+from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
-from msgflow.fleet.store import Store
 
 NODE = {
     "num_cpus": 1,
@@ -137,8 +137,8 @@ def children(scratch: Path) -> dict[int, str]:
     for entry in Path("/proc").iterdir():
         with contextlib.suppress(OSError, IndexError):
             words = (entry / "cmdline").read_bytes().split(b"\0")
-            if b"msgflow.fleet.child" in words:
-                directory = Path(words[words.index(b"msgflow.fleet.child") + 1].decode())
+            if b"msgflow.fleet.child_process" in words:
+                directory = Path(words[words.index(b"msgflow.fleet.child_process") + 1].decode())
                 if scratch in directory.parents:  # not those of others
                     found[int(entry.name)] = (directory / "stage").read_text()
     return found

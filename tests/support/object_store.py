@@ -50,7 +50,7 @@ class ObjectStore:
 
     def put(self, path: str, content: bytes) -> None:
         """Write an object: BUCKET/KEY."""
-        from msgflow.fleet.store import Store
+        from msgflow.fleet.file_store import Store
 
         Store(f"s3://{path.rpartition('/')[0]}").put(path.rpartition("/")[2], content)
 

@@ -18,11 +18,11 @@ from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
 from msgflow.fleet.answers import answers
-from msgflow.fleet.asking import fleet_query
 from msgflow.fleet.failure import write_failure
 from msgflow.fleet.lake import Lake
+from msgflow.fleet.lake_page import lake_page, write_lake_page
+from msgflow.fleet.lake_query import fleet_query
 from msgflow.fleet.layout import part_path
-from msgflow.fleet.page import lake_page, write_lake_page
 from msgflow.fleet.part import Content, write_part
 from msgflow.view.server import listening, single_application
 

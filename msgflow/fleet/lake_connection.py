@@ -72,7 +72,6 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
     """
     with open_memory() as con:
         shut_in(con)
-        con.execute("SET lock_configuration = true")
         runs = visible(lake.rows(), con)
         if not len(runs):
             raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
@@ -177,9 +176,7 @@ class Reading:
         try:
             with lake_errors(choice.lake):
                 self._fill(tables)
-            self.connection.execute("SET allowed_paths = ?", [self._local_files])
-            shut_in(self.connection)
-            self.connection.execute("SET lock_configuration = true")
+            shut_in(self.connection, files=self._local_files)
         except BaseException:
             self.close()
             raise

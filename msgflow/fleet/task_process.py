@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.fleet.child import RESULT, STAGE
+from msgflow.fleet.child_process import RESULT, STAGE
 from msgflow.fleet.task import Outcome, Reason, Task, without_secrets
 from msgflow.owner import is_abandoned, mark
 
@@ -74,7 +74,7 @@ def _scratch(parent: str | None) -> Iterator[Path]:
 def _watched(task: Task, directory: Path, begin: float) -> Outcome:
     with (directory / _LOG).open("wb") as log:
         child = subprocess.Popen(
-            [sys.executable, "-m", "msgflow.fleet.child", str(directory)],
+            [sys.executable, "-m", "msgflow.fleet.child_process", str(directory)],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=log,

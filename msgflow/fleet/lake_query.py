@@ -19,14 +19,14 @@ from msgflow.database import capped, sql_error
 from msgflow.db.sql_guard import guarded_query
 from msgflow.errors import QueryError, UsageError
 from msgflow.fleet.answers import answers
-from msgflow.fleet.layout import VIEWS
-from msgflow.fleet.reading import (
+from msgflow.fleet.lake_connection import (
     Reading,
     choose,
     lake_errors,
     quoted,
     what_there_is,
 )
+from msgflow.fleet.layout import VIEWS
 from msgflow.nearest import nearest
 from msgflow.query.catalogue import query_names
 from msgflow.query.result import QueryResult
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from msgflow.fleet.lake import Lake
-    from msgflow.fleet.reading import Choice
+    from msgflow.fleet.lake_connection import Choice
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
 

@@ -12,11 +12,11 @@ from object_store import KEYS, ObjectStore, object_store
 from sql_attack import ALLOWED, SECRET, answered, attack, content
 
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.asking import fleet_query, fleet_sql, fleet_worst
+from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.opening import open_run
-from msgflow.fleet.reading import choose, open_runs
-from msgflow.fleet.store import Store
+from msgflow.fleet.lake_connection import choose, open_runs
+from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst
+from msgflow.fleet.run_database import open_run
 from msgflow.query.result import QueryResult
 
 

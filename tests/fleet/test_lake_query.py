@@ -16,9 +16,9 @@ from typer.testing import CliRunner, Result
 from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import QueryError, UsageError
-from msgflow.fleet.asking import fleet_query, fleet_sql, fleet_worst, names, statements
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.reading import Reading, choose
+from msgflow.fleet.lake_connection import Reading, choose
+from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst, names, statements
 from msgflow.query.catalogue import query_names
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "fleet.md").read_text(encoding="utf-8")
@@ -275,7 +275,7 @@ def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) 
 def test_nobody_waits_for_pandas(night: Lake) -> None:
     """It is imported by pyarrow for values of Python, and takes longer than a small question."""
     program = (
-        "import sys; from msgflow.fleet.asking import fleet_query; "
+        "import sys; from msgflow.fleet.lake_query import fleet_query; "
         "from msgflow.fleet.lake import Lake; "
         "fleet_query(Lake.open(sys.argv[1]), 'e2e-latency', where=\"robot = 'r1'\"); "
         "assert 'pandas' not in sys.modules"

@@ -12,7 +12,7 @@ from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path
-from msgflow.fleet.opening import open_run
+from msgflow.fleet.run_database import open_run
 
 
 def key_of(lake: Lake, name: str) -> str:

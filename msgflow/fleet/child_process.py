@@ -1,4 +1,4 @@
-"""The process that does one recording: `python -m msgflow.fleet.child DIRECTORY`.
+"""The process that does one recording: `python -m msgflow.fleet.child_process DIRECTORY`.
 
 It reads its task from stdin, and ends as soon as that is closed: nobody waits for it any more. What
 it is doing, and what came of it, stands in files of the directory, which its parent removes.
@@ -80,10 +80,10 @@ class _Stage:
 
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
     from msgflow.database import Database
+    from msgflow.fleet.file_store import S3
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.part import Content, write_part
     from msgflow.fleet.recording import fetch, look_at
-    from msgflow.fleet.store import S3
 
     enter("looking at the source")
     before = look_at(task.source)

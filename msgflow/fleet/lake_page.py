@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.fleet.asking import fleet_query, statements
+from msgflow.fleet.lake_connection import Reading, choose, lake_errors
+from msgflow.fleet.lake_query import fleet_query, statements
 from msgflow.fleet.listing import list_failures
-from msgflow.fleet.reading import Reading, choose, lake_errors
 from msgflow.view.columns import encode
 from msgflow.view.single_page import Parts, single_page
 
