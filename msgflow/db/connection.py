@@ -1,4 +1,4 @@
-"""Connections to databases of msgflow, and the errors of files that are none, or no current one."""
+"""Connections to current databases of msgflow, and errors for all other files."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
 
 
 def recorded_revision(con: duckdb.DuckDBPyConnection) -> str | None:
-    """Return the schema revision of a database, or None where it is not msgflow's."""
+    """Return the schema revision of a database, None if it is not one of msgflow."""
     # Not fetchone: DuckDB refuses the next query as long as this one may have more rows.
     ((count,),) = con.execute(
         "SELECT count(*) FROM duckdb_tables() WHERE database_name = current_database() "

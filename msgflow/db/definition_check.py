@@ -1,8 +1,8 @@
 """The check that the tables, views and macros in a database are those of this msgflow.
 
-Commands that write make it first: they run the SQL of views, macros and triggers in the file, which
-somebody else may have changed. DuckDB renders definitions its own way, and those read from a file
-not as those just created. Hence they are compared with those of a new file.
+Commands that write make it first: they would run changed views, macros and triggers of the file.
+DuckDB renders definitions in its own way, and those of a file not as those just created. Hence the
+definitions are compared with those of a new file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Memory limits of databases, and how many threads they are enough for."""
+"""Memory limits of DuckDB, and the number of threads that they are enough for."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from msgflow.sql.failure import is_of_the_file
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-# DuckDB's own limit is 80 % of the memory of the machine or container; a quarter is left to it.
+# DuckDB's own limit is 80 % of the memory of the machine or container; this gives a quarter of it.
 _SHARE_OF_OWN_LIMIT = 0.25 / 0.8
-# Ten million events fit into the former; more than the latter hardly saves time.
+# An ingest of ten million events works with the least; more than the most hardly saves time.
 _LEAST_DEFAULT_BYTES = 500_000_000
 _MOST_DEFAULT_BYTES = 4_000_000_000
-# With less, even opening fails.
+# With less, DuckDB cannot even open a database.
 _LEAST_BYTES = 15_000_000
-# As DuckDB advises. With less for each, threads spill what fewer would not.
+# DuckDB advises this. With less for each, threads spill more than fewer threads would.
 _BYTES_PER_THREAD = 125_000_000
 _EXAMPLE = "--memory-limit 2GB"
 
 
 def default_limit() -> str:
-    """Return the memory limit of an ingest or a server where the user gave none.
+    """Return the memory limit of an ingest or a server without `--memory-limit`.
 
     It is a quarter of the memory of the machine, at least 500 MB and at most 4 GB.
     """
@@ -36,10 +36,10 @@ def default_limit() -> str:
 
 
 def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
-    """Let a connection take so much memory.
+    """Set the memory limit of a connection.
 
     Raises:
-        DatabaseError: that is no amount, or none that a database can work with.
+        DatabaseError: it is no amount of memory, or too little for a database.
     """
     try:
         con.execute("SET memory_limit = ?", [limit])
@@ -47,18 +47,18 @@ def set_memory_limit(con: duckdb.DuckDBPyConnection, limit: str) -> None:
         raise DatabaseError(f"too little memory for this database — {limit}", _EXAMPLE) from error
     except duckdb.Error as error:
         raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE) from error
-    if limit.strip().startswith("-"):  # DuckDB takes it for no limit
+    if limit.strip().startswith("-"):  # DuckDB reads it as no limit
         raise DatabaseError(f"not an amount of memory — {limit}", _EXAMPLE)
     try:
         is_enough = _limit_bytes(con) >= _LEAST_BYTES
-    except duckdb.OutOfMemoryException:  # not even for that question
+    except duckdb.OutOfMemoryException:  # too little even for that question
         is_enough = False
     if not is_enough:
         raise DatabaseError(f"too little memory for any database — {limit}", _EXAMPLE)
 
 
 def limit_threads(con: duckdb.DuckDBPyConnection) -> None:
-    """Let no more threads work than the memory limit of a connection is enough for."""
+    """Reduce the threads of a connection to what its memory limit is enough for."""
     most = max(1, round(_limit_bytes(con) / _BYTES_PER_THREAD))
     if most < con.execute("SELECT current_setting('threads')").fetchall()[0][0]:
         con.execute(f"SET threads = {most}")
@@ -66,7 +66,7 @@ def limit_threads(con: duckdb.DuckDBPyConnection) -> None:
 
 @contextlib.contextmanager
 def ingest_memory_errors(limit: str) -> Iterator[None]:
-    """Raise an ingest that runs out of memory as an error that says what to do.
+    """Turn an out-of-memory error of an ingest into one that says what to do.
 
     Raises:
         DatabaseError: the traces need more memory than `limit`.
@@ -74,7 +74,7 @@ def ingest_memory_errors(limit: str) -> Iterator[None]:
     try:
         yield
     except duckdb.OutOfMemoryException as error:
-        if is_of_the_file(error):  # nor can more be spilled
+        if is_of_the_file(error):  # the disk is full
             raise
         raise DatabaseError(
             f"the traces need more memory than {limit}",

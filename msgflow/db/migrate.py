@@ -1,4 +1,4 @@
-"""Puts new databases in place, and brings old ones up to date: Alembic for tables, then views."""
+"""Migration: new databases, and upgrades of old ones, by Alembic for tables and anew for views."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Upgrade:
-    """What an upgrade did.
+    """The result of an upgrade.
 
     Attributes:
         before: schema revision found; None for a new file.
         after: schema revision now.
-        views_changed: whether the views had to be applied anew.
-        rederived_runs: names of the runs whose links were derived anew.
+        views_changed: the views were not current.
+        rederived_runs: names of the runs whose links were derived again.
     """
 
     before: str | None
@@ -51,7 +51,7 @@ class Upgrade:
 
 
 def current_revision(con: duckdb.DuckDBPyConnection) -> str | None:
-    """Return the schema revision of a database, or None where it is not msgflow's."""
+    """Return the schema revision of a database, None if it is not one of msgflow."""
     return recorded_revision(con)
 
 
@@ -80,7 +80,7 @@ def _replace_by_new(path: Path) -> None:
 
 
 def require_ingestable(path: Path) -> None:
-    """Raise unless `path` does not exist yet, or is a current msgflow database.
+    """Raise unless `path` is free, or a current msgflow database.
 
     Raises:
         DatabaseError: the file is locked, foreign, or of another schema revision.
@@ -109,7 +109,7 @@ def upgrade(path: Path) -> Upgrade:
                 views_changed = not _has_our_views(con, path)
                 _bring_to_head(con, path)
         if before is None:
-            # One of our own, as its format depends on who made it.
+            # A file of our own: the format of this one depends on the program that made it.
             _replace_by_new(path)
             return Upgrade(None, objects.head_revision(), True, ())
         # DuckDB renders definitions that it has just written in another way than those of a file.
@@ -130,7 +130,7 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
 def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     if recorded_revision(con) != objects.head_revision():
         _migrate(con)
-    # Views over tables that are not there cannot be made.
+    # Views need their tables.
     require_ours(con, path, only_tables=True)
     con.begin()
     try:
@@ -161,7 +161,7 @@ def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
 
 
 def _migrate(con: duckdb.DuckDBPyConnection) -> None:
-    # Only files of an older revision need any of this.
+    # These imports are slow, and only files of an older revision need them.
     from alembic import command
     from alembic.config import Config
     from sqlalchemy.exc import DBAPIError
@@ -173,7 +173,7 @@ def _migrate(con: duckdb.DuckDBPyConnection) -> None:
         with _sqlalchemy_connection(con) as connection:
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
-    except DBAPIError as error:  # a full disk is told as everywhere else
+    except DBAPIError as error:  # so that a full disk has the usual message
         raise (error.orig or error) from error
 
 

@@ -39,11 +39,11 @@ def change_runs(
     Args:
         path: the database.
         run: 'all', a name or an id; the latest run when None.
-        change: does it, inside the open transaction; what it returns is returned.
+        change: is called inside the open transaction; its result is returned.
         memory_limit: most memory that the database takes, such as '2GB'.
 
     Raises:
-        UsageError: no such run, or of `change`.
+        UsageError: no such run, or raised by `change`.
         DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
     with (
@@ -69,7 +69,7 @@ def _in_transaction(con: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _
 
 
 def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:
-    """Delete runs with all that is known of them, and return which.
+    """Delete runs with all their rows, and return them.
 
     Args:
         path: the database.
@@ -135,7 +135,7 @@ def label_runs(
         memory_limit: most memory that the database takes, such as '2GB'.
 
     Raises:
-        UsageError: no such run, a key or a value that cannot be one, or no such label to take away.
+        UsageError: no such run, an invalid key or value, or no such label to take away.
         DatabaseError: the database is missing, locked, foreign, or of another schema revision.
     """
     for key, value in labels.items():
@@ -164,10 +164,10 @@ def label_runs(
 
 
 def require_label(key: str, value: str | None) -> None:
-    """Raise unless there may be such a label.
+    """Raise unless a label is valid.
 
     Raises:
-        UsageError: the key is none, or the value is no text that a database holds, or too long.
+        UsageError: the key is invalid, or the value is too long or not valid Unicode.
     """
     if not _KEY.fullmatch(key):
         raise UsageError(
@@ -192,7 +192,7 @@ def require_run_name(name: str) -> None:
     """Raise unless a run may have this name.
 
     Raises:
-        UsageError: `--run` takes it for something else, or it is no text that a database holds.
+        UsageError: it means something else to `--run`, or is not valid Unicode.
     """
     if not is_run_name(name):
         raise UsageError(

@@ -63,8 +63,8 @@ def require_condition(
 ) -> None:
     """Raise unless `text` is one expression of SQL.
 
-    `1) OR (1=1` would be a condition as well, once it stands in parentheses. Only the syntax tree
-    shows that it is none.
+    `1) OR (1=1` is no expression, but would pass inside of parentheses. Only the syntax tree shows
+    that.
 
     Args:
         con: any connection; it parses.

@@ -1,4 +1,4 @@
-"""Moves a run from staging into the tables of `store`, giving it its ids."""
+"""The store: moves a run from staging into the tables of `store` and assigns its ids."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ if TYPE_CHECKING:
     from msgflow.db.tables import Column, Table
 
 
-# Joins of more rows than fit into memory give them in any order, in which ids and times take far
-# more room. To put fewer rows in order costs more than it saves. Of a view it is not known how many
-# it has: where one table is large, everything is put in order.
+# A join that does not fit into memory gives rows in any order, in which ids and times take far more
+# room in the file. Sorting fewer rows costs more than it saves. The size of a view is not known: if
+# one table is large, all are sorted.
 _ROWS_WORTH_ORDERING = 1_000_000
 
 
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Copy what staging has under the name of a store table, inside the open transaction.
 
-    Ids in staging are above 0; in the store those of a run come after what is there. Tables without
-    a row are left alone: each statement takes longer than its few rows. Which ones have none is
-    known of what was there when the transaction began: staging is filled before it, and one run is
-    stored in it.
+    Ids in staging are above 0; the store adds its highest id to them. Tables without a row are left
+    out, as each statement takes longer than its few rows. DuckDB knows these tables as of the start
+    of the transaction: staging is filled before, and a transaction stores one run.
     """
     staged = dict(
         con.execute(
@@ -63,10 +62,10 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     for table in TABLES.values():
         key = f"{table.name}_id"
         if key in table.columns:
-            row = None
+            bases[key] = 0
             if table.name in filled:
-                row = con.execute(f"SELECT max({key}) FROM {table.full_name}").fetchone()
-            bases[key] = 0 if row is None else int(row[0] or 0)
+                ((most,),) = con.execute(f"SELECT max({key}) FROM {table.full_name}").fetchall()
+                bases[key] = int(most or 0)
     return bases
 
 

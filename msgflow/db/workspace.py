@@ -1,4 +1,4 @@
-"""A directory beside the database for what a command needs only while it runs."""
+"""Workspaces: directories beside a database for the temporary files of a command."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _LOCK = ".lock"
 def workspace(beside: Path) -> Iterator[Path]:
     """Yield an empty directory in the directory of `beside`; it is gone afterwards.
 
-    What a killed command left behind is removed first: a lock file that nobody holds tells. Where
-    the system has no such locks, what was left stays.
+    It first removes workspaces of killed commands, whose lock files no process holds. On a system
+    without such locks these stay.
 
     Raises:
         DatabaseError: the directory of the database cannot be written.
@@ -48,7 +48,7 @@ def workspace(beside: Path) -> Iterator[Path]:
 
 
 def remove_abandoned_workspaces(parent: Path) -> None:
-    """Remove from a directory what killed commands have left there."""
+    """Remove the workspaces of killed commands from a directory."""
     for abandoned in parent.glob(f"{_PREFIX}*{_LOCK}") if fcntl else ():
         with contextlib.suppress(OSError), _locked(abandoned, wait=False):
             shutil.rmtree(abandoned.with_suffix(""), ignore_errors=True)
@@ -56,10 +56,10 @@ def remove_abandoned_workspaces(parent: Path) -> None:
 
 @contextlib.contextmanager
 def creating(database: Path) -> Iterator[None]:
-    """Be the only one to create `database`, as far as the system has file locks.
+    """Keep other processes from creating `database`, if the system has file locks.
 
     Raises:
-        DatabaseError: another process is at it, or the directory cannot be written.
+        DatabaseError: another process is creating it, or the directory cannot be written.
     """
     if not fcntl:
         yield
@@ -90,7 +90,7 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
     """Hold the lock file `path`, which is removed with the lock.
 
     Raises:
-        OSError: somebody else holds it and `wait` is false, or it cannot be created.
+        OSError: another process holds it and `wait` is false, or it cannot be created.
     """
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)

@@ -1,4 +1,4 @@
-"""What a lake holds of every run: answers, each a table whose rows are those of a query."""
+"""Answers: the tables that a lake holds of every run, each with the rows of a query."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FLOW = "flow"
 DISTRIBUTION = "distribution"
 FINDING = "finding"
-# Named queries with their defaults and the rows of ROS itself, each under its own name.
+# Named queries, run with their defaults and with internal rows; each gives a table of its name.
 QUERIES = (
     "e2e-latency",
     "callback-duration",
@@ -42,8 +42,8 @@ class Answer:
 
     Attributes:
         table: its name.
-        read: returns the rows of a run, with a column `run_id`, in an order of their own.
-        meaning: what it is, for docs.
+        read: returns the rows of a run, in a fixed order and with a column `run_id`.
+        meaning: one line for the documentation.
     """
 
     table: str
@@ -52,7 +52,7 @@ class Answer:
 
 
 def answers() -> tuple[Answer, ...]:
-    """Return the answers that a lake holds, in the order in which they are computed."""
+    """Return the answers of a lake in the order of their computation."""
     return (
         Answer(FLOW, _statement("fleet_flow"), "one row per flow of every path"),
         Answer(

@@ -1,7 +1,7 @@
-"""The process that does one recording: `python -m msgflow.fleet.child_process DIRECTORY`.
+"""The child process that ingests one recording: `python -m msgflow.fleet.child_process DIRECTORY`.
 
-It reads its task from stdin, and ends as soon as that is closed: nobody waits for it any more. What
-it is doing, and what came of it, stands in files of the directory, which its parent removes.
+It reads its task from stdin, and ends as soon as its parent closes that. It writes its stage and
+its outcome into files of the directory, which the parent removes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ORPHAN = 1
 
 
 def main() -> None:
-    """Do what stdin says."""
+    """Do the task on stdin."""
     directory = Path(sys.argv[1])
     text = sys.stdin.readline()
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -47,8 +47,8 @@ def do(task: Task, directory: Path) -> Outcome:
     """Fetch, ingest, check and write one recording; commit nothing.
 
     Args:
-        task: what is to be done.
-        directory: an empty one for all that is needed meanwhile.
+        task: the recording and its options.
+        directory: an empty one for temporary files.
     """
     from msgflow.fleet.task import Outcome
 
@@ -66,14 +66,14 @@ def do(task: Task, directory: Path) -> Outcome:
 
 
 class _Stage:
-    """What is being done, for whoever finds the process hanging or gone."""
+    """The current stage, in a file: the parent reads it when the process hangs or has gone."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
         self.name = ""
 
     def enter(self, name: str) -> None:
-        """Begin with something else."""
+        """Begin a stage."""
         self.name = name
         self._file.write_text(name, encoding="utf-8")
 
@@ -131,7 +131,7 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
 
 
 class ChangedError(Exception):
-    """The source changed while it was read."""
+    """The source changed during the ingest."""
 
 
 def _require_space(task: Task, directory: Path) -> None:
@@ -145,7 +145,7 @@ def _require_space(task: Task, directory: Path) -> None:
 
 
 def _rename_paths(database: Path, before: str, after: str) -> None:
-    """Let a database name its source by its own address, wherever it was copied to."""
+    """Replace the path of the local copy by the address of the source in all texts."""
     from msgflow.db.connection import connect
 
     with contextlib.closing(connect(database, read_only=False)) as con:

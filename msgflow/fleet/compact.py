@@ -1,4 +1,4 @@
-"""Fewer, larger files in a lake, and none that nobody needs; also while it is read and written."""
+"""Compaction of a lake: fewer, larger files, and no unused ones; readers and writers go on."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from msgflow.fleet.file_store import Entry
 
 PACK = "pack"
-# Of one pack: what is held in memory at once, and written again when a run of it is removed.
+# Size of one pack: it is held in memory, and written again when one of its runs is removed.
 _MOST_RUNS = 1_000
 _MOST_BYTES = 50_000_000
-# Small groups of rows, run after run: who wants a few of the runs reads only theirs.
+# Small groups of rows, run after run: a query of few runs reads few groups.
 _ROW_GROUP = 20_000
 _READ_AT_ONCE = 16
 DAY = 86_400.0
@@ -34,12 +34,12 @@ DAY = 86_400.0
 
 @dataclass(frozen=True)
 class Compaction:
-    """What was done.
+    """The result of a compaction.
 
     Attributes:
-        packed: runs whose answers lie in a new part now.
+        packed: runs whose answers are in a new part now.
         packs: new parts.
-        deleted: files that were deleted.
+        deleted: deleted files.
         size: their bytes.
     """
 
@@ -52,12 +52,12 @@ class Compaction:
 def compact(lake: Lake, *, older_than: float = DAY) -> Compaction:
     """Put the answers of many runs together, and delete files that no row of `run` needs.
 
-    Readers and writers need not stop: what they may still use stays for `older_than`.
+    Readers and writers may go on: files that they may still use stay for `older_than`.
 
     Args:
         lake: the lake.
-        older_than: seconds for which a file that is not needed stays. It has to be longer than
-            reading takes, and than the ingest of one recording.
+        older_than: seconds for which an unused file stays. This has to be longer than a query, and
+            than the ingest of one recording.
 
     Raises:
         DatabaseError: the lake cannot be read or written.
@@ -78,7 +78,7 @@ def compact(lake: Lake, *, older_than: float = DAY) -> Compaction:
 
 
 def _groups(rows: pa.Table, sizes: Mapping[str, int]) -> list[list[dict[str, Any]]]:
-    """Return the runs whose answers are to lie together, as they do not yet."""
+    """Return groups of runs whose answers are to go into one part."""
     runs = visible(rows).to_pylist()
     living = Counter(row["part"] for row in runs)
     named = Counter(part for _, part in {(row["run"], row["part"]) for row in rows.to_pylist()})
@@ -106,7 +106,7 @@ def _groups(rows: pa.Table, sizes: Mapping[str, int]) -> list[list[dict[str, Any
 def _is_worth_it(
     group: Sequence[Mapping[str, Any]], living: Mapping[str, int], named: Mapping[str, int]
 ) -> bool:
-    """Tell whether runs lie in several parts, or with some that are gone."""
+    """Tell whether runs are in several parts, or in one with runs that are gone."""
     parts = {row["part"] for row in group}
     return len(parts) > 1 or any(
         part.startswith(PACK) and named[part] > living[part] for part in parts
@@ -120,12 +120,12 @@ def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]]) -> None:
         table = _together(lake, answer.table, rows)
         if table is not None:
             _write(lake, answer.table, part, table, revision)
-    # Of the same generation: a run that is replaced or removed meanwhile stays so.
+    # The generation stays: a run that is replaced or removed meanwhile has a higher one.
     lake.commit({**row, "part": part} for row in rows)
 
 
 def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.Table | None:
-    """Return the answers of some runs, run after run; None where no part has the table."""
+    """Return the answers of some runs, run after run; None if no part has the table."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -141,7 +141,7 @@ def _together(lake: Lake, table: str, rows: Sequence[Mapping[str, Any]]) -> pa.T
     if not found:
         return None
     whole = pa.concat_tables(found, promote_options="permissive")
-    # Stable: the rows of a run keep their order.
+    # The sort is stable: the rows of a run keep their order.
     return whole.take(pc.sort_indices(whole["run"]))
 
 
@@ -150,7 +150,7 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
     import pyarrow.compute as pc
 
     content = lake.store.read(part_path(table, part))
-    # One that an earlier msgflow wrote may lack it.
+    # A part of an earlier msgflow may lack the table.
     if content is None:
         return None
     read = read_parquet(content)
@@ -172,9 +172,9 @@ def _write(lake: Lake, name: str, part: str, table: pa.Table, revision: str) -> 
 
 
 def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
-    """Delete what no row needs that counts, or has counted within that time."""
+    """Delete the files that no row names that counts, or counted within that time."""
     before_ns = time.time_ns() - round(older_than * 1e9)
-    # Rows are read first: a part that is written meanwhile is younger.
+    # Rows come first: a part that is written meanwhile is younger than `older_than`.
     files = {path: rows.to_pylist() for path, rows in lake.rows_by_file().items()}
     covered = lake.covered()
     latest: dict[str, dict[str, Any]] = {}
@@ -183,7 +183,7 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
             latest[row["run"]] = row
 
     def is_over(row: Mapping[str, Any]) -> bool:
-        """Tell whether another row has counted for so long that nobody goes by this one."""
+        """Tell whether another row took its place so long ago that no reader uses it any more."""
         newest = latest[row["run"]]
         return _order(row) != _order(newest) and newest["committed_ns"] < before_ns
 
@@ -204,7 +204,7 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
         if entry.changed_ns < before_ns and _part_of(entry) not in parts
     ]
     entries = {entry.path: entry for entry in lake.store.entries(RUN, recursive=False)}
-    # Who listed them before there was a file that stands for them may still read them.
+    # A reader that listed them before their replacement was there may still read them.
     unneeded += [
         entries[path]
         for path, by in covered.items()
@@ -212,7 +212,7 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
     ]
     rest = dict(files)
     while True:
-        # A removal is said until nothing else says that the run is there.
+        # The row of a removal stays as long as another row names the run.
         said = Counter(row["run"] for row in itertools.chain.from_iterable(rest.values()))
         over = [
             path
@@ -232,7 +232,7 @@ def _clean_up(lake: Lake, older_than: float) -> list[Entry]:
 
 
 def _delete(lake: Lake, entry: Entry) -> bool:
-    """Delete a file, unless somebody has written it again meanwhile."""
+    """Delete a file, unless a writer has written it again meanwhile."""
     now = lake.store.entry(entry.path)
     if now is None or now.changed_ns != entry.changed_ns:
         return False

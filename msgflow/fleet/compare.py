@@ -1,4 +1,4 @@
-"""Compares runs of a lake by a label: do they differ by more than runs of one side do?"""
+"""Comparison of runs of a lake by a label: do they differ more than runs of one side do?"""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake
 
 CASES = ("first", "last", "newest", "every_pair")
-# With fewer, intervals are too narrow where the other side has many, see docs/fleet.md.
+# With fewer runs on one side and many on the other, intervals are too narrow: docs/fleet.md.
 LEAST_RUNS = 6
 _TABLES = ("flow", "e2e_latency")
 _SHOWN = ("B is longer", "B is shorter")
@@ -45,14 +45,14 @@ class FleetComparison:
         """Return a row for each path, the greatest change first.
 
         Args:
-            only_different: leave out those of which no difference is shown.
+            only_different: leave out paths without a proven difference.
         """
         from msgflow.query.changes import changes
 
         return changes(self.result, only_different)
 
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
-        """Return what exceeds side A by more than conditions such as 'p95>5%' allow.
+        """Return the rows that exceed side A by more than conditions such as 'p95>5%' allow.
 
         Raises:
             UsageError: see `msgflow.query.compare.failures`.
@@ -79,14 +79,14 @@ def compare(
     Args:
         lake: the lake.
         by: key of the label.
-        base: its value in side A; None where the runs have two values of it: the lesser is A,
-            numbers in them by their size.
-        other: its value in side B; None where they have one besides `base`.
-        where: condition on the runs, as `choose` has it; all when None.
-        unit: key of a label of which each value counts as one run, such as the robot: where runs
-            of one are more alike than those of several, as many runs tell less.
+        base: its value in side A. None if the runs have two values: A is the lesser one, and
+            numbers in them count by their size.
+        other: its value in side B. None if they have one value besides `base`.
+        where: a condition on the runs, see `choose`; all runs when None.
+        unit: key of a label; runs with the same value count as one. Runs of one robot are more
+            alike than runs of several, so that they tell less.
         case: which arrivals of paths: one of CASES.
-        confidence: share of intervals that would contain the true difference.
+        confidence: probability that an interval contains the true difference.
 
     Raises:
         UsageError: no such label or value, no run, or no path in common.
@@ -132,12 +132,12 @@ def compare(
 def compared(
     connection: duckdb.DuckDBPyConnection, *, case: str = "first", confidence: float = 0.95
 ) -> QueryResult:
-    """Return how two sides differ.
+    """Return the differences between two sides.
 
     Args:
-        connection: with `flow` and `e2e_latency` of a lake, and `sided` with run, side and unit.
+        connection: it has `flow` and `e2e_latency` of a lake, and `sided` (run, side, unit).
         case: which arrivals of paths.
-        confidence: share of intervals that would contain the true difference.
+        confidence: probability that an interval contains the true difference.
     """
     measured = program().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
     connection.register("measured", measured)
@@ -159,7 +159,7 @@ def _require_label(choice: Choice, key: str | None) -> None:
 def _sides(
     by: str, known: Mapping[str, int], base: str | None, other: str | None
 ) -> tuple[str, str]:
-    """Return the values of the label that are side A and side B."""
+    """Return the values of the label for side A and side B."""
     values = sorted(known, key=_natural)
     have = ", ".join(f"{value} ({known[value]:,})" for value in values[:_MOST_NAMED])
     have += ", …" if len(values) > _MOST_NAMED else ""
@@ -181,7 +181,7 @@ def _sides(
 
 
 def _natural(text: str) -> list[tuple[int, int | str]]:
-    """Return by what to order: 2.9 before 2.10."""
+    """Return the sort key of a version: 2.9 before 2.10."""
     return [
         (0, int(part)) if part.isdecimal() and part.isascii() else (1, part)
         for part in re.split(r"(\d{1,40})", text)
@@ -216,7 +216,7 @@ def _left_out(
 
 
 def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
-    """Say what only one side has; nothing in common is an error."""
+    """Yield a note of what only one side has; raise if the sides have nothing in common."""
     rows = _of_paths(result)
     if not any(row["a_count"] and row["b_count"] for row in rows):
         raise UsageError(
@@ -230,7 +230,7 @@ def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
 
 
 def _doubts(result: QueryResult, confidence: float) -> Iterator[str]:
-    """Say what the numbers do not tell."""
+    """Yield notes that limit what the numbers show."""
     rows = result.to_arrow().to_pylist()
     if any(row[CUT_COLUMN] for row in rows):
         yield "some runs have more paths than an ingest looks for, and those are left out"

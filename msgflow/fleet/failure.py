@@ -1,4 +1,4 @@
-"""Recordings that did not go in: the table `fleet_failure` of a lake."""
+"""Failed recordings: the table `fleet_failure` of a lake."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def read_failures(lake: Lake) -> pa.Table:
-    """Return the recordings that did not go in: one row each, columns of `failure_schema`.
+    """Return the failed recordings: one row each, columns of `failure_schema`.
 
     Raises:
         DatabaseError: the lake cannot be read.
@@ -30,7 +30,7 @@ def read_failures(lake: Lake) -> pa.Table:
     schema = failure_schema()
     tables = [schema.empty_table()]
     for entry in lake.store.entries(FAILURE, recursive=False):
-        # One that went in meanwhile is gone.
+        # Another process may have ingested the recording and deleted this file meanwhile.
         if entry.path.endswith(".parquet") and (content := lake.store.read(entry.path)):
             try:
                 tables.append(read_parquet(content, schema))
@@ -43,7 +43,7 @@ def read_failures(lake: Lake) -> pa.Table:
 
 
 def write_failure(lake: Lake, values: Mapping[str, Any]) -> None:
-    """Note that a recording did not go in, in place of what was noted of it before.
+    """Write the failure of a recording, in place of an earlier one.
 
     Raises:
         DatabaseError: the lake cannot be written.
@@ -57,7 +57,7 @@ def write_failure(lake: Lake, values: Mapping[str, Any]) -> None:
 
 
 def forget_failure(lake: Lake, source: str) -> None:
-    """Forget a failure: the recording went in."""
+    """Delete the failure of a recording, which is in the lake now."""
     lake.store.delete(_path(source))
 
 

@@ -1,7 +1,7 @@
-"""Where files of a lake and recordings lie: a folder, or a bucket of an S3-compatible store.
+"""The store of a lake or of recordings: a folder, or a bucket of an S3-compatible service.
 
-Both are reached through pyarrow. Credentials come from the environment alone, as the libraries of
-AWS look for them; they are never written, and never part of an address.
+pyarrow reaches both. Credentials come from the environment only, as for the libraries of AWS. They
+are never written, and never part of an address.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _T = TypeVar("_T")
 
 S3 = "s3://"
 _CHUNK = 8 * 1024 * 1024
-# Of each request, by the client of AWS, which waits twice as long each time: together some 10 s.
+# Tries of each request by the client of AWS, with pauses that double: some 10 s together.
 _MOST_ATTEMPTS = 6
 _CONNECT_SECONDS = 10
 _REQUEST_SECONDS = 60
-# What the environment may name an endpoint by, first the more special one.
+# Variables of the environment that name an endpoint, the more specific one first.
 _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
-# What the client of AWS says where another try is in vain: nobody answers, for which it has waited
-# enough, or it is forbidden, or not there.
+# Messages of the client of AWS after which another try is useless: no answer after all its tries,
+# access denied, or not found.
 _HOPELESS = re.compile(
     r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
 )
@@ -64,8 +64,8 @@ class Entry:
 class Store:
     """Files below one address.
 
-    A file appears whole or not at all: in a folder by renaming, in a bucket since the store shows
-    an object when all of it is there.
+    A file appears whole or not at all: in a folder it is renamed into place, in a bucket an object
+    becomes visible when it is complete.
 
     Attributes:
         url: the address: an absolute path, or `s3://BUCKET/PREFIX`.
@@ -84,28 +84,28 @@ class Store:
 
     @property
     def filesystem(self) -> Any:
-        """Return the `pyarrow.fs.FileSystem`; paths of it begin with `full`."""
+        """Return the `pyarrow.fs.FileSystem`; `full` gives its paths."""
         if self._system is None:
             self._system = _local() if self.is_local else _s3()
         return self._system
 
     def full(self, path: str = "") -> str:
-        """Return the path of a file as the file system wants it."""
+        """Return the path of a file in `filesystem`."""
         return f"{self._root}/{path}" if path else self._root
 
     def url_of(self, path: str) -> str:
-        """Return the address of a file, as DuckDB, Spark and people read it."""
+        """Return the address of a file, for DuckDB, Spark and people."""
         return f"{self.url}/{path}"
 
     def _reading(self, path: str) -> Any:
-        # Without this pyarrow unpacks what is called .gz or .zst, and packs it once more.
+        # Otherwise pyarrow unpacks files called .gz or .zst, and packs them again when it writes.
         return self.filesystem.open_input_stream(self.full(path), compression=None)
 
     def _writing(self, path: str) -> Any:
         return self.filesystem.open_output_stream(self.full(path), compression=None)
 
     def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
-        """Return the files below a path, sorted; none where there is no such path.
+        """Return the files below a path, sorted; an empty list if there is no such path.
 
         Raises:
             DatabaseError: the store cannot be reached or read.
@@ -138,7 +138,7 @@ class Store:
         return sorted(info.base_name for info in found if info.type == FileType.Directory)
 
     def entry(self, path: str = "") -> Entry | None:
-        """Return what is known of one file, None where it is none.
+        """Return the entry of one file, None if there is no such file.
 
         Raises:
             DatabaseError: the store cannot be reached or read.
@@ -152,7 +152,7 @@ class Store:
         return Entry(path, info.size, info.mtime_ns or 0)
 
     def read(self, path: str) -> bytes | None:
-        """Return a small file, None where it is none.
+        """Return the content of a small file, None if there is no such file.
 
         Raises:
             DatabaseError: the store cannot be reached or read.
@@ -169,7 +169,7 @@ class Store:
             return self._patiently(read)
 
     def fetch(self, path: str, target: Path) -> None:
-        """Copy a file into a new one of this machine.
+        """Copy a file into a new local file.
 
         Raises:
             DatabaseError: the store cannot be reached or read.
@@ -185,10 +185,10 @@ class Store:
             self._patiently(copy)
 
     def _patiently(self, work: Callable[[], _T]) -> _T:
-        """Return what `work` returns, which a bucket may refuse now and then.
+        """Return what `work` returns; try again if a bucket refuses.
 
-        The client of AWS tries again by itself, but not where it was about to read, and not always
-        where it looks.
+        The client of AWS tries again by itself, but not during a download, and not always when it
+        lists files.
         """
         for pause in () if self.is_local else _PAUSES:
             try:
@@ -204,11 +204,11 @@ class Store:
         return work()
 
     def put(self, path: str, content: bytes | Path) -> None:
-        """Write a file, in place of one that is there.
+        """Write a file, in place of an existing one.
 
         Args:
             path: from the root.
-            content: its bytes, or a file of this machine.
+            content: its bytes, or a local file.
 
         Raises:
             DatabaseError: the store cannot be reached or written.
@@ -229,7 +229,7 @@ class Store:
 
     def _put_locally(self, target: Path, content: bytes | Path) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
-        # No reader takes it for a file of the lake: those end with .parquet.
+        # Readers ignore it, as files of a lake end with .parquet.
         temporary = target.with_name(f".{target.name}.{mark()}.part")
         try:
             with temporary.open("wb") as file:
@@ -245,7 +245,7 @@ class Store:
             temporary.unlink(missing_ok=True)
 
     def delete(self, path: str) -> None:
-        """Remove a file; nothing happens where there is none.
+        """Remove a file if it exists.
 
         Raises:
             DatabaseError: the store cannot be reached or written.
@@ -254,7 +254,7 @@ class Store:
             if self.is_local:
                 file = Path(self.full(path))
                 file.unlink(missing_ok=True)
-                # In a bucket there are no folders that could be left over.
+                # A bucket has no folders that could be left empty.
                 folder = file.parent
                 while folder != Path(self._root) and not any(folder.iterdir()):
                     folder.rmdir()
@@ -264,7 +264,7 @@ class Store:
 
 
 def normal_url(url: str | Path) -> str:
-    """Return an address in its one form: an absolute path, or `s3://BUCKET/PREFIX`.
+    """Return an address in its normal form: an absolute path, or `s3://BUCKET/PREFIX`.
 
     Raises:
         UsageError: an address of another kind, or with a name or password in it.
@@ -286,7 +286,7 @@ def normal_url(url: str | Path) -> str:
         )
     if "?" in rest or not rest.partition("/")[0]:
         raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
-    # So that `..` in a manifest leads to where it leads in a folder.
+    # `..` in a manifest means the same as in a folder.
     path = posixpath.normpath(rest)
     if path.startswith("."):
         raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
@@ -294,7 +294,7 @@ def normal_url(url: str | Path) -> str:
 
 
 def endpoint() -> str | None:
-    """Return the address of the store that the environment names, None for that of AWS."""
+    """Return the endpoint that the environment names, None for that of AWS."""
     return next((os.environ[name] for name in _ENDPOINTS if os.environ.get(name)), None)
 
 

@@ -1,4 +1,4 @@
-"""Many recordings into one lake: gives out the work, commits what was done, notes what was not."""
+"""The ingest of many recordings into a lake: gives tasks to workers and commits their results."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ _LONGEST_PAUSE = 60.0
 
 @dataclass(frozen=True)
 class Options:
-    """How each recording is to be done.
+    """Options for all recordings.
 
     Attributes:
         ingest: options of the ingest: reader, strict, ignore, clock_sync.
-        views: write the public views, too.
-        database: write the database, too.
-        replace: do those again that the lake has already.
-        retry_failed: do those again that failed before.
-        tries: how often, where the next one may go better.
+        views: also write the public views.
+        database: also write the database.
+        replace: ingest recordings again that the lake has already.
+        retry_failed: ingest recordings again that failed before.
+        tries: most tries of a recording, if another one may succeed.
         pause: seconds before the second try; twice as many before each further one.
-        timeout: seconds that one may take.
-        memory: most bytes that one may take.
-        scratch: folder of each worker for what is needed meanwhile.
+        timeout: most seconds of one recording.
+        memory: most bytes of one recording.
+        scratch: folder of each worker for temporary files.
     """
 
     ingest: Mapping[str, Any] = field(default_factory=dict)
@@ -66,20 +66,20 @@ class Options:
 
 @dataclass
 class FleetProgress:
-    """How far it has come.
+    """Progress of the ingest, in numbers of recordings.
 
     Attributes:
-        total: recordings given.
-        added: went in.
-        replaced: took the place of what was there.
-        there: were in the lake already, as they are.
-        same: have the packets of another recording that is in the lake, and the same labels.
-        failed: did not go in.
-        failed_before: failed at an earlier time, and were left alone.
+        total: all recordings.
+        added: new in the lake.
+        replaced: took the place of an earlier run.
+        there: were in the lake already, unchanged.
+        same: have the packets and labels of another recording that is in the lake.
+        failed: failed now.
+        failed_before: failed in an earlier call, and were left alone.
         retried: tries after a first one.
-        events: events of those that went in.
-        seconds: since the begin.
-        workers: how many each worker did.
+        events: events of those that were added or replaced.
+        seconds: since the start.
+        workers: number of recordings by worker.
         failures: (source, reason, error) of those that failed now.
     """
 
@@ -98,22 +98,22 @@ class FleetProgress:
 
     @property
     def done(self) -> int:
-        """Recordings of which the end is known."""
+        """Number of recordings that are finished, whatever their result."""
         return self.in_lake + self.failed + self.failed_before
 
     @property
     def in_lake(self) -> int:
-        """Recordings that the lake has."""
+        """Number of recordings that the lake has."""
         return self.added + self.replaced + self.there + self.same
 
     @property
     def worked(self) -> int:
-        """Recordings that somebody worked on to the end."""
+        """Number of recordings that a worker has finished."""
         return self.added + self.replaced + self.same + self.failed
 
     @property
     def seconds_left(self) -> float | None:
-        """How long the rest will take, if it goes on like that; None: nobody knows yet."""
+        """Estimated seconds for the rest; None as long as there is nothing to go by."""
         if not self.worked:
             return None
         return self.seconds / self.worked * (self.total - self.done)
@@ -128,24 +128,24 @@ def fleet_ingest(
     labels: Mapping[str, str] | None = None,
     progress: Callable[[FleetProgress], None] | None = None,
 ) -> FleetProgress:
-    """Ingest recordings into a lake, each as one run; what fails does not end the rest.
+    """Ingest recordings into a lake, each as one run; a failure does not stop the others.
 
     Args:
         sources: directories, archives, patterns or manifests, in folders or buckets.
-        lake: address of the lake; a new one where there is nothing yet.
-        ray: address of a Ray cluster, 'auto', 'local' for one of this machine, or None: this
-            process does one after the other.
-        options: how each recording is to be done.
-        labels: of all recordings; what a manifest says comes first.
-        progress: called whenever something has ended.
+        lake: address of the lake, which is created if there is nothing.
+        ray: address of a Ray cluster, 'auto', or 'local' for one on this machine. None: this
+            process ingests one recording after the other.
+        options: for all recordings.
+        labels: of all recordings; a manifest overrides them.
+        progress: called after each recording.
 
     Raises:
-        UsageError: sources, labels or an address that cannot be one; Ray is not there.
-        DatabaseError: the lake cannot be written, is none, or newer than this msgflow.
+        UsageError: invalid sources, labels or address, or Ray is not installed.
+        DatabaseError: the lake cannot be written, is no lake, or newer than this msgflow.
     """
     recordings = find_recordings(sources, labels)
     url = normal_url(lake)
-    # A pattern for the folder that the lake is in fits it as well.
+    # A pattern may fit the lake itself.
     recordings = [each for each in recordings if not f"{each.source}/".startswith(f"{url}/")]
     if not recordings:
         raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
@@ -155,7 +155,7 @@ def fleet_ingest(
 
 @dataclass
 class _Item:
-    """A recording on its way."""
+    """A recording in progress."""
 
     index: int
     recording: Recording
@@ -164,7 +164,7 @@ class _Item:
 
 
 class _Ingest:
-    """One call: what the lake has, what is to be done, and what came of it."""
+    """The state of one call: runs of the lake, tasks and progress."""
 
     def __init__(
         self,
@@ -178,20 +178,20 @@ class _Ingest:
         self._recordings = recordings
         self._report = progress
         self._begin = time.monotonic()
-        # What is there stays as it is, for those who read it, until the new part is committed.
+        # Readers see the earlier part until the new one is committed.
         self._edition = secrets.token_hex(4) if options.replace else ""
         self._progress = FleetProgress(len(recordings))
         self._read_runs()
-        # Runs that this call wrote, and what else it found to have the packets of a run.
+        # Runs that this call wrote, and other sources with the packets of a run.
         self._written: set[str] = set()
         self._alike: dict[str, Mapping[str, Any]] = {}
         self._failed = {row["source"]: row for row in read_failures(lake).to_pylist()}
-        # (when, tie, item): what is tried again after a pause.
+        # (when, tie, item): recordings to try again after a pause.
         self._paused: list[tuple[float, int, _Item]] = []
         self._ties = itertools.count()
 
     def _read_runs(self) -> None:
-        """Read which runs the lake has, where others may have changed that since the last time."""
+        """Read the runs of the lake, which others may have changed since the last time."""
         self._files = set(self._lake.run_files())
         rows = self._lake.rows()
         self._runs = {row["run"]: row for row in visible(rows).to_pylist()}
@@ -204,7 +204,7 @@ class _Ingest:
         self._looked = time.monotonic()
 
     def _look_again(self) -> None:
-        """Read anew which runs the lake has, where somebody else has written or removed some."""
+        """Read the runs of the lake again if another process has written or removed some."""
         if time.monotonic() - self._looked < _SECONDS_BETWEEN_LOOKS_AT_RUNS:
             return
         if set(self._lake.run_files()) != self._files:
@@ -212,7 +212,7 @@ class _Ingest:
         self._looked = time.monotonic()
 
     def run(self, ray: str | None) -> FleetProgress:
-        """Do all that is left."""
+        """Ingest all recordings."""
         workers: Workers | None = None
         with ThreadPoolExecutor(_LOOKING_AT_ONCE) as pool:
             looked = pool.map(_look, self._recordings)
@@ -230,7 +230,7 @@ class _Ingest:
                         item = self._next(fresh)
                         if item is None:
                             break
-                        # Where nothing is left to do, no cluster is needed.
+                        # Connect to a cluster only when there is work.
                         workers = workers or make_workers(ray)
                         self._submit(workers, item, running)
                     if not running and not self._paused:
@@ -244,13 +244,13 @@ class _Ingest:
                 pool.shutdown(wait=False, cancel_futures=True)
                 if workers is not None:
                     workers.close()
-        # Thousands of small files would take seconds to read, every time.
+        # Thousands of small files would take seconds to read, in every later call.
         self._lake.put_together()
         self._tell()
         return self._progress
 
     def _next(self, fresh: Iterator[_Item]) -> _Item | None:
-        """Return what is to be done next: first what has waited long enough."""
+        """Return the next recording: first one whose pause is over."""
         if self._paused and self._until_next() <= 0:
             return heapq.heappop(self._paused)[2]
         return next(fresh, None)
@@ -259,7 +259,7 @@ class _Ingest:
         return self._paused[0][0] - time.monotonic()
 
     def _new(self, index: int, recording: Recording, found: State | MsgflowError) -> _Item | None:
-        """Return what is to be done of a recording; None where nothing is."""
+        """Return the item of a recording; None if there is nothing to do."""
         item = _Item(index, recording)
         self._look_again()
         if isinstance(found, MsgflowError):
@@ -305,7 +305,7 @@ class _Ingest:
         )
 
     def _relabel(self, run: Mapping[str, Any], recording: Recording) -> None:
-        """Say of a run what is said of its recording now; its answers stay as they are."""
+        """Give a run the labels of its recording; its answers stay."""
         if recording.labels and dict(run["labels"] or ()) != dict(recording.labels):
             self._commit([{**run, "labels": dict(recording.labels)}])
 
@@ -365,7 +365,7 @@ class _Ingest:
             self._same_packets(item, there, outcome, outcome.values)
             return
         before = self._before(item, key)
-        # Who says nothing of a recording leaves what was said of it.
+        # A recording without labels keeps those that it had.
         labels = dict(item.recording.labels) or dict((there or before or {}).get("labels") or ())
         row = {
             **outcome.values,
@@ -385,14 +385,14 @@ class _Ingest:
         self._tell()
 
     def _before(self, item: _Item, key: str) -> Mapping[str, Any] | None:
-        """Return the run that the same source gave before, when it held something else."""
+        """Return the earlier run of the same source, if that had other packets."""
         before = self._sources.get(item.recording.source)
         return None if before is None or before == key else self._runs.get(before)
 
     def _gone(self, before: Mapping[str, Any] | None) -> list[dict[str, Any]]:
-        """Return the row that takes a run away whose source holds something else by now.
+        """Return the row that removes the earlier run of a source with new packets.
 
-        Another recording of this call may have its packets: then it is that one's run.
+        If another recording of this call has the packets of that run, the run stays.
         """
         if before is None:
             return []
@@ -450,10 +450,10 @@ class _Ingest:
             forget_failure(self._lake, item.recording.source)
 
     def _failed_now(self, item: _Item, outcome: Outcome) -> None:
-        """Try again later where that may help; else note the failure."""
+        """Try again later if that may help; otherwise write the failure."""
         if outcome.reason in PASSING and item.tries < self._options.tries and item.state:
             pause = min(self._options.pause * 2 ** (item.tries - 1), _LONGEST_PAUSE)
-            # Not all at once, where many failed for one reason.
+            # At random moments: many may have failed together for one reason.
             when = time.monotonic() + pause * random.uniform(0.5, 1.5)
             heapq.heappush(self._paused, (when, next(self._ties), item))
             self._progress.retried += 1

@@ -1,8 +1,8 @@
-"""A lake: which runs it holds, and in which files.
+"""The lake: its runs, its files, and commits to them.
 
-A row of the table `run` makes a run visible, and the one of the highest generation counts. What it
-names is complete before the row is written, no file of a visible run is ever changed, and one file
-may hold many rows, which count all at once.
+A row of the table `run` makes a run visible; the row with the highest generation counts. Its files
+are complete before the row is written, and no file of a visible run ever changes. One file of the
+table may hold many rows, which become visible together.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 COVERED = "msgflow.covered"
 _TOGETHER = "together-"
-# Fewer files are read as fast as one; one of more rows is not written again.
+# Fewer files are read as fast as one; a file with more rows is not written again.
 _WORTH_IT = 8
 _MANY = 10_000
 _READ_AT_ONCE = 16
@@ -60,7 +60,7 @@ class Lake:
 
     def __init__(self, store: Store) -> None:
         self.store = store
-        # A file of the table `run` is never changed.
+        # Files of the table `run` never change.
         self._known: dict[str, tuple[pa.Table, list[str]]] = {}
 
     @classmethod
@@ -68,7 +68,7 @@ class Lake:
         """Return the lake at an address.
 
         Raises:
-            DatabaseError: there is none, it is newer than this msgflow, or cannot be read.
+            DatabaseError: there is no lake, it is newer than this msgflow, or cannot be read.
             UsageError: no such kind of address.
         """
         store = Store(url)
@@ -82,7 +82,7 @@ class Lake:
 
     @classmethod
     def open_or_create(cls, url: str | Path) -> Lake:
-        """Return the lake at an address; a new one where there is nothing yet.
+        """Return the lake at an address, which is created if there is nothing.
 
         Raises:
             DatabaseError: something else is there, it is newer than this msgflow, or cannot be
@@ -100,7 +100,7 @@ class Lake:
             store.put(ABOUT, about())
         else:
             require_readable(content, store.url)
-            # Now, instead of after the first recording: may this be written?
+            # Find out now, not after the first recording, whether it can be written.
             probe = f".probe-{secrets.token_hex(4)}"
             store.put(probe, b"")
             store.delete(probe)
@@ -115,11 +115,11 @@ class Lake:
         import pyarrow as pa
 
         tables = list(self.rows_by_file().values())
-        # Not for nothing: making an empty table imports pandas where it is installed.
+        # Only if needed: making an empty table imports pandas if that is installed.
         return pa.concat_tables(tables) if tables else run_schema().empty_table()
 
     def rows_by_file(self) -> dict[str, pa.Table]:
-        """Return the rows of the table `run` by their files, but of those that another stands for.
+        """Return the rows of the table `run` by file, without files that another one replaces.
 
         Raises:
             DatabaseError: the lake cannot be read.
@@ -135,7 +135,7 @@ class Lake:
             found |= self._read_runs(alone)
             return {path: rows for path, (rows, _) in found.items() if path not in covered}
         except FileNotFoundError:
-            # Compaction has deleted them since they were listed: another stands for them.
+            # Compaction has deleted files since they were listed: another one replaces them.
             return self.rows_by_file()
         except (pa.ArrowInvalid, OSError) as error:
             raise DatabaseError(
@@ -144,7 +144,7 @@ class Lake:
             ) from error
 
     def _read_runs(self, files: Sequence[str]) -> dict[str, tuple[pa.Table, list[str]]]:
-        """Return the rows of files of the table `run`, and the files that each stands for."""
+        """Return the rows of files of the table `run`, and the files that each replaces."""
         schema = run_schema()
         unknown = [path for path in files if path not in self._known]
         with ThreadPoolExecutor(_READ_AT_ONCE) as pool:
@@ -157,13 +157,13 @@ class Lake:
         return {path: self._known[path] for path in files}
 
     def put_together(self) -> int:
-        """Write the rows of many small files of the table `run` into one that stands for them.
+        """Write the rows of many small files of the table `run` into one that replaces them.
 
-        It has their very rows, so that nothing changes for anybody, whatever is written at the same
-        time. They stay for those who read them now, until `compact` deletes them.
+        It has the same rows, so that nothing changes for readers and writers. The small files stay
+        for current readers until `compact` deletes them.
 
         Returns:
-            How many files the new one stands for; 0: there are few.
+            Number of files that the new one replaces; 0 if there are few.
 
         Raises:
             DatabaseError: the lake cannot be read or written.
@@ -186,7 +186,7 @@ class Lake:
         return len(rows)
 
     def _covered_by(self, files: Iterable[str]) -> set[str]:
-        """Return files of the table `run`, and those that they stand for as long as these exist."""
+        """Return files of the table `run`, and the existing files that they replace."""
         covered = set(files)
         there = set(self.run_files())
         for path in files:
@@ -195,7 +195,7 @@ class Lake:
         return covered
 
     def covered(self) -> dict[str, str]:
-        """Return the files of the table `run` that another stands for, each with one of these.
+        """Return the replaced files of the table `run`, each with a file that replaces it.
 
         Raises:
             DatabaseError: the lake cannot be read.
@@ -225,17 +225,17 @@ class Lake:
         return visible(self.rows())
 
     def commit(self, rows: Iterable[Mapping[str, Any]]) -> str:
-        """Make runs visible, or those that are replaced or removed: all of them at once.
+        """Add, replace or remove runs, all of them at once.
 
-        What the rows name has to be in the lake already.
+        The files that the rows name have to be in the lake already.
 
         Args:
-            rows: values of columns of `run_schema`. A higher `generation` takes the place of what
-                counts so far, whatever else is written at the same time; an equal one only where
-                nothing else is.
+            rows: values of columns of `run_schema`. A row with a higher `generation` always takes
+                the place of the current one; a row with an equal one only if no other process
+                writes the run at the same time.
 
         Returns:
-            The file that has them; '' without rows.
+            The file with the rows; '' without rows.
 
         Raises:
             DatabaseError: the lake cannot be written.
@@ -246,7 +246,7 @@ class Lake:
         whole = [
             dict.fromkeys(run_schema().names)
             | dict(row)
-            # Later than the row that it comes from, whatever the clocks of machines say.
+            # Later than the row that it replaces, even if the clocks of machines differ.
             | {"committed_ns": max(now, (row.get("committed_ns") or 0) + 1)}
             | {"lake_revision": LAKE_REVISION}
             for row in rows
@@ -261,10 +261,10 @@ class Lake:
         return path
 
     def remove(self, keys: Sequence[str]) -> int:
-        """Take runs out of the lake; `msgflow fleet compact` deletes their files.
+        """Remove runs from the lake; `msgflow fleet compact` deletes their files.
 
         Returns:
-            How many they were: a key may be there twice.
+            Their number, without keys that are given twice.
 
         Raises:
             UsageError: there is no such run.
@@ -298,8 +298,8 @@ class Lake:
             path: from the root of the lake.
             table_name: name of the table.
             table: its rows.
-            revision: of the schema that they were made with.
-            more: metadata beside those of every file.
+            revision: schema revision of the rows.
+            more: metadata besides those of every file.
 
         Raises:
             DatabaseError: the lake cannot be written.
@@ -307,7 +307,7 @@ class Lake:
         import pyarrow as pa
         import pyarrow.parquet
 
-        # With the meanings of the columns, which a table that was read may lack.
+        # The schema has the descriptions of columns, which the table may lack.
         schema = table.schema.with_metadata(metadata(table_name, revision) | dict(more or {}))
         sink = pa.BufferOutputStream()
         pyarrow.parquet.write_table(table.cast(schema), sink, compression="zstd")
@@ -316,11 +316,11 @@ class Lake:
     def files(self, table: str, runs: pa.Table) -> list[str]:
         """Return the files with the answers of some runs, from the root of the lake, sorted.
 
-        They may hold rows of other runs, too, and of these: take those of (run, part).
+        They may also hold rows of other runs: select by (run, part).
 
         Args:
             table: such as 'flow'.
-            runs: of `runs`, all or some of its rows.
+            runs: all or some of the rows of `runs`.
         """
         parts = {part for part in runs["part"].to_pylist() if part is not None}
         return [part_path(table, part) for part in sorted(parts)]
@@ -336,14 +336,14 @@ def visible(rows: pa.Table, con: duckdb.DuckDBPyConnection | None = None) -> pa.
 
     Args:
         rows: columns of `run_schema`.
-        con: a connection to use; one of its own when None.
+        con: any connection; a new one when None.
     """
     import pyarrow as pa
 
     if con is None:
         with open_memory() as con:
             return visible(rows, con)
-    # Not pyarrow.compute: importing that takes longer.
+    # SQL, as importing pyarrow.compute takes longer.
     con.register("known", rows)
     found = con.sql(_VISIBLE).to_arrow_table()
     con.unregister("known")
@@ -355,7 +355,7 @@ def _is_together(path: str) -> bool:
 
 
 def _covered(content: bytes) -> list[str]:
-    """Return the files that a file of the table `run` stands for."""
+    """Return the files that a file of the table `run` replaces."""
     import pyarrow as pa
     import pyarrow.parquet
 

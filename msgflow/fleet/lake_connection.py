@@ -1,9 +1,9 @@
-"""Opens some runs of a lake for SQL: the runs that a condition chooses, and what is known of them.
+"""Connections to chosen runs of a lake, for SQL.
 
-One DuckDB connection has a table `run` with the chosen runs, and a view per table of the lake with
-the rows of those runs that count; public views are in the schema `view`. Only files of the chosen
-runs are opened. The connection reaches nothing else: a folder it reads itself, but no other path,
-and a bucket through pyarrow, which alone has the credentials.
+A DuckDB connection has a table `run` with the chosen runs, and a view per table of the lake with
+their rows; public views are in the schema `view`. It can read the files of the chosen runs and
+nothing else. DuckDB reads a folder itself. It reads a bucket through pyarrow, which alone has the
+credentials.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake
 
 _COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')
-# What DuckDB says where pyarrow, which reads a bucket for it, failed.
+# DuckDB says this when pyarrow failed to read a bucket.
 _STREAM = "reading the stream registered as"
 _EXAMPLE = "such as --where \"robot LIKE 'r%' AND software_version = '2.4'\""
 _NONE_YET = "msgflow fleet ingest SOURCE --lake adds some"
@@ -46,9 +46,9 @@ class Choice:
 
     Attributes:
         lake: the lake.
-        runs: the chosen ones: one row each, by key, columns of `run_schema`.
-        labels: keys of labels that any run of the lake has, sorted.
-        total: how many runs the lake has.
+        runs: the chosen ones, one row each, ordered by key; columns of `run_schema`.
+        labels: keys of the labels of all runs of the lake, sorted.
+        total: number of runs of the lake.
     """
 
     lake: Lake
@@ -58,16 +58,16 @@ class Choice:
 
 
 def choose(lake: Lake, where: str | None = None) -> Choice:
-    """Return the runs of a lake that a condition holds for.
+    """Return the runs of a lake that fit a condition.
 
     Args:
         lake: the lake.
-        where: a condition in SQL on columns of the table `run`, and on labels by their keys: each
-            is a text, NULL where a run lacks it. A column has the name before a label does; that
-            one is `labels['KEY']`. All runs when None.
+        where: a condition in SQL on columns of the table `run`, and on labels by their keys: texts,
+            NULL for a run without the label. A name that is both means the column; the label is
+            `labels['KEY']` then. All runs when None.
 
     Raises:
-        UsageError: no condition that only reads, a label that no run has, or no run fits.
+        UsageError: the condition is invalid, no run has such a label, or no run fits.
         DatabaseError: the lake cannot be read.
     """
     with open_memory() as con:
@@ -91,27 +91,27 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
 
 
 def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
-    """Return the labels that may stand in SQL by their own names: no column is called so."""
+    """Return the labels that SQL can call by their keys: those that are not names of columns."""
     taken = {name.lower() for name in columns}
     lower = [label.lower() for label in labels]
     return [each for each in labels if each.lower() not in taken and lower.count(each.lower()) == 1]
 
 
 def quoted(name: str) -> str:
-    """Return a name as SQL has it in quotes."""
+    """Return a name in quotes, for SQL."""
     return '"' + name.replace('"', '""') + '"'
 
 
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
 ) -> pa.Table:
-    """Return the runs that a condition holds for, by key."""
+    """Return the runs that fit a condition, ordered by key."""
     import pyarrow as pa
 
     con.register("known_run", runs)
     named = label_columns(labels, runs.column_names)
     columns = [f"labels[$label_{n}] AS {quoted(key)}" for n, key in enumerate(named)]
-    # A comment at its end ends with the line.
+    # A comment at the end of the condition ends with the line.
     table = f"SELECT {', '.join(['*', *columns])} FROM known_run"
     own = ", ".join(map(quoted, runs.column_names))
     text = f"SELECT {own} FROM ({table}) WHERE (\n{where}\n) ORDER BY run"
@@ -136,7 +136,7 @@ def _fitting(
 
 
 def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> str:
-    """Return the labels and columns of runs that somebody may have meant."""
+    """Return a hint: the labels and columns of runs, similar names first."""
     near = nearest(name, [*labels, *columns])
     meant = f"did you mean {' or '.join(near)}? " if near else ""
     have = f"its labels are {', '.join(labels)}" if labels else "its runs have no labels"
@@ -148,8 +148,8 @@ class Reading:
 
     Attributes:
         choice: the runs.
-        connection: with the table `run`, and views of the tables that were asked for, each with the
-            columns of its files but `part`.
+        connection: it has the table `run`, and a view of each table that was asked for, without the
+            column `part`.
         tables: those of them that these runs have.
     """
 
@@ -158,8 +158,8 @@ class Reading:
 
         Args:
             choice: the runs.
-            tables: what is to be read, such as 'flow' or 'view/publication': answers by their name,
-                public views behind 'view/'. All that the lake has of these runs when None.
+            tables: the tables to read: answers by name, such as 'flow', and public views with a
+                prefix, such as 'view/publication'. All tables when None.
 
         Raises:
             DatabaseError: the lake cannot be read.
@@ -193,9 +193,9 @@ class Reading:
 
     def _fill(self, tables: Sequence[str]) -> None:
         con = self.connection
-        # What does not fit into memory fails, instead of growing files where nobody looks for them.
+        # A query that needs more than the memory fails: there is no good place for spilled files.
         con.execute("SET temp_directory = ''")
-        # What a view reads is looked at when it is made, and again when it is asked.
+        # DuckDB looks at the files of a view when it makes the view, and when it reads the view.
         con.execute("SET parquet_metadata_cache = true")
         con.register("chosen_run", self.choice.runs)
         con.execute(f"CREATE TABLE {RUN} AS SELECT * EXCLUDE (is_removed) FROM chosen_run")
@@ -216,12 +216,13 @@ class Reading:
             )
 
     def _files(self, table: str, key: str) -> dict[str, list[str]]:
-        """Return the parts with a table, those together whose files have the same columns.
+        """Return the parts with a table, grouped by equal columns.
 
-        What an earlier version wrote may lack the table, or columns of it; one part of each tells.
+        Parts of earlier versions may lack the table or some of its columns. This looks at one part
+        of each version.
 
         Raises:
-            FileNotFoundError: a part lacks a table that it was written with.
+            FileNotFoundError: a part lacks a file that was written.
         """
         alike: dict[tuple[str, str], list[str]] = {}
         seen = set()
@@ -247,7 +248,7 @@ class Reading:
         return self.choice.lake.store.entry(part_path(table, part)) is not None
 
     def _scan(self, table: str, found: dict[str, list[str]]) -> str:
-        """Return what reads the rows of a table in SQL, with a column `part`."""
+        """Return SQL for the rows of a table, with a column `part`."""
         store = self.choice.lake.store
         name = f"files of {table}"
         parts = [part for alike in found.values() for part in alike]
@@ -278,7 +279,7 @@ class Reading:
             partitions=[ds.field("part") == part for part in parts],
         )
         if len(self.choice.runs) < self.choice.total:
-            # Of large files only the groups of rows that have one of the runs.
+            # Large files: read only the groups of rows with one of the runs.
             keys = self.choice.runs["run"].combine_chunks()
             dataset = dataset.filter(ds.field("run").isin(keys))
         self.connection.register(name, dataset)
@@ -287,11 +288,11 @@ class Reading:
 
 @contextmanager
 def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
-    """Raise what the files of a lake are to blame for as a DatabaseError.
+    """Turn errors that the files of a lake cause into a DatabaseError.
 
     Args:
         lake: the lake.
-        is_query: a statement of a user may be to blame for its input.
+        is_query: errors of SQL come from the statement of a user, and stay.
     """
     try:
         yield
@@ -306,5 +307,5 @@ def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
 
 
 def open_runs(lake: Lake, where: str | None = None, tables: Sequence[str] | None = None) -> Reading:
-    """Open the runs of a lake that a condition holds for, as `choose` and `Reading` say."""
+    """Open the runs of a lake that fit a condition: `choose`, then `Reading`."""
     return Reading(choose(lake, where), tables)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake
     from msgflow.query.result import QueryResult
 
-# Labels that the page has a table for; each takes a query over all flows.
+# Most labels with a table on the page; each takes a query over all flows.
 MOST_LABELS = 8
 _STATEMENTS = ("page_run", "page_point", "page_outlier", "page_worst")
 _LATENCY, _FINDINGS = "e2e-latency", "findings"
@@ -33,9 +33,9 @@ class LakePage:
     """The page of a lake.
 
     Attributes:
-        content: what a browser opens.
-        runs: how many runs it shows.
-        notes: what it leaves out, a sentence each.
+        content: HTML.
+        runs: number of runs on it.
+        notes: what it leaves out, one sentence each.
     """
 
     content: str
@@ -51,9 +51,9 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
         where: a condition on runs and their labels, see `choose`; all runs when None.
 
     Raises:
-        UsageError: a label that there is not, or no run fits.
+        UsageError: no run has such a label, or no run fits.
         DatabaseError: the lake cannot be read.
-        QueryError: the lake could not be asked.
+        QueryError: a query failed.
     """
     choice = choose(lake, where)
     notes = []
@@ -113,12 +113,12 @@ def write_lake_page(lake: Lake, path: Path, *, where: str | None = None, max_siz
 
     Args:
         lake: the lake.
-        path: the file; one that exists is replaced.
+        path: the file; an existing one is replaced.
         where: a condition on runs and their labels, see `choose`; all runs when None.
         max_size: most bytes of the file.
 
     Raises:
-        UsageError: a label that there is not, no run fits, or the page is too large.
+        UsageError: no run has such a label, no run fits, or the page is too large.
         DatabaseError: the lake cannot be read.
     """
     page = lake_page(lake, where=where)
@@ -143,7 +143,7 @@ def _encoded(result: QueryResult, command: str) -> bytes:
 
 
 def _with_time(failures: pa.Table) -> pa.Table:
-    """Return failures with the time of the last try as people read it."""
+    """Return failures with the time of the last try as text."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -154,7 +154,7 @@ def _with_time(failures: pa.Table) -> pa.Table:
 
 
 def _frame(lake: Lake, runs: pa.Table) -> pa.Table:
-    """Return the one row that all pages are about: here, the lake."""
+    """Return the row that the head of a page shows; here it names the lake."""
     import pyarrow as pa
 
     name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url

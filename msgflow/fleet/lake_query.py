@@ -1,7 +1,8 @@
-"""Questions to many runs of a lake: the named queries, the slowest flows of a path, and any SQL.
+"""Queries over many runs of a lake: named ones, the slowest flows of a path, and SQL of users.
 
-What each named query says of many runs is a statement below `sql`: counts, sums and extremes are
-added up, quantiles come from rows of flows or from counts in buckets. Quantiles are never averaged.
+Each named query has a statement below `sql` that combines runs. It adds up counts and sums,
+compares extremes, and takes quantiles from rows of flows or from counts in buckets. Quantiles are
+never averaged.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 GROUP = "label_group"
 WORST = "worst"
 DEFAULT_LIMIT = 10
-# What looks at tables without naming them.
+# Words of SQL that look at tables without naming them.
 _LISTS = re.compile(
     r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
 )
@@ -56,7 +57,7 @@ _BUCKETS = "distributed"
 
 @cache
 def statements() -> Statements:
-    """Return what a lake is asked for."""
+    """Return the statements below `sql`."""
     return Statements(Path(__file__).parent / "sql")
 
 
@@ -105,19 +106,18 @@ def fleet_query(
 
     Args:
         lake: the lake.
-        name: as `names` has it.
+        name: one of `names`.
         where: a condition on runs and their labels, see `choose`; all runs when None.
-        group_by: labels, or columns of the table `run`: one row for each of their values, which
-            stand in columns before the others.
+        group_by: labels, or columns of the table `run`. The result has one row for each of their
+            values, and the values in its first columns.
         internal: show the rows of ROS's own topics and services too.
-        selection: node, topic, callback, host, via, without, sort and limit, as `Database.query`
-            has them.
+        selection: node, topic, callback, host, via, without, sort and limit of `Database.query`.
         parameters: the query's own.
 
     Raises:
-        UsageError: a query, label, parameter or column that there is not, or no run fits.
+        UsageError: no such query, label, parameter or column, or no run fits.
         DatabaseError: the lake cannot be read.
-        QueryError: the lake could not be asked.
+        QueryError: the query failed.
     """
     header = header_of(name)
     own = bind(header, parameters, f"msgflow fleet query {name}")
@@ -159,7 +159,7 @@ def fleet_sql(
     Args:
         lake: the lake.
         text: one query, or EXPLAIN of one. Tables are `run` and the answers, with the rows of the
-            chosen runs that count; public views are in the schema `view`.
+            chosen runs; public views are in the schema `view`.
         where: a condition on runs and their labels, see `choose`; all runs when None.
         limit: most rows returned, all when None; a note says when there were more.
 
@@ -182,7 +182,7 @@ def fleet_sql(
 def fleet_worst(
     lake: Lake, path: str, *, where: str | None = None, limit: int = DEFAULT_LIMIT
 ) -> QueryResult:
-    """Return the flows of a path that took longest, each with the command that opens it.
+    """Return the slowest flows of a path, each with the command that opens it.
 
     Args:
         lake: the lake.
@@ -191,7 +191,7 @@ def fleet_worst(
         limit: most rows.
 
     Raises:
-        UsageError: no path has this text, a label that there is not, or no run fits.
+        UsageError: no path has this text, no run has such a label, or no run fits.
         DatabaseError: the lake cannot be read.
     """
     import pyarrow as pa
@@ -210,13 +210,13 @@ def fleet_worst(
             f"no flow of these runs reached the end of a path with this text — {path}",
             f"msgflow fleet query e2e-latency --lake {shlex.quote(lake.store.url)}",
         )
-    # A handful of rows, as text: what to type is not for SQL to say.
+    # SQL does not know the commands of a shell; these are few rows.
     commands = [_command(lake, row) for row in table.to_pylist()]
     table = table.append_column("command", pa.array(commands, pa.string()))
     table = table.drop_columns(["has_database"])
     notes = []
     if commands[0] is not None:
-        # Where the screen has no room for the column.
+        # The screen may have no room for the column.
         notes.append(f"the slowest one: {commands[0]}")
     if None in commands:
         notes.append("runs without a command were written with --no-database")
@@ -252,7 +252,7 @@ def _require_tables(reading: Reading, header: Header) -> None:
 
 
 def _named_tables(text: str) -> list[str] | None:
-    """Return the tables of the lake that SQL names; None: any may be looked at."""
+    """Return the tables of the lake that SQL names; None if it may look at any."""
     if _LISTS.search(text):
         return None
     known = {answer.table for answer in answers()}
@@ -265,7 +265,7 @@ def _named_tables(text: str) -> list[str] | None:
 def _group(
     con: duckdb.DuckDBPyConnection, choice: Choice, header: Header, group_by: Sequence[str]
 ) -> Header:
-    """Make the table that says which run is of which group; return the query with their labels."""
+    """Make a table with the group of each run; return the query with the labels of groups."""
     taken = {column.name.lower() for column in header.columns}
     fields = set(choice.runs.column_names) - {"labels", "is_removed"}
     values, bound = [], {}

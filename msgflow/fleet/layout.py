@@ -1,6 +1,6 @@
-"""What lies where in a lake, and the columns of its table of runs.
+"""The layout of a lake: paths of its files, and columns of its tables of runs and failures.
 
-The names are an interface: people read them with DuckDB, Spark and others, see docs/fleet.md.
+Paths and names are an interface: users read them with DuckDB, Spark and others, see docs/fleet.md.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _FORMAT = "msgflow lake"
 
 
 def about() -> bytes:
-    """Return the file that says what the folder is, and of which revision."""
+    """Return the content of the file that marks a lake and names its revision."""
     text = json.dumps({"format": _FORMAT, "revision": LAKE_REVISION})
     return f"{text}\n".encode()
 
@@ -36,7 +36,7 @@ def require_readable(content: bytes, url: str) -> None:
     """Raise unless a lake has a revision that this msgflow reads.
 
     Raises:
-        DatabaseError: it is newer, or no lake at all.
+        DatabaseError: it is newer, or no lake.
     """
     try:
         read = json.loads(content)
@@ -55,17 +55,17 @@ def require_readable(content: bytes, url: str) -> None:
 
 
 def part_path(table: str, part: str) -> str:
-    """Return where the rows of a table lie that were written together."""
+    """Return the path of the rows of a table in a part."""
     return f"{table}/part={part}/{FILE_NAME}"
 
 
 def view_path(view: str, part: str) -> str:
-    """Return where the rows of a public view of one run lie."""
+    """Return the path of the rows of a public view in a part."""
     return part_path(f"{VIEWS}/{view}", part)
 
 
 def database_path(part: str) -> str:
-    """Return where the database of one run lies, compressed with Zstandard."""
+    """Return the path of the database of one run, compressed with Zstandard."""
     return f"{DATABASE}/part={part}/{DATABASE_NAME}"
 
 

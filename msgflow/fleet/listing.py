@@ -1,4 +1,4 @@
-"""What a lake holds, as tables for people."""
+"""Lists of the runs and failures of a lake, as tables for people."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def list_runs(lake: Lake) -> QueryResult:
 
 
 def list_failures(lake: Lake) -> QueryResult:
-    """Return the recordings that did not go in: `fleet_failure`, with labels as KEY=VALUE.
+    """Return the failed recordings: the table `fleet_failure`, with labels as KEY=VALUE.
 
     Raises:
         DatabaseError: the lake cannot be read.

@@ -1,4 +1,4 @@
-"""Manifests: lists of recordings with what is said of each, as CSV, JSONL or Parquet."""
+"""Manifests: lists of recordings with their labels, as CSV, JSONL or Parquet."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PATH = "path"
 
 @dataclass(frozen=True)
 class _Row:
-    """One row: where it stands, for people, and its values as text."""
+    """One row: its place, for messages, and its values as text."""
 
     place: str
     values: dict[str, str | None]
@@ -37,11 +37,11 @@ def is_manifest(source: str) -> bool:
 def read_manifest(source: str) -> list[Recording]:
     """Return the recordings of a manifest, in its order.
 
-    Each has a path; relative ones begin where the manifest lies. All other columns are labels:
-    texts, as they stand there; an empty one is none. Equal rows count once.
+    Each has a path; a relative one starts in the folder of the manifest. All other columns are
+    labels, taken as text; an empty value means no label. Equal rows count once.
 
     Raises:
-        UsageError: it does not exist, is no such file, or a row of it cannot be one.
+        UsageError: it does not exist, or the file or one of its rows is invalid.
         DatabaseError: its store cannot be reached.
     """
     url = normal_url(source)

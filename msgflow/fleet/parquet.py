@@ -1,4 +1,4 @@
-"""Small Parquet files of a lake, read as they are: without pandas, and without names of folders."""
+"""Small Parquet files of a lake, read without pandas and without columns from folder names."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
 
     Args:
         content: its bytes.
-        schema: the columns to return, NULL where the file lacks one; as the file has them when
-            None.
+        schema: the columns to return; those that the file lacks are NULL. The columns of the file
+            when None.
 
     Raises:
-        pyarrow.ArrowInvalid: it is no such file, or a column is of another type.
+        pyarrow.ArrowInvalid: it is no Parquet file, or a column has another type.
     """
     import pyarrow as pa
     import pyarrow.parquet
 
-    # Not `read_table`: that imports pandas where it is installed.
+    # `read_table` would import pandas if that is installed.
     file = pyarrow.parquet.ParquetFile(pa.BufferReader(content))
-    # Most have one row: threads would cost more than they bring.
+    # Most files have one row: threads would cost more than they save.
     table = file.read(use_threads=len(content) > _LARGE).replace_schema_metadata()
     if schema is None:
         return table

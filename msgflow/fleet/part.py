@@ -1,7 +1,7 @@
-"""Writes what a lake holds of one run: all files of it, which nobody sees before it is committed.
+"""Parts of a lake: the files of one run, which become visible with its commit.
 
-The name of a part is made of the run and of all that its files depend on. Whoever writes it again,
-after a crash or at the same time, writes the same bytes to the same places.
+The name of a part depends on the run and on all that its files depend on. A second writer, after a
+crash or at the same time, writes the same bytes to the same paths.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ if TYPE_CHECKING:
 KEY = "run"
 _ROWS_AT_ONCE = 100_000
 _RUN_ID = "run_id"
-# Of the public view `run`: the lake's own table has what is worth knowing of it.
+# Public views that a lake does not hold: its own table `run` has the useful columns.
 _LEFT_OUT = (RUN,)
 
 
 @dataclass(frozen=True)
 class Part:
-    """What was written of a run.
+    """The written files of a run.
 
     Attributes:
-        values: of columns of the table `run`, as far as the database knows them.
-        file_count: files written.
+        values: columns of the table `run` that the database knows.
+        file_count: number of files.
         size: their bytes.
     """
 
@@ -58,7 +58,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Content:
-    """What to write beside the answers.
+    """What to write besides the answers.
 
     Attributes:
         views: the public views.
@@ -70,7 +70,7 @@ class Content:
 
 
 def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
-    """Return the key of a run: equal for equal packets, wherever they were read.
+    """Return the key of a run: equal for equal packets, whatever their paths.
 
     Raises:
         TraceError: the run has no packets.
@@ -82,7 +82,7 @@ def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
 
 
 def part_name(key: str, source: str, options: Mapping[str, Any]) -> str:
-    """Return the name of the part of a run, with all in it that its files depend on."""
+    """Return the name of the part of a run, with a hash of all that its files depend on."""
     import pyarrow as pa
 
     facts = [source, dict(options), __version__, LAKE_REVISION, pa.__version__, duckdb.__version__]
@@ -100,16 +100,16 @@ def write_part(
     options: Mapping[str, Any],
     content: Content,
 ) -> Part:
-    """Write all that a lake holds of the one run of a database; commit nothing.
+    """Write all files of the only run of a database; commit nothing.
 
     Args:
-        connection: to the database, reading.
+        connection: to the database, read-only.
         database: its file.
         store: of the lake.
-        scratch: a directory for files on their way.
+        scratch: a directory for temporary files.
         source: address of the recording.
         options: of the ingest.
-        content: what to write beside the answers.
+        content: what to write besides the answers.
 
     Raises:
         TraceError: the run has no packets.
@@ -129,7 +129,7 @@ def write_part(
         written.table(answer.table, part_path(answer.table, part), rows)
     if content.views:
         for view in _views(connection):
-            # The name comes from the catalogue of the database.
+            # A name of the catalogue: it needs no more than quotes.
             relation = connection.sql(f'SELECT * FROM main."{view}" ORDER BY ALL')
             rows = relation.to_arrow_reader(_ROWS_AT_ONCE)
             written.table(view, view_path(view, part), rows)
@@ -152,7 +152,7 @@ def write_part(
 
 
 def _keyed(schema: pa.Schema) -> pa.Schema:
-    """Return the columns of a table of the lake: first the key of the run, not its number."""
+    """Return the columns of a table of the lake: the key of the run, in place of its id, first."""
     import pyarrow as pa
 
     rest = [field for field in schema if field.name != _RUN_ID]
@@ -168,7 +168,7 @@ def _views(connection: duckdb.DuckDBPyConnection) -> list[str]:
 
 
 class _Writer:
-    """Writes files, by way of this machine's scratch, and counts them."""
+    """Writes files to the lake by way of the scratch directory, and counts them."""
 
     def __init__(self, store: Store, scratch: Path, key: str, revision: str) -> None:
         self._store = store

@@ -1,4 +1,4 @@
-"""A recording of a fleet: where it lies, what is said of it, and whether it is still the same."""
+"""Recordings of a fleet: address, labels, and whether the files have changed."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Recording:
-    """What becomes one run.
+    """A recording, which becomes one run.
 
     Attributes:
         source: absolute path, or `s3://…`: a directory with traces, or an archive.
-        labels: what is said of it.
+        labels: by key.
     """
 
     source: str
@@ -31,7 +31,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class State:
-    """What a source looks like from outside.
+    """The files of a source, without their content.
 
     Attributes:
         signature: hash of names, sizes and times of all its files.
@@ -45,12 +45,12 @@ class State:
 
 
 def look_at(source: str) -> State:
-    """Return what a source looks like, without reading its files.
+    """Return the state of a source, without reading its files.
 
     Raises:
-        TraceError: there is nothing, or it cannot be read.
+        TraceError: nothing is there.
         DatabaseError: its store cannot be reached.
-        OSError: a folder or file of it cannot be looked at.
+        OSError: one of its folders or files cannot be accessed.
     """
     store = Store(source)
     file = store.entry()
@@ -59,7 +59,7 @@ def look_at(source: str) -> State:
     elif store.is_local:
         files = sorted(_local_files(source))
     else:
-        # Times in a bucket are those of the upload: another one is taken for another recording.
+        # Times in a bucket are those of the upload: a second upload counts as a change.
         files = [(entry.path, entry.size, entry.changed_ns) for entry in store.entries()]
     if not files:
         raise TraceError(f"no such recording — {source}", "check the path")
@@ -82,7 +82,7 @@ def fetch(source: str, directory: Path) -> Path:
         return target
     for entry in store.entries():
         place = target / entry.path
-        # A name in a bucket may be anything.
+        # Names in a bucket may hold `..`.
         if not place.resolve().is_relative_to(target.resolve()):
             raise TraceError(f"a name that leads out of the recording — {entry.path}", None)
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -99,7 +99,7 @@ def _local_files(source: str) -> Iterator[tuple[str, int, int]]:
     seen = {os.path.realpath(source)}
     for directory, folders, names in os.walk(source, onerror=_raise, followlinks=True):
         for folder in sorted(folders):
-            # A link may lead back.
+            # A link may lead to a folder above.
             place = os.path.realpath(Path(directory, folder))
             if place in seen:
                 folders.remove(folder)
@@ -108,7 +108,7 @@ def _local_files(source: str) -> Iterator[tuple[str, int, int]]:
             path = Path(directory, name)
             try:
                 status = path.stat()
-            except FileNotFoundError:  # a link that leads nowhere, or gone meanwhile
+            except FileNotFoundError:  # a dangling link, or deleted meanwhile
                 continue
             yield str(path.relative_to(source)), status.st_size, status.st_mtime_ns
 

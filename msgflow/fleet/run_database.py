@@ -1,4 +1,4 @@
-"""Brings one run of a lake back as an ordinary database."""
+"""The database of one run of a lake, restored as an ordinary file."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _SHORTEST = 4
 
 @dataclass(frozen=True)
 class OpenedRun:
-    """A run that was brought back.
+    """A restored run.
 
     Attributes:
         run: its key.
         name: its name.
         path: the database.
         size: bytes of it.
-        before: the schema revision that it was upgraded from; None: it had the current one.
+        before: the schema revision before the upgrade; None if it had the current one.
     """
 
     run: str
@@ -44,17 +44,17 @@ class OpenedRun:
 def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
     """Write the database of a run of a lake into a new file.
 
-    It is the database that the ingest made, verified by the packets that it knows, and upgraded
-    where an earlier msgflow made it.
+    It is the database of the ingest. Its packets are compared with the key of the run, and it is
+    upgraded if an earlier msgflow made it.
 
     Args:
         lake: the lake.
-        run: key of the run, the begin of it, or the name of a run.
-        path: the file, which must not exist; the key and `.duckdb`, here, when None.
+        run: key of the run, the beginning of its key, or its name.
+        path: the file, which must not exist; KEY.duckdb in the current folder when None.
 
     Raises:
         UsageError: no such run or several, no database of it, or the file exists.
-        DatabaseError: the lake cannot be read, or holds something else than this run there.
+        DatabaseError: the lake cannot be read, or holds another database there.
     """
     row = _row(lake, run)
     target = Path(f"{row['run']}.duckdb") if path is None else path
@@ -73,7 +73,7 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
         _fetch(lake, row, aside)
         before = _verified(lake, row, aside)
         try:
-            # Fails where somebody made the file meanwhile.
+            # This fails if the file exists by now.
             os.link(aside, target)
         except FileExistsError:
             raise UsageError(
@@ -130,7 +130,7 @@ def _fetch(lake: Lake, row: dict[str, Any], target: Path) -> None:
 
 
 def _verified(lake: Lake, row: dict[str, Any], file: Path) -> str | None:
-    """Return the revision that a database was upgraded from; raise unless it is that of the run."""
+    """Upgrade a database and return its revision before; raise if it is not that of the run."""
     try:
         done = upgrade(file)
         with contextlib.closing(connect(file, read_only=True)) as con:

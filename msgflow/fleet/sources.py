@@ -1,4 +1,4 @@
-"""From what is typed to recordings: paths, addresses, patterns of both, and manifests."""
+"""Sources that users type: paths, addresses, patterns and manifests, resolved to recordings."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 def find_recordings(
     sources: Sequence[str], labels: Mapping[str, str] | None = None
 ) -> list[Recording]:
-    """Return the recordings that are meant, each once, in the order given.
+    """Return the recordings of some sources, each once, in the given order.
 
     Args:
-        sources: directories, archives, manifests; in folders or buckets; or patterns of such with
-            `*`, `?` and `[…]`. A directory is one recording, with all traces below it.
-        labels: of all of them; what a manifest says of one comes first.
+        sources: directories, archives and manifests in folders or buckets, or patterns with `*`,
+            `?` and `[…]`. A directory is one recording, with all traces below it.
+        labels: of all of them; a manifest overrides them.
 
     Raises:
-        UsageError: a pattern that nothing fits, a manifest that is none, or two rows that say
-            different things of one recording.
+        UsageError: nothing fits a pattern, a manifest is invalid, or one recording has different
+            labels in two rows.
         DatabaseError: a store cannot be reached.
     """
     found: dict[str, Recording] = {}
@@ -64,7 +64,7 @@ def _of(source: str) -> list[Recording]:
 
 
 def _in_bucket(pattern: str) -> list[str]:
-    """Return what fits a pattern, segment by segment, as in a folder."""
+    """Return the addresses that fit a pattern, segment by segment, as in a folder."""
     bucket, *segments = pattern.removeprefix(S3).rstrip("/").split("/")
     found = [S3 + bucket]
     for segment in segments:

@@ -1,4 +1,4 @@
-"""What is asked of a worker, and what it answers: plain values, so that they go anywhere."""
+"""Tasks for workers and their outcomes: plain values, which can be sent to any machine."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
-# Secrets that a message of a library could repeat.
+# Variables with secrets, which messages of libraries could repeat.
 _SECRETS = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
 _MEGABYTE = 1_000_000
 
 
 class Reason(StrEnum):
-    """Why a recording did not go in."""
+    """Why a recording failed."""
 
     BROKEN = "broken"
     TOO_LARGE = "too_large"
@@ -28,7 +28,7 @@ class Reason(StrEnum):
     ERROR = "error"
 
 
-# What may go well the next time, without anything having been changed.
+# Another try may succeed although nothing has been changed.
 PASSING = frozenset(
     {
         Reason.CHANGED,
@@ -43,21 +43,21 @@ PASSING = frozenset(
 
 @dataclass(frozen=True)
 class Task:
-    """One recording, and how it is to be done.
+    """One recording to ingest, with options.
 
     Attributes:
-        index: which of the recordings.
+        index: number of the recording in the call.
         source: address of the recording.
         lake: address of the lake.
         options: of the ingest: reader, strict, ignore, clock_sync.
         views: write the public views.
         database: write the database.
-        timeout: seconds that it may take.
-        most_memory: bytes that it may take; None: what the machine has.
-        scratch: folder for what it needs meanwhile; None: that of the system.
-        memory: bytes that it will need, as far as can be told from outside.
-        disk: bytes of scratch space, likewise.
-        edition: told apart from what was written of the same recording before.
+        timeout: most seconds.
+        most_memory: most bytes of memory; None for no limit.
+        scratch: folder for temporary files; that of the system when None.
+        memory: estimated bytes of memory.
+        disk: estimated bytes of scratch space.
+        edition: makes the part different from earlier ones of the same recording.
     """
 
     index: int
@@ -74,23 +74,23 @@ class Task:
     edition: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as values that JSON can hold."""
+        """Return the attributes, as values for JSON."""
         return asdict(self)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a task.
+    """The outcome of a task.
 
     Attributes:
-        values: of columns of the table `run`, where all went well; else None.
-        reason: what kind of failure.
-        stage: what was being done.
-        error: what went wrong, in words.
+        values: columns of the table `run`; None after a failure.
+        reason: kind of failure.
+        stage: what the task was doing.
+        error: what went wrong.
         hint: what to do about it.
-        signature: of the source, where it was looked at.
-        seconds: how long it took.
-        worker: machine that did it.
+        signature: of the source, if known.
+        seconds: duration.
+        worker: machine and process.
     """
 
     values: dict[str, Any] | None = None
@@ -103,17 +103,17 @@ class Outcome:
     worker: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as values that JSON can hold."""
+        """Return the attributes, as values for JSON."""
         return asdict(self)
 
 
 def needs(size: int, *, is_archive: bool, is_remote: bool) -> tuple[int, int]:
-    """Return (memory, disk) that a recording will need, bytes; see docs/fleet.md#sizing.
+    """Estimate (memory, disk) that a recording needs, in bytes; see docs/fleet.md#sizing.
 
     Args:
         size: bytes of the source.
-        is_archive: it is packed: traces become some eight times smaller.
-        is_remote: it is copied to this machine first.
+        is_archive: it is packed, to about an eighth of its size.
+        is_remote: it is in a bucket, and has to be copied first.
     """
     unpacked = size * 8 if is_archive else size
     copied = (size if is_remote else 0) + (unpacked if is_archive else 0)
@@ -121,7 +121,7 @@ def needs(size: int, *, is_archive: bool, is_remote: bool) -> tuple[int, int]:
 
 
 def without_secrets(text: str) -> str:
-    """Return a text without what the environment has of credentials."""
+    """Return a text without credentials of the environment."""
     for name in _SECRETS:
         value = os.environ.get(name)
         if value and len(value) > 3:

@@ -1,4 +1,4 @@
-"""Does a task in a process of its own, which can be ended whatever it is doing."""
+"""The parent of a task's process: it starts it, watches time and memory, and ends it if it must."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _LONGEST_LOG = 500
 
 
 def run_task(given: dict[str, Any]) -> dict[str, Any]:
-    """Do a task and return what came of it, as values that go anywhere.
+    """Do a task and return its outcome, both as plain values.
 
-    Nothing of the task stays on this machine, and what killed workers left here is removed.
+    No file of the task stays on this machine. Files that killed workers left here are removed.
     """
     task = Task(**given)
     begin = time.monotonic()
@@ -53,7 +53,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def worker_name() -> str:
-    """Return what this worker is called: its machine and process."""
+    """Return the name of this worker: its machine and process."""
     return f"{socket.gethostname()}:{os.getpid()}"
 
 
@@ -78,14 +78,14 @@ def _watched(task: Task, directory: Path, begin: float) -> Outcome:
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=log,
-            # Archives are unpacked there, too.
+            # Archives are unpacked there as well.
             env={**os.environ, "TMPDIR": str(directory)},
             start_new_session=True,
         )
     try:
         assert child.stdin is not None
         with contextlib.suppress(BrokenPipeError):
-            # It stays open: that it is closed tells the child that nobody waits any more.
+            # It stays open: the child ends when it is closed.
             child.stdin.write(json.dumps(task.as_dict()).encode() + b"\n")
             child.stdin.flush()
         while child.poll() is None:
@@ -135,7 +135,7 @@ def _ended(directory: Path, begin: float, reason: Reason, words: str) -> Outcome
 
 
 def _memory(pid: int) -> int:
-    """Return the bytes of memory that a process takes now; 0 where nobody knows."""
+    """Return the current memory of a process in bytes; 0 if the system does not tell."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
     except (OSError, ValueError, IndexError):

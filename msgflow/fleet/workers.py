@@ -1,4 +1,4 @@
-"""Who does the tasks: this process one after the other, or the nodes of a Ray cluster."""
+"""Workers that do tasks: this process, one after the other, or the nodes of a Ray cluster."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ if TYPE_CHECKING:
 
 LOCAL = "local"
 _SCRATCH = "scratch"
-# How many tasks wait at the workers, beside those that are being done, for each of them.
+# Tasks that wait for each worker, besides the one that it does.
 _WAITING = 1
 
 
 class Workers(Protocol):
-    """Does tasks, and tells what came of them."""
+    """Does tasks and returns their outcomes."""
 
     def has_room(self) -> bool:
-        """Tell whether another task would be begun soon."""
+        """Tell whether another task would start soon."""
 
     def is_too_large(self, task: Task) -> str | None:
-        """Say why no worker can ever do a task; None where one can."""
+        """Return why no worker can ever do a task; None if one can."""
 
     def submit(self, task: Task) -> None:
         """Take a task."""
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
-        """Yield what has ended; wait for the first, no longer than `seconds`."""
+        """Yield finished tasks; wait for the first, at most `seconds`."""
 
     def close(self) -> None:
-        """End all that is being done."""
+        """Cancel all tasks."""
 
 
 class OneProcess:
-    """Does one task after the other."""
+    """Does one task after the other, in this process."""
 
     def __init__(self) -> None:
         self._tasks: list[Task] = []
@@ -49,7 +49,7 @@ class OneProcess:
         return not self._tasks
 
     def is_too_large(self, task: Task) -> str | None:
-        """Say so where this machine has less memory than the task needs."""
+        """Return a reason if this machine has less memory than the task needs."""
         total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
         return _too_much("memory", task.memory, total)
 
@@ -58,26 +58,26 @@ class OneProcess:
         self._tasks.append(task)
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
-        """Do the tasks; they do not end before they are done."""
+        """Do the tasks, without a limit of time, and yield their outcomes."""
         while self._tasks:
             task = self._tasks.pop(0)
             yield task, Outcome(**run_task(task.as_dict()))
 
     def close(self) -> None:
-        """Forget what is to be done."""
+        """Forget all tasks."""
         self._tasks.clear()
 
 
 class RayWorkers:
-    """The nodes of a Ray cluster, which ask for the memory and scratch space of each task."""
+    """The nodes of a Ray cluster; each task reserves its memory and scratch space."""
 
     def __init__(self, address: str) -> None:
-        """Connect to a cluster, or start one of this machine where the address is 'local'.
+        """Connect to a cluster, or start one on this machine if the address is 'local'.
 
         Raises:
             UsageError: Ray is not installed, or the cluster cannot be reached.
         """
-        # Nobody is told that this is used.
+        # Ray sends no statistics of usage.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         try:
             import ray
@@ -88,7 +88,8 @@ class RayWorkers:
         self._ray: Any = ray
         self._is_ours = not ray.is_initialized()
         if self._is_ours:
-            # Ray knows the word: without it, it would join what runs here or RAY_ADDRESS names.
+            # Ray knows the word 'local'. Otherwise it would join a cluster that runs here or that
+            # RAY_ADDRESS names.
             more: dict[str, Any] = {"address": address}
             if address == LOCAL:
                 more |= {"include_dashboard": False, "object_store_memory": 100_000_000}
@@ -105,7 +106,7 @@ class RayWorkers:
                     f"cannot reach the Ray cluster: {line} — {address}",
                     "ray status --address ADDRESS; --ray local starts one of this machine",
                 ) from error
-        # A worker that was lost is tried again by whoever counts the tries.
+        # `ingest` counts the tries of a task whose worker was lost.
         self._run = ray.remote(max_retries=0)(run_task)
         self._running: dict[Any, Task] = {}
 
@@ -115,7 +116,7 @@ class RayWorkers:
         return len(self._running) < max(1, workers) * (1 + _WAITING)
 
     def is_too_large(self, task: Task) -> str | None:
-        """Say so where no node has what the task needs."""
+        """Return a reason if no node has what the task needs."""
         nodes = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
         for name, needed in (("memory", task.memory), (_SCRATCH, task.disk)):
             most = max((node.get(name, 0) for node in nodes), default=0)
@@ -126,13 +127,13 @@ class RayWorkers:
     def submit(self, task: Task) -> None:
         """Hand a task to the cluster."""
         resources = self._ray.cluster_resources()
-        # Only clusters that say how much scratch space they have can be asked for some.
+        # Only some clusters declare their scratch space; on others none can be reserved.
         more = {"resources": {_SCRATCH: task.disk}} if resources.get(_SCRATCH) else {}
         ask = self._run.options(num_cpus=1, memory=task.memory, **more)
         self._running[ask.remote(task.as_dict())] = task
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
-        """Yield what has ended."""
+        """Yield finished tasks."""
         if not self._running:
             return
         done, _ = self._ray.wait(list(self._running), num_returns=1, timeout=seconds)
@@ -152,7 +153,7 @@ class RayWorkers:
                 )
 
     def close(self) -> None:
-        """End all tasks; leave the cluster."""
+        """Cancel all tasks and leave the cluster."""
         for reference in self._running:
             self._ray.cancel(reference, force=True)
         self._running.clear()
@@ -161,7 +162,7 @@ class RayWorkers:
 
 
 def make_workers(ray: str | None) -> Workers:
-    """Return the workers of a Ray cluster, or of this process where none is named.
+    """Return the workers of a Ray cluster, or this process if no cluster is named.
 
     Args:
         ray: address of a cluster, 'auto', 'local', or None.

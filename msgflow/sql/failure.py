@@ -1,4 +1,4 @@
-"""What DuckDB says when a file or its place is at fault, in our words."""
+"""Errors of DuckDB that a file or its disk causes, in words for users."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 _FULL = re.compile(r"no space left|disk quota|max_temp_directory_size|not enough space", re.I)
 _REFUSED = re.compile(r"permission denied|read-only file system|operation not permitted", re.I)
-# Base class of all: what DuckDB finds in blocks whose checksum is wrong has no class of its own.
+# A block with a wrong checksum raises the base class of all errors.
 _DAMAGE = re.compile(
     r"corrupt|checksum|deserializ|invalid unicode|could not read|failed to load metadata",
     re.I,
 )
-# DuckDB 2.0 fails at times where dictionaries of strings pass through several joins; the same
-# statement seldom meets it twice (duckdb/duckdb#24807 is the like of it).
+# DuckDB 2.0 sometimes fails when dictionaries of strings pass through several joins. The same
+# statement seldom fails twice (similar: duckdb/duckdb#24807).
 _MISTAKE = re.compile(r"dict-surviving")
 _OF_FILES = (
     duckdb.IOException,
@@ -36,12 +36,12 @@ _DAMAGED_KINDS = (duckdb.InternalException, duckdb.FatalException, duckdb.Serial
 
 
 def is_of_the_file(error: BaseException) -> bool:
-    """Tell whether a database file or its place is at fault, rather than a statement."""
+    """Tell whether a database file or its disk causes an error, not a statement."""
     return _kind(error) is not None
 
 
 def in_words(error: BaseException, path: Path) -> DatabaseError | None:
-    """Return an error of the database at `path` in our words, None if a statement is at fault."""
+    """Return an error of the file at `path` in our words, None if a statement causes it."""
     kind = _kind(error)
     if kind == "full":
         return DatabaseError(
@@ -69,13 +69,13 @@ def in_words(error: BaseException, path: Path) -> DatabaseError | None:
 def out_of_memory(
     what: str, hint: str = "give more with --memory-limit, or ask for less at a time"
 ) -> QueryError:
-    """Return the error of a question that DuckDB had not enough memory for."""
+    """Return the error of a query that needs more memory than DuckDB has."""
     return QueryError(f"more memory is needed than the database may take — {what}", hint)
 
 
 @contextmanager
 def database_errors(path: Path) -> Iterator[None]:
-    """Raise what the file at `path`, or its place, is to blame for as a DatabaseError."""
+    """Turn errors that the file at `path` or its disk causes into a DatabaseError."""
     try:
         yield
     except (duckdb.Error, OSError, UnicodeDecodeError) as error:
@@ -87,7 +87,7 @@ def database_errors(path: Path) -> Iterator[None]:
 
 def _kind(error: BaseException) -> str | None:
     if isinstance(error, OSError):
-        # Others name their file, or are about the traces.
+        # Other errors name their file, or concern the traces.
         return "full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else None
     if isinstance(error, UnicodeDecodeError):
         return "damaged"

@@ -1,8 +1,8 @@
-"""Ctrl-C that is never lost, and heeded only where it leaves nothing half done.
+"""Interrupts: Ctrl-C and SIGTERM, which are never lost and leave nothing half done.
 
-Python raises KeyboardInterrupt wherever the main thread happens to be: inside of a callback of the
-garbage collector it is printed and forgotten, inside of DuckDB it becomes another exception. Hence
-the signal is only noted here, and raised by those who ask for it.
+Python raises KeyboardInterrupt wherever the main thread happens to be. Inside a callback of the
+garbage collector it is printed and forgotten; inside DuckDB it becomes another exception. Hence the
+signal handler only notes the signal, and the code that can stop asks for it.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _SECONDS_BETWEEN_ATTEMPTS = 0.05
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, where the command line treats it as Ctrl-C."""
+    """SIGTERM, which the command line treats as Ctrl-C."""
 
 
 class Interrupts:
-    """What is known of Ctrl-C: whether it came, and whether it still counts."""
+    """The state of Ctrl-C: whether it came, and whether it still counts."""
 
     def __init__(self) -> None:
         self._is_noted = False
@@ -36,7 +36,7 @@ class Interrupts:
         self._lock = threading.Lock()
 
     def on_signal(self, number: int, frame: FrameType | None) -> None:
-        """Note Ctrl-C; the second one is raised at once, for work that does not ask for long."""
+        """Note Ctrl-C; raise the second one at once, as the work may not ask for a long time."""
         if number == signal.SIGTERM:
             self._kind = Terminated
         if self._is_noted and not self._is_final:
@@ -44,7 +44,7 @@ class Interrupts:
         self._is_noted = True
 
     def note(self) -> None:
-        """Take Ctrl-C for noted that was raised by somebody else."""
+        """Note a Ctrl-C that came as an exception."""
         self._is_noted = True
 
     def check(self) -> None:
@@ -55,7 +55,7 @@ class Interrupts:
     def make_final(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C came before; from now on it comes too late.
 
-        Called before the one step that cannot be taken back, by any thread.
+        Any thread calls this before the step that cannot be undone.
         """
         with self._lock:
             self.check()
@@ -72,16 +72,16 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def _may_be_replaced(handler: object) -> bool:
-    # Python's own, and that of the command line (msgflow.cli.stop).
+    # Python's own handler, and that of the command line (msgflow.cli.stop).
     return handler is signal.default_int_handler or getattr(handler, "raises_interrupts", False)
 
 
 @contextmanager
 def noted_interrupts() -> Iterator[Interrupts]:
-    """Note Ctrl-C instead of raising it; inside of another such block, share what that noted.
+    """Note Ctrl-C instead of raising it; an inner block shares the state of the outer one.
 
-    Only the main thread receives signals. Where the program that uses msgflow handles Ctrl-C
-    itself, or ignores it, that stays so. SIGTERM is noted in the command line only.
+    Only the main thread receives signals. A program that uses msgflow keeps its own handling of
+    Ctrl-C. SIGTERM is noted in the command line only.
     """
     if threading.current_thread() is not threading.main_thread():
         yield Interrupts()
@@ -99,7 +99,7 @@ def noted_interrupts() -> Iterator[Interrupts]:
             signal.signal(number, interrupts.on_signal)
         yield interrupts
     except Exception:
-        # What Ctrl-C made fail is no error of its own.
+        # After Ctrl-C the failure is only its consequence.
         interrupts.check()
         raise
     finally:
@@ -110,8 +110,8 @@ def noted_interrupts() -> Iterator[Interrupts]:
 def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:
     """Return what `work` returns; Ctrl-C interrupts the statement that it runs on `connection`.
 
-    DuckDB looks for signals only while the main thread has a part of the statement to compute, so
-    that a statement run there may not notice Ctrl-C at all. Hence the work goes to another thread.
+    DuckDB looks for signals only while the main thread computes a part of the statement, and might
+    never notice Ctrl-C. Hence another thread does the work.
 
     Raises:
         KeyboardInterrupt: after the statement has ended.
@@ -134,7 +134,7 @@ def interruptible(connection: duckdb.DuckDBPyConnection, work: Callable[[], _T])
             interrupts.note()
             is_watched.set()
             raise
-        # Again and again: between two statements of the work there is nothing to interrupt.
+        # Repeatedly: between two statements of the work there is nothing to interrupt.
         while not future.done():
             try:
                 is_watched.set()

@@ -20,12 +20,12 @@ _NO = frozenset(("false", "no", "off", "0"))
 
 
 def is_integer(type_name: str) -> bool:
-    """Tell whether the DuckDB type `type_name` is one of integers."""
+    """Tell whether `type_name` is an integer type of DuckDB."""
     return type_name.upper() in _INTEGER_TYPES
 
 
 def described_type(type_name: str) -> str:
-    """Return what people call a value of the DuckDB type `type_name`: 'a whole number'."""
+    """Return a plain name for values of the DuckDB type `type_name`, such as 'a whole number'."""
     name = type_name.upper()
     if name.endswith("[]"):
         return "values separated by commas"
@@ -37,10 +37,10 @@ def described_type(type_name: str) -> str:
 
 
 def parse_literal(text: str) -> Value:
-    """Return the value of a literal as SQL writes it: NULL, a truth value, number, string or list.
+    """Return the value of a literal in SQL: NULL, a truth value, number, string or list.
 
     Raises:
-        ValueError: it is none of these.
+        ValueError: it is another kind of text.
     """
     if text.lower() in _WORDS:
         return _WORDS[text.lower()]
@@ -56,9 +56,9 @@ def parse_literal(text: str) -> Value:
 
 
 def parse_text(text: str, type_name: str) -> Value:
-    """Return what `text`, typed by a user, means for a parameter of DuckDB type `type_name`.
+    """Return the value of `text`, typed by a user, for a parameter of DuckDB type `type_name`.
 
-    Integers may be hexadecimal (0x…, as handles are printed); a list is separated by commas.
+    Integers may be hexadecimal (0x…, the form of handles); commas separate a list.
 
     Raises:
         ValueError: it is not a value of this type.
