@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.create import write_new
+from msgflow.db.empty_database import write_empty
 from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
@@ -100,6 +100,6 @@ def expected_definitions() -> Mapping[str, str]:
     """Return the definitions that a database of this msgflow has, by kind and name."""
     with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
         path = Path(directory) / "new.duckdb"
-        write_new(path)
+        write_empty(path)
         with duckdb.connect(str(path), read_only=True) as con:
             return definitions(con)

@@ -18,8 +18,8 @@ from msgflow.db.connection import (
     recorded_revision,
     require_known,
 )
-from msgflow.db.create import write_new
 from msgflow.db.definition_check import require_ours
+from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
@@ -70,7 +70,7 @@ def _replace_by_new(path: Path) -> None:
     try:
         with database_errors(path), workspace(path) as directory:
             fresh = directory / "new.duckdb"
-            write_new(fresh)
+            write_empty(fresh)
             os.replace(fresh, path)
     except OSError as error:
         raise DatabaseError(

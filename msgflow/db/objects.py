@@ -34,7 +34,7 @@ SCHEMAS = ("store", "derive", "main")
 
 _REVISION = re.compile(r"[0-9]{4}")
 # What makes tables, and views of them, beside `schema/`: read as text, not run.
-_DECLARATION = ("tables.py", "table_view.py", "create.py", "diagnostic.py")
+_DECLARATION = ("tables.py", "table_view.py", "empty_database.py", "diagnostic.py")
 
 
 @cache

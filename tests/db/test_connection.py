@@ -9,7 +9,7 @@ import duckdb
 import pytest
 
 from msgflow.db.connection import attach
-from msgflow.db.create import write_new
+from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file, open_memory
 
 
@@ -51,7 +51,7 @@ def test_a_file_may_be_open_twice_in_a_process(tmp_path: Path) -> None:
 
 def test_a_new_database_has_no_log_and_is_whole_after_a_checkpoint(tmp_path: Path) -> None:
     path = tmp_path / "new.duckdb"
-    write_new(path)
+    write_empty(path)
     with open_memory() as con:
         attach(con, path, is_new=True)
         con.execute("UPDATE store.alembic_version SET version_num = 'x'")

@@ -12,10 +12,11 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from msgflow.db import cache, create, derive, migrate, objects
+from msgflow.db import derive, migrate, objects
 from msgflow.db.connection import connect, recorded_revision
 from msgflow.db.definition_check import expected_definitions
-from msgflow.db.sandbox import STORAGE_VERSION, open_file
+from msgflow.db.empty_database import write_empty
+from msgflow.db.sandbox import open_file
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
 
@@ -143,24 +144,32 @@ def test_a_new_database_is_the_same_with_and_without_a_cache(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     made = tmp_path / "made.duckdb"
-    create.write_new(made)
-    (kept,) = (tmp_path / "cache" / "msgflow").glob("database-*")
+    write_empty(made)
+    (kept,) = (tmp_path / "cache" / "msgflow").iterdir()
     assert schema_of(made) == schema_of(database)
-
-    monkeypatch.setattr(create, "_statements", lambda: pytest.fail("made again"))
-    create.write_new(tmp_path / "copied.duckdb")
-    assert (tmp_path / "copied.duckdb").read_bytes() == made.read_bytes()
-    assert schema_of(tmp_path / "copied.duckdb") == schema_of(made)
-
-    monkeypatch.undo()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     whole = kept.read_bytes()
-    assert cache.read("database", STORAGE_VERSION) is not None
-    for damage in (b"", whole[:-1], whole[:5000] + b"x" + whole[5001:]):
+
+    # A file that is made anew differs, as each has an identifier.
+    write_empty(tmp_path / "copied.duckdb")
+    assert (tmp_path / "copied.duckdb").read_bytes() == made.read_bytes()
+    for n, damage in enumerate((b"", whole[:-1], whole[:5000] + b"x" + whole[5001:])):
         kept.write_bytes(damage)
-        assert cache.read("database", STORAGE_VERSION) is None
-    create.write_new(tmp_path / "again.duckdb")
-    assert schema_of(tmp_path / "again.duckdb") == schema_of(database)
+        again = tmp_path / f"again{n}.duckdb"
+        write_empty(again)
+        assert schema_of(again) == schema_of(database)
+        assert kept.read_bytes().partition(b"\n")[2] == again.read_bytes() != made.read_bytes()
+
+
+def test_the_cache_keeps_few_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "msgflow").mkdir()
+    for n in range(20):
+        (tmp_path / "msgflow" / f"database-{n}").touch()
+        os.utime(tmp_path / "msgflow" / f"database-{n}", (n, n))
+    write_empty(tmp_path / "new.duckdb")
+    kept = {each.name for each in (tmp_path / "msgflow").iterdir()}
+    assert len(kept) == 10
+    assert kept > {f"database-{n}" for n in range(11, 20)}
 
 
 def test_a_new_database_needs_neither_alembic_nor_a_dialect(tmp_path: Path) -> None:

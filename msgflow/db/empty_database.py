@@ -1,0 +1,113 @@
+"""Empty databases: all tables, views and macros, and no run.
+
+They are made from `tables.py` and `schema/` without a migration, so that Alembic is not needed.
+DuckDB takes long to look at each view. Hence the first empty database is kept in the user's cache,
+and later ones are copies of it. A cache that is damaged, missing or read-only costs time only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import duckdb
+
+from msgflow.db import objects
+from msgflow.db.sandbox import STORAGE_VERSION, open_file
+from msgflow.version import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from msgflow.db.tables import Table
+
+# Versions of msgflow that alternate on one machine each keep theirs.
+_MOST_KEPT = 10
+
+
+def write_empty(path: Path) -> None:
+    """Write an empty database to `path`, which does not exist yet.
+
+    Raises:
+        OSError: it cannot be written.
+        duckdb.Error: likewise.
+    """
+    content = _cached()
+    if content is not None:
+        path.write_bytes(content)
+        return
+    with contextlib.closing(open_file(path, read_only=False)) as con:
+        con.begin()
+        for statement in _statements():
+            con.execute(statement)
+        objects.apply(con)
+        con.commit()
+        con.execute("CHECKPOINT")  # closing would fail silently, and leave a log behind
+    _cache(path.read_bytes())
+
+
+def _cached() -> bytes | None:
+    """Return the empty database in the cache, None if there is none, or a damaged one."""
+    try:
+        digest, content = _cache_file().read_bytes().split(b"\n", 1)
+    except (OSError, ValueError, RuntimeError):  # the last: there is no home directory
+        return None
+    return content if hashlib.sha256(content).hexdigest().encode() == digest else None
+
+
+def _cache(content: bytes) -> None:
+    """Keep an empty database in the cache, if possible."""
+    with contextlib.suppress(OSError, RuntimeError):
+        path = _cache_file()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        aside = path.with_suffix(f".{os.getpid()}.part")
+        try:
+            aside.write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
+            aside.replace(path)
+        finally:
+            aside.unlink(missing_ok=True)
+        kept = sorted(path.parent.iterdir(), key=lambda each: each.stat().st_mtime)
+        for old in kept[:-_MOST_KEPT]:
+            old.unlink()
+
+
+def _cache_file() -> Path:
+    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
+    made_by = (__version__, objects.head_revision(), objects.definition_hash(), STORAGE_VERSION)
+    key = hashlib.sha256("\0".join(made_by).encode()).hexdigest()[:32]
+    return root / "msgflow" / f"database-{duckdb.__version__}-{key}"
+
+
+def _statements() -> Iterator[str]:
+    from msgflow.db.tables import SCHEMA, TABLES
+
+    yield f"CREATE SCHEMA {SCHEMA}"
+    for table in TABLES.values():
+        yield from _table(table)
+    # As Alembic makes it.
+    yield (
+        f"CREATE TABLE {SCHEMA}.alembic_version (version_num VARCHAR(32) NOT NULL, "
+        "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
+    )
+    revision = objects.literal(objects.head_revision())
+    yield f"INSERT INTO {SCHEMA}.alembic_version (version_num) VALUES ({revision})"
+
+
+def _table(table: Table) -> Iterator[str]:
+    columns = ", ".join(
+        f'"{column.name}" {column.type}'
+        + (" PRIMARY KEY" if column.is_key else " NOT NULL" if column.is_required else "")
+        + (f" DEFAULT {column.default}" if column.default is not None else "")
+        for column in table.columns.values()
+    )
+    yield f"CREATE TABLE {table.full_name} ({columns})"
+    yield f"COMMENT ON TABLE {table.full_name} IS {objects.literal(table.comment)}"
+    for column in table.columns.values():
+        yield (
+            f'COMMENT ON COLUMN {table.full_name}."{column.name}" IS '
+            f"{objects.literal(column.comment)}"
+        )
