@@ -942,6 +942,8 @@ def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
     """Return what DuckDB says about SQL that a user gave."""
     if isinstance(error, duckdb.OutOfMemoryException):
         return out_of_memory("the SQL", *more_memory)
+    if isinstance(error, duckdb.PermissionException):
+        return QueryError(first_line(error), "SQL reaches no other files here; use DuckDB for that")
     # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))

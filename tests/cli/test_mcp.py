@@ -106,8 +106,8 @@ def test_answers_are_capped_and_say_so(small_database: Path) -> None:
     ("call", "words"),
     [
         (("sql", {"query": "COPY run TO 'x.csv'"}), ["not a statement that only reads", "hint: "]),
-        (("sql", {"query": "FROM read_csv('/etc/passwd')"}), ["more than read this database"]),
-        (("sql", {"query": "FROM '/etc/passwd'"}), ["there is no table of that name"]),
+        (("sql", {"query": "FROM read_csv('/etc/passwd')"}), ["SQL reaches no other files"]),
+        (("sql", {"query": "FROM '/etc/passwd'"}), ["/etc/passwd does not exist"]),
         (("sql", {"query": "FROM nothing"}), ["nothing"]),
         (("run_query", {"name": "latency"}), ["no such query", "hint: ", "e2e-latency"]),
         (("run_query", {"name": "info-runs", "run": "x"}), ["no such run — x", "morning (1)"]),
