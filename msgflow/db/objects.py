@@ -1,6 +1,6 @@
 """The SQL objects of `schema/`: loaded, ordered by what they need, and applied to a database.
 
-A public view that shows a table as it is has no file, but a declaration in `tables.py`.
+A public view that shows a table unchanged has no file, but a declaration in `tables.py`.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ if TYPE_CHECKING:
 
     import duckdb
 
-# Folders whose objects live in the database; each may need only those to its left, and itself.
+# Folders whose objects are in the database; each may need only itself and those to its left.
 PUBLIC = "public"
 # Views are put together of what lies here.
 DIAGNOSTICS = "health/diagnostic"
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
-# Of a database: tables, what is derived from them, and what users read.
+# Schemas of a database: tables, objects derived from them, and objects for users.
 SCHEMAS = ("store", "derive", "main")
 
 _REVISION = re.compile(r"[0-9]{4}")
-# What makes tables, and views of them, beside `schema/`: read as text, not run.
+# Modules that make tables and views besides `schema/`; the hash reads them as text.
 _DECLARATION = ("tables.py", "table_view.py", "empty_database.py", "diagnostic.py")
 
 
 @cache
 def load(layer: str) -> tuple[Header, ...]:
-    """Return the objects of one folder of `schema/` and its rooms, each after those it needs.
+    """Return the objects of a folder of `schema/` and its subfolders, each after those it needs.
 
-    Among those of `public` are the views that `tables.py` declares, and columns that their header
-    only names are as they stand there; among others what diagnostics are put together to.
+    `public` includes the views that `tables.py` declares, and takes from there the columns that a
+    header only names. Other folders include the objects that combine diagnostics.
 
     Raises:
         ValueError: two objects need each other, or a column is declared nowhere.
@@ -57,7 +57,7 @@ def load(layer: str) -> tuple[Header, ...]:
 
 
 def _completed(header: Header) -> Header:
-    """Fill in the columns that a header only names: they are those of the table of its name."""
+    """Fill in the columns that a header only names, from the table of the same name."""
     if all(column.type for column in header.columns):
         return header
     from msgflow.db.table_view import declared_columns
@@ -74,7 +74,7 @@ def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
     """Order objects so that each comes after those that it needs; ties by name.
 
     Raises:
-        ValueError: two objects need each other, be it by way of what is stored of one.
+        ValueError: two objects need each other, directly or by way of a stored table.
     """
     by_name = {header.name: header for header in headers}
     sorter = TopologicalSorter({name: sources(by_name, name) for name in sorted(by_name)})
@@ -85,9 +85,9 @@ def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
 
 
 def sources(by_name: Mapping[str, Header], name: str) -> list[str]:
-    """Return which of these objects one is made of: those that it needs, and who fills tables.
+    """Return which of these objects one is made of: those that it needs, and those of its tables.
 
-    What the table `store.x` holds was read from `derive.x`, where there is such an object.
+    The rows of a table `store.x` come from `derive.x`, if there is such an object.
     """
     needs = dict.fromkeys(by_name[name].needs)
     needs |= dict.fromkeys(need.replace("store.", "derive.", 1) for need in needs)
@@ -116,15 +116,15 @@ def hash_of(texts: Iterable[str]) -> str:
 
 @cache
 def definition_hash() -> str:
-    """Return the SHA-256 of everything that `apply` would apply.
+    """Return the SHA-256 of all that `apply` would create.
 
-    Reads the files without parsing them, so that opening a database stays quick.
+    This reads the files without parsing them, so that a database opens quickly.
     """
     return hash_of([*_texts((*VIEW_LAYERS, DIAGNOSTICS)), *_declaration()])
 
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:
-    """Return these objects and tables, and all that they are made of, step by step."""
+    """Return these objects and tables, and all that they are made of, directly or not."""
     by_name = {header.name: header for header in views()}
     found: set[str] = set()
     waiting = list(names)
@@ -153,13 +153,13 @@ def _declaration() -> Iterable[str]:
 
 @cache
 def head_revision() -> str:
-    """Return the newest schema revision: the number that the last migration begins with."""
+    """Return the newest schema revision: the first number in the name of the last migration."""
     return max(known_revisions())
 
 
 @cache
 def known_revisions() -> frozenset[str]:
-    """Return all schema revisions that can be upgraded, or are current."""
+    """Return the current schema revision, and all that can be upgraded to it."""
     versions = resource_directory("migrations") / "versions"
     return frozenset(_revision(path) for path in versions.glob("[0-9]*_*.py"))
 
@@ -176,7 +176,7 @@ def _revision(path: Path) -> str:
 def apply(con: duckdb.DuckDBPyConnection) -> None:
     """Create or replace all views and macros with their comments, inside the open transaction.
 
-    Objects that no longer exist in `schema/` are dropped.
+    This drops objects that are no longer in `schema/`.
     """
     drop(con)
     for header in views():
@@ -231,5 +231,5 @@ def _quoted(name: str) -> str:
 
 
 def literal(text: str) -> str:
-    """Return a text as a constant of SQL."""
+    """Return a text as a literal of SQL."""
     return "'" + text.replace("'", "''") + "'"
