@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 DEFAULT_LIMIT = 10_000
+_WRITING_WITH = re.compile(r"WITH clause containing a .* statement must be at the top level")
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
 # Of reports, bytes: what mail servers take.
 DEFAULT_REPORT_SIZE = 20_000_000
@@ -944,6 +945,9 @@ def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
         return out_of_memory("the SQL", *more_memory)
     if isinstance(error, duckdb.PermissionException):
         return QueryError(first_line(error), "SQL reaches no other files here; use DuckDB for that")
+    if _WRITING_WITH.search(str(error)):
+        # DuckDB sees the query as a subquery, and would advise to put the WITH where it is.
+        return QueryError("not a statement that only reads — WITH", "SELECT in each part of WITH")
     # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))

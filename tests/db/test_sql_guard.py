@@ -205,6 +205,10 @@ def test_what_is_refused_is_said(small_database: Path) -> None:
             ("UPDATE EXTENSIONS", "not a statement that only reads"),
             ("DROP TABLE store.run", "not a statement that only reads — DROP"),
             ("EXPLAIN DELETE FROM store.run", "not a statement that only reads — EXPLAIN"),
+            (
+                "WITH x AS (DELETE FROM store.run RETURNING *) FROM x",
+                "not a statement that only reads — WITH",
+            ),
             ("SELECT 1; SELECT 2", "one query at a time — 2 statements"),
         ):
             with pytest.raises(QueryError, match=message) as raised:
