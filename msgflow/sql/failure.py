@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import re
+import shlex
 import shutil
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -78,6 +79,11 @@ def database_errors(path: Path) -> Iterator[None]:
     """Turn errors that the file at `path` or its disk causes into a DatabaseError."""
     try:
         yield
+    except duckdb.PermissionException as error:
+        raise DatabaseError(
+            f"a view of the database reads more than the database: {_first_line(error)} — {path}",
+            f"msgflow db upgrade --db {shlex.quote(str(path))} makes views and macros anew",
+        ) from error
     except (duckdb.Error, OSError, UnicodeDecodeError) as error:
         words = in_words(error, path)
         if words is None:

@@ -12,7 +12,7 @@ from sql_attack import ALLOWED, SECRET, STATEMENTS, answered, attack, content
 import msgflow
 from msgflow.db.connection import connect
 from msgflow.db.sql_guard import guarded_query
-from msgflow.errors import MsgflowError, QueryError, UsageError
+from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 
 
 @pytest.fixture
@@ -146,6 +146,15 @@ def test_a_forged_view_or_macro_reaches_no_other_file(place: Path, forged: str) 
                 told = str(error)
             assert SECRET not in told
     assert content(place.parent) == before
+
+
+def test_a_forged_view_that_reads_a_file_is_said(place: Path) -> None:
+    with duckdb.connect(str(place)) as con:
+        con.execute(FORGED[0].format(secret=place.parent / "other.csv"))
+    with msgflow.open_db(place) as database:
+        with pytest.raises(DatabaseError, match="a view of the database reads more") as raised:
+            database.runs()
+        assert "msgflow db upgrade" in str(raised.value.hint)
 
 
 @pytest.mark.parametrize(
