@@ -1,22 +1,24 @@
 """Audits: what must be true of every database, and which rows break it.
 
 `schema/health/check` holds one audit per file, a query that returns the offending rows with their
-run. Relations between tables are audited from what `tables.py` declares: there are no foreign keys.
+run. Relations between tables are audited from the foreign keys that `tables` declares: databases do
+not have them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.db import objects
-from msgflow.db.tables import SCHEMA, TABLES
+from msgflow.db.tables import STORE
 from msgflow.sql.parsed import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import duckdb
+    from sqlalchemy import Column
 
 
 RELATION_SEVERITY = "error"
@@ -59,55 +61,51 @@ def _audits(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[Chec
 
 def _relations(con: duckdb.DuckDBPyConnection, run_id: int | None) -> Iterator[CheckResult]:
     relations = {
-        table.name: [
-            (column.name, column.references)
-            for column in table.columns.values()
-            if column.references not in (None, f"{table.name}.{column.name}")
+        table: [
+            (column.name, key.column) for column in table.columns for key in column.foreign_keys
         ]
-        for table in TABLES.values()
+        for table in sorted(STORE.tables.values(), key=lambda table: table.name)
     }
-    blocks = _blocks(con, {reference for each in relations.values() for _, reference in each})
+    blocks = _blocks(con, {parent for each in relations.values() for _, parent in each})
     of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
     selects = [
-        f"SELECT '{table}', ["
-        + ", ".join(_broken(column, reference, blocks[reference]) for column, reference in each)
-        + f"] FROM {SCHEMA}.{table} AS child{of_run}"
+        f"SELECT '{table.name}', ["
+        + ", ".join(_broken(column, parent, blocks[parent]) for column, parent in each)
+        + f"] FROM {table.fullname} AS child{of_run}"
         for table, each in relations.items()
         if each
     ]
     # One statement: each takes longer to plan than its few rows to count.
     row_counts = dict(con.execute(" UNION ALL ".join(selects)).fetchall())
-    for table, references in relations.items():
-        for (column, reference), row_count in zip(
-            references, row_counts.get(table, []), strict=True
-        ):
+    for table, each in relations.items():
+        for (column, parent), row_count in zip(each, row_counts.get(table.name, []), strict=True):
             yield CheckResult(
-                f"relation.{table}.{column}",
+                f"relation.{table.name}.{column}",
                 RELATION_SEVERITY,
                 row_count,
-                f"Every {column} of {table} is a row of {reference.partition('.')[0]}.",
+                f"Every {column} of {table.name} is a row of {parent.table.name}.",
             )
 
 
 def _blocks(
-    con: duckdb.DuckDBPyConnection, references: set[str]
-) -> dict[str, tuple[int, int] | None]:
-    """Return the first and last of the ids that each column holds, None where some are missing."""
+    con: duckdb.DuckDBPyConnection, keys: set[Column[Any]]
+) -> dict[Column[Any], tuple[int, int] | None]:
+    """Return the first and last of the ids that each column holds, None if some are missing."""
     rows = con.execute(
         " UNION ALL ".join(
-            f"SELECT '{reference}', min({column}), max({column}), count({column}) "
-            f"FROM {SCHEMA}.{table}"
-            for reference in sorted(references)
-            for table, _, column in [reference.partition(".")]
+            f"SELECT '{key}', min({key.name}), max({key.name}), count({key.name}) "
+            f"FROM {key.table.fullname}"
+            for key in keys
         )
     ).fetchall()
-    return {
-        reference: (first or 1, last or 0) if count == (last or 0) - (first or 1) + 1 else None
-        for reference, first, last, count in rows
+    by_name = {
+        name: (first or 1, last or 0) if count == (last or 0) - (first or 1) + 1 else None
+        for name, first, last, count in rows
     }
+    return {key: by_name[str(key)] for key in keys}
 
 
-def _broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
+def _broken(column: str, key: Column[Any], block: tuple[int, int] | None) -> str:
     """Return the expression that counts the children without a parent.
 
     A whole block of ids, which is what ingests write, makes that a comparison; an id used twice
@@ -115,5 +113,4 @@ def _broken(column: str, reference: str, block: tuple[int, int] | None) -> str:
     """
     if block is not None:
         return f"count(*) FILTER (child.{column} < {block[0]} OR child.{column} > {block[1]})"
-    table, _, key = reference.partition(".")
-    return f"count(*) FILTER (child.{column} NOT IN (SELECT {key} FROM {SCHEMA}.{table}))"
+    return f"count(*) FILTER (child.{column} NOT IN (SELECT {key.name} FROM {key.table.fullname}))"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.db.definition_check import require_ours
-from msgflow.db.objects import definition_hash, head_revision, is_before_release, known_revisions
+from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, require_file
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import database_errors
@@ -129,7 +129,7 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
     """Return the revision of a database that this msgflow can read or upgrade.
 
     Raises:
-        DatabaseError: it is foreign, newer, or older than the first release.
+        DatabaseError: it is foreign, newer, or from before the first release.
     """
     with database_errors(path):
         revision = recorded_revision(con)
@@ -137,20 +137,10 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
         raise DatabaseError(
             f"a DuckDB database, but not one of msgflow — {path}", "give another file with --db"
         )
-    if is_before_release(revision):
+    if revision not in known_revisions():
         raise DatabaseError(
-            f"database has schema revision {revision}, from before the first release — {path}",
-            "ingest the traces into a new file",
-        )
-    if revision not in known_revisions() and revision <= head_revision():
-        raise DatabaseError(
-            f"database has a schema revision that no msgflow had: {revision[:40]!r} — {path}",
-            "give another file with --db",
-        )
-    if revision > head_revision():
-        raise DatabaseError(
-            f"database has schema revision {revision[:40]}, newer than this msgflow knows "
-            f"({head_revision()}) — {path}",
-            "upgrade msgflow, or give another file with --db",
+            f"database has schema revision {revision[:40]!r}, this msgflow knows none after "
+            f"{head_revision()}: it is newer, or from before the first release — {path}",
+            "upgrade msgflow, or ingest the traces into a new file",
         )
     return revision

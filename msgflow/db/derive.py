@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.conditions import has_no_row
 from msgflow.db.noted import forget, note
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,7 +69,7 @@ def derived_tables() -> tuple[str, ...]:
         name
         for header in objects.views()
         for schema, _, name in [header.name.partition(".")]
-        if schema == "derive" and name in TABLES
+        if schema == "derive" and f"store.{name}" in STORE.tables
     )
 
 
@@ -92,7 +92,7 @@ def derivation_hash() -> str:
 
 def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
     """Derive one of `derived_tables` anew, inside the open transaction."""
-    columns = ", ".join(TABLES[name].columns)
+    columns = ", ".join(STORE.tables[f"store.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     if has_no_row(con, f"derive.{name}", run_id):
         return

@@ -1,6 +1,6 @@
 """Empty databases: all tables, views and macros, and no run.
 
-They are made from `tables.py` and `schema/` without a migration, so that Alembic is not needed.
+They are made from `tables` and `schema/` without a migration, so that Alembic is not needed.
 DuckDB takes long to look at each view. Hence the first empty database is kept in the user's cache,
 and later ones are copies of it. A cache that is damaged, missing or read-only costs time only.
 """
@@ -21,8 +21,6 @@ from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from msgflow.db.tables import Table
 
 # Versions of msgflow that alternate on one machine each keep theirs.
 _MOST_KEPT = 10
@@ -50,7 +48,7 @@ def write_empty(path: Path) -> None:
 
 
 def _cached() -> bytes | None:
-    """Return the empty database in the cache, None if there is none, or a damaged one."""
+    """Return the empty database in the cache, None if it is missing or damaged."""
     try:
         digest, content = _cache_file().read_bytes().split(b"\n", 1)
     except (OSError, ValueError, RuntimeError):  # the last: there is no home directory
@@ -83,31 +81,13 @@ def _cache_file() -> Path:
 
 
 def _statements() -> Iterator[str]:
-    from msgflow.db.tables import SCHEMA, TABLES
+    from msgflow.db.table_ddl import create_statements
 
-    yield f"CREATE SCHEMA {SCHEMA}"
-    for table in TABLES.values():
-        yield from _table(table)
+    yield from create_statements()
     # As Alembic makes it.
     yield (
-        f"CREATE TABLE {SCHEMA}.alembic_version (version_num VARCHAR(32) NOT NULL, "
+        "CREATE TABLE store.alembic_version (version_num VARCHAR(32) NOT NULL, "
         "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
     )
     revision = objects.literal(objects.head_revision())
-    yield f"INSERT INTO {SCHEMA}.alembic_version (version_num) VALUES ({revision})"
-
-
-def _table(table: Table) -> Iterator[str]:
-    columns = ", ".join(
-        f'"{column.name}" {column.type}'
-        + (" PRIMARY KEY" if column.is_key else " NOT NULL" if column.is_required else "")
-        + (f" DEFAULT {column.default}" if column.default is not None else "")
-        for column in table.columns.values()
-    )
-    yield f"CREATE TABLE {table.full_name} ({columns})"
-    yield f"COMMENT ON TABLE {table.full_name} IS {objects.literal(table.comment)}"
-    for column in table.columns.values():
-        yield (
-            f'COMMENT ON COLUMN {table.full_name}."{column.name}" IS '
-            f"{objects.literal(column.comment)}"
-        )
+    yield f"INSERT INTO store.alembic_version (version_num) VALUES ({revision})"

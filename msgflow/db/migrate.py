@@ -1,4 +1,4 @@
-"""Migration: new databases, and upgrades of old ones, by Alembic for tables and anew for views."""
+"""Migration: new databases, and upgrades of old ones: tables by Alembic, views and macros anew."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ from msgflow.sql.failure import database_errors
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-
-    from sqlalchemy.engine import Connection
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,9 @@ def require_ingestable(path: Path) -> None:
 
 
 def upgrade(path: Path) -> Upgrade:
-    """Bring a database to the schema, views and links of this msgflow, in one transaction each.
+    """Bring a database to the schema and views, then to the links, of this msgflow.
+
+    Either is one transaction.
 
     Raises:
         DatabaseError: the file is missing, locked, foreign, or newer than this msgflow.
@@ -128,67 +128,66 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
 
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-    if recorded_revision(con) != objects.head_revision():
-        _migrate(con)
-    # Views need their tables.
-    require_ours(con, path, only_tables=True)
-    con.begin()
-    try:
-        objects.apply(con)
-        con.commit()
-    except BaseException:
-        with suppress(duckdb.Error):  # an interrupted statement has ended the transaction
-            con.rollback()
-        raise
+    is_older = recorded_revision(con) != objects.head_revision()
+    with migrated(con) if is_older else _transaction(con) as changing:
+        # Views need their tables. Before the first release, others had revisions of the same names.
+        require_ours(changing, path, only_tables=True)
+        objects.apply(changing)
 
 
 def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
     from msgflow.db.derive import derive, stale_runs
 
     stale = stale_runs(con)
-    if not stale:
-        return ()
+    if stale:
+        with _transaction(con):
+            for run_id, _ in stale:
+                derive(con, run_id)
+    return tuple(name for _, name in stale)
+
+
+@contextmanager
+def _transaction(con: duckdb.DuckDBPyConnection) -> Iterator[duckdb.DuckDBPyConnection]:
     con.begin()
     try:
-        for run_id, _ in stale:
-            derive(con, run_id)
+        yield con
         con.commit()
     except BaseException:
         with suppress(duckdb.Error):  # an interrupted statement has ended the transaction
             con.rollback()
         raise
-    return tuple(name for _, name in stale)
 
 
-def _migrate(con: duckdb.DuckDBPyConnection) -> None:
+@contextmanager
+def migrated(
+    con: duckdb.DuckDBPyConnection, revision: str = "head"
+) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Apply the migrations up to a revision, and commit them at the end of the block.
+
+    Yields:
+        A connection inside their transaction, for what belongs to it as well.
+    """
     # These imports are slow, and only files of an older revision need them.
     from alembic import command
     from alembic.config import Config
+    from duckdb_engine import ConnectionWrapper
+    from sqlalchemy import create_engine
     from sqlalchemy.exc import DBAPIError
+    from sqlalchemy.pool import StaticPool
 
     config = Config()
     config.set_main_option("script_location", str(resource_directory("migrations")))
     config.set_main_option("path_separator", "os")
-    try:
-        with _sqlalchemy_connection(con) as connection:
-            config.attributes["connection"] = connection
-            command.upgrade(config, "head")
-    except DBAPIError as error:  # so that a full disk has the usual message
-        raise (error.orig or error) from error
-
-
-@contextmanager
-def _sqlalchemy_connection(con: duckdb.DuckDBPyConnection) -> Iterator[Connection]:
-    """Lend a DuckDB connection to SQLAlchemy; it stays open and is committed at the end."""
-    from duckdb_engine import ConnectionWrapper
-    from sqlalchemy import create_engine
-    from sqlalchemy.pool import StaticPool
-
+    cursor = con.cursor()
     engine = create_engine(
-        "duckdb://", creator=lambda: ConnectionWrapper(con.cursor()), poolclass=StaticPool
+        "duckdb://", creator=lambda: ConnectionWrapper(cursor), poolclass=StaticPool
     )
     try:
         with engine.begin() as connection:
-            yield connection
+            config.attributes["connection"] = connection
+            command.upgrade(config, revision)
+            yield cursor
+    except DBAPIError as error:  # so that a full disk has the usual message
+        raise (error.orig or error) from error
     finally:
         engine.dispose()

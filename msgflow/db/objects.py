@@ -1,12 +1,11 @@
 """The SQL objects of `schema/`: loaded, ordered by what they need, and applied to a database.
 
-A public view that shows a table unchanged has no file, but a declaration in `tables.py`.
+A public view that shows a table unchanged has no file, but a declaration in `tables`.
 """
 
 from __future__ import annotations
 
 import hashlib
-import re
 from dataclasses import replace
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -32,16 +31,15 @@ VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 # Schemas of a database: tables, objects derived from them, and objects for users.
 SCHEMAS = ("store", "derive", "main")
 
-_REVISION = re.compile(r"[0-9]{4}")
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
-_DECLARATION = ("tables.py", "table_view.py", "empty_database.py", "diagnostic.py")
+_DECLARATION = ("tables/*.py", "table_*.py", "empty_database.py", "diagnostic.py")
 
 
 @cache
 def load(layer: str) -> tuple[Header, ...]:
     """Return the objects of a folder of `schema/` and its subfolders, each after those it needs.
 
-    `public` includes the views that `tables.py` declares, and takes from there the columns that a
+    `public` includes the views that `tables` declares, and takes from there the columns that a
     header only names. Other folders include the objects that combine diagnostics.
 
     Raises:
@@ -146,14 +144,15 @@ def _texts(layers: Sequence[str]) -> Iterable[str]:
 
 
 def _declaration() -> Iterable[str]:
-    for name in _DECLARATION:
-        yield name
-        yield Path(__file__).with_name(name).read_text(encoding="utf-8")
+    for pattern in _DECLARATION:
+        for path in sorted(Path(__file__).parent.glob(pattern)):
+            yield path.name
+            yield path.read_text(encoding="utf-8")
 
 
 @cache
 def head_revision() -> str:
-    """Return the newest schema revision: the first number in the name of the last migration."""
+    """Return the newest schema revision: the number in the name of the last migration."""
     return max(known_revisions())
 
 
@@ -161,24 +160,19 @@ def head_revision() -> str:
 def known_revisions() -> frozenset[str]:
     """Return the current schema revision, and all that can be upgraded to it."""
     versions = resource_directory("migrations") / "versions"
-    return frozenset(_revision(path) for path in versions.glob("[0-9]*_*.py"))
-
-
-def is_before_release(revision: str) -> bool:
-    """Tell whether only databases from before the first release had this schema revision."""
-    return bool(_REVISION.fullmatch(revision)) and "0000" < revision < min(known_revisions())
-
-
-def _revision(path: Path) -> str:
-    return path.name.split("_", 1)[0]
+    return frozenset(path.name.partition("_")[0] for path in versions.glob("[0-9]*_*.py"))
 
 
 def apply(con: duckdb.DuckDBPyConnection) -> None:
-    """Create or replace all views and macros with their comments, inside the open transaction.
+    """Create or replace all views and macros and all comments, inside the open transaction.
 
     This drops objects that are no longer in `schema/`.
     """
+    from msgflow.db.table_ddl import comment_statements
+
     drop(con)
+    for statement in comment_statements():
+        con.execute(statement)
     for header in views():
         con.execute(create_statement(header))
         if header.kind == "view":

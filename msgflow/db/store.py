@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import duckdb
-
-    from msgflow.db.tables import Column, Table
+    from sqlalchemy import Column, Table
 
 
 # A join that does not fit into memory gives rows in any order, in which ids and times take far more
@@ -37,7 +36,7 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     )
     bases = _bases(con)
     is_large = max(staged.values(), default=0) >= _ROWS_WORTH_ORDERING
-    for table in TABLES.values():
+    for table in STORE.tables.values():
         if table.name in staged:
             _copy(con, table, run_id, bases, in_order=is_large)
 
@@ -45,9 +44,9 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
 def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
     """Delete runs from every table, inside the open transaction."""
     for run_id in run_ids:
-        for table in TABLES.values():
+        for table in STORE.tables.values():
             if "run_id" in table.columns:
-                con.execute(f"DELETE FROM {table.full_name} WHERE run_id = ?", [run_id])
+                con.execute(f"DELETE FROM {table.fullname} WHERE run_id = ?", [run_id])
 
 
 def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
@@ -59,12 +58,12 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
         ).fetchall()
     }
     bases = {}
-    for table in TABLES.values():
+    for table in STORE.tables.values():
         key = f"{table.name}_id"
         if key in table.columns:
             bases[key] = 0
             if table.name in filled:
-                ((most,),) = con.execute(f"SELECT max({key}) FROM {table.full_name}").fetchall()
+                ((most,),) = con.execute(f"SELECT max({key}) FROM {table.fullname}").fetchall()
                 bases[key] = int(most or 0)
     return bases
 
@@ -77,20 +76,20 @@ def _copy(
     *,
     in_order: bool,
 ) -> None:
-    names = ", ".join(table.columns)
-    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns.values())
+    names = ", ".join(table.columns.keys())
+    values = ", ".join(_value(table, column, run_id, bases) for column in table.columns)
     key = f"{table.name}_id"
     order = f" ORDER BY {key}" if in_order and key in table.columns else ""
     con.execute(
-        f"INSERT INTO {table.full_name} ({names}) SELECT {values} FROM staging.{table.name}{order}"
+        f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}{order}"
     )
 
 
-def _value(table: Table, column: Column, run_id: int, bases: dict[str, int]) -> str:
+def _value(table: Table, column: Column[Any], run_id: int, bases: dict[str, int]) -> str:
     if column.name == "run_id":
         return str(run_id)
     if column.name == f"{table.name}_id":
         return f"{column.name} + {bases[column.name]}"
-    if column.references is None:
-        return f'"{column.name}"'
-    return f"{column.name} + {bases[column.references.split('.')[1]]}"
+    for relation in column.foreign_keys:
+        return f"{column.name} + {bases[relation.column.name]}"
+    return f'"{column.name}"'

@@ -13,7 +13,7 @@ import duckdb
 from msgflow.db import objects
 from msgflow.db.conditions import conditions_of_diagnostics, conditions_of_model, is_empty
 from msgflow.db.diagnostic import STAGED, of_model, staged
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 from msgflow.ingest import calls, side_by_side, staging
 from msgflow.ingest.outline import creating, empty_tables
 from msgflow.ingest.reported import restore
@@ -174,7 +174,7 @@ class Growing:
 
 def _finished(headers: tuple[Header, ...], position: int) -> set[str]:
     """Return the tables, built or read, that nothing after the object at `position` needs."""
-    stored = {f"staging.{name}" for name in TABLES}
+    stored = {f"staging.{table.name}" for table in STORE.tables.values()}
     unfolded = {header.name: header for header in headers if header.kind != "view"}
     later = {name for name in stored if name in unfolded}  # evaluated when they are stored
     for header in headers[position + 1 :]:

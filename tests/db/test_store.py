@@ -8,7 +8,7 @@ import duckdb
 import pytest
 
 from msgflow.db import store
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def con(fresh_database: Path) -> duckdb.DuckDBPyConnection:
     con.execute("SET preserve_insertion_order = false")
     columns = ", ".join(
         f'"{column.name}" {column.type}'
-        for column in TABLES["take"].columns.values()
+        for column in STORE.tables["store.take"].columns
         if column.name != "run_id"
     )
     con.execute(f"CREATE TABLE staging.take ({columns})")

@@ -9,12 +9,13 @@ import duckdb
 import pytest
 
 from msgflow.db import objects
+from msgflow.db.table_ddl import type_name
 from msgflow.db.table_view import table_views
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 
 VIEWS = table_views()
 AHEAD_NS = 1_000
-# Tables that nobody sees but through the rules that read them.
+# Tables that users see only through the rules that read them.
 INNER = {
     "definition", "flow_call", "flow_hop", "flow_root", "nearest_message", "orphan_take", "packet",
     "ring_buffer_event", "stamp_clock", "undelivered",
@@ -29,7 +30,7 @@ def filled(
     path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
     path.write_bytes(empty_database.read_bytes())
     with duckdb.connect(str(path)) as con:
-        for table in TABLES.values():
+        for table in STORE.tables.values():
             values = [
                 {
                     "BOOLEAN": "true",
@@ -38,17 +39,17 @@ def filled(
                     "BIGINT[]": "[1]",
                     "BLOB": "'a'::BLOB",
                 }.get(kind, "'1'" if kind == "VARCHAR" else "1")
-                for kind in (column.type for column in table.columns.values())
+                for kind in map(type_name, table.columns)
             ]
             if table.name != "definition":
-                con.execute(f"INSERT INTO {table.full_name} VALUES ({', '.join(values)})")
+                con.execute(f"INSERT INTO {table.fullname} VALUES ({', '.join(values)})")
         con.execute(f"UPDATE store.clock SET offset_ns = {AHEAD_NS}, drift_ppb = 0")
         yield con
 
 
 def test_every_table_is_seen_or_inner() -> None:
     public = set(objects.public_names())
-    assert {table.name for table in TABLES.values()} - public == INNER
+    assert {table.name for table in STORE.tables.values()} - public == INNER
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.name)
@@ -63,7 +64,8 @@ def test_columns_are_those_of_the_output(
         "WHERE schema_name || '.' || table_name = ?",
         [view.name],
     ).fetchall()
-    declared = TABLES[view.name.removeprefix("main.")].declared
+    table = STORE.tables[view.name.replace("main.", "store.")]
+    declared = (*table.columns, *table.info.get("computed", ()))
     assert dict(comments).items() <= {column.name: column.comment for column in declared}.items()
 
 
@@ -73,10 +75,10 @@ def test_times_of_a_clock_are_corrected_and_nothing_else(
 ) -> None:
     (row,) = filled.sql(f"FROM {view.name}").fetchall()
     shown = dict(zip((column.name for column in view.columns), row, strict=True))
-    table = TABLES[view.name.removeprefix("main.")]
-    (row,) = filled.sql(f"FROM {table.full_name}").fetchall()
-    stored = dict(zip(table.columns, row, strict=True))
-    is_corrected = {column.name for column in table.columns.values() if column.clock_of}
+    table = STORE.tables[view.name.replace("main.", "store.")]
+    (row,) = filled.sql(f"FROM {table.fullname}").fetchall()
+    stored = dict(zip(table.columns.keys(), row, strict=True))
+    is_corrected = {column.name for column in table.columns if "clock" in column.info}
     for name, value in shown.items():
         if name in is_corrected:
             assert value == stored[name] + AHEAD_NS, name
@@ -88,10 +90,10 @@ def test_what_is_corrected() -> None:
     """All moments but the stamps of the middleware, and those of clocks themselves."""
     as_recorded = {
         (table.name, column.name)
-        for table in TABLES.values()
-        if table.view
-        for column in table.declared
-        if column.unit == "epoch ns" and column.is_public and column.clock_of is None
+        for table in STORE.tables.values()
+        if "view" in table.info
+        for column in table.columns
+        if column.info.get("unit") == "epoch ns" and not {"is_hidden", "clock"} & column.info.keys()
     }
     assert as_recorded == {
         ("publication", "source_timestamp_ns"),

@@ -12,7 +12,7 @@ import duckdb
 import pytest
 from ingested import contents
 
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 from msgflow.errors import ExitCode, UsageError
 from msgflow.ingest import ingest
 
@@ -28,11 +28,11 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
     """Rows of a run, its ids counted from 1 as in a database of its own."""
     result = {}
     with duckdb.connect(str(database), read_only=True) as connection:
-        for table in TABLES.values():
+        for table in STORE.tables.values():
             if "run_id" not in table.columns or table.name == "run":
                 continue
             columns = []
-            for column in table.columns.values():
+            for column in table.columns:
                 if column.name == "root_id":  # of the table that its kind names
                     columns.append(
                         "root_id - CASE root_kind WHEN 'publication' THEN "
@@ -41,13 +41,14 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
                         "WHERE run_id = $run) END + 1"
                     )
                     continue
-                key = (column.references or f"{table.name}.{column.name}").split(".")
+                key = next((own.column for own in column.foreign_keys), column)
                 base = ""
-                if column.name != "run_id" and key[1] == f"{key[0]}_id":
-                    base = f" - (SELECT min({key[1]}) FROM store.{key[0]} WHERE run_id = $run) + 1"
+                if column.name != "run_id" and key.name == f"{key.table.name}_id":
+                    first = f"SELECT min({key.name}) FROM {key.table.fullname} WHERE run_id = $run"
+                    base = f" - ({first}) + 1"
                 columns.append(f"{column.name}{base}" if column.name != "run_id" else "1")
             result[table.name] = connection.execute(
-                f"SELECT {', '.join(columns)} FROM {table.full_name} WHERE run_id = $run "
+                f"SELECT {', '.join(columns)} FROM {table.fullname} WHERE run_id = $run "
                 "ORDER BY ALL",
                 {"run": run_id},
             ).fetchall()

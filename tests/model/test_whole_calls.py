@@ -15,7 +15,7 @@ from ros_system import RosSystem
 from staged_events import Thread
 from thorough import examples
 
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 from msgflow.ingest import whole
 from msgflow.ingest.catalogue import load
 
@@ -39,7 +39,7 @@ DISTURBANCES = (
 
 
 def disturbed(seed: int) -> RosSystem:
-    """Return a random system of which events are lost, and some are of other kinds."""
+    """Return a random system; some of its events are lost, some are of other kinds."""
     random = Random(seed)
     losses, others = random.choice([(0, 0), (0, 0.1), (0.04, 0), (0.04, 0.1)])
     whole_system = random_system(seed, actions=30)
@@ -69,8 +69,8 @@ def model(analyse: Analyse, system: RosSystem) -> dict[str, list[Any]]:
     analysis = analyse(system)
     assert analysis.connection
     return {
-        table.name: analysis.rows(f"SELECT * FROM {table.full_name} ORDER BY ALL")
-        for table in TABLES.values()
+        table.name: analysis.rows(f"SELECT * FROM {table.fullname} ORDER BY ALL")
+        for table in STORE.tables.values()
         if "run_id" in table.columns and table.name != "run"
     }
 

@@ -17,7 +17,7 @@ from msgflow.db.connection import attach
 from msgflow.db.derive import derive, derive_table, derived_tables, learn_topics
 from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
-from msgflow.db.tables import TABLES
+from msgflow.db.tables import STORE
 from msgflow.ingest import model, staging
 from msgflow.ingest.reported import restore
 
@@ -193,7 +193,7 @@ class Analysis:
             con.execute(f"CHECKPOINT {database}")
 
     def _keep(self) -> None:
-        """Let what is stored outlast the transaction, for whoever takes the database."""
+        """Let what is stored outlast the transaction, for users of the database."""
         if self._is_stored:
             self._connection.commit()
             self._is_stored, self._is_kept = False, True
@@ -211,9 +211,9 @@ class Analysis:
                 "WHERE schema_name = 'store' AND estimated_size > 0"
             )
         }
-        for table in TABLES.values():
-            if "run_id" in table.columns and table.full_name in filled:
-                self._connection.execute(f"DELETE FROM {table.full_name}")
+        for table in STORE.tables.values():
+            if "run_id" in table.columns and table.fullname in filled:
+                self._connection.execute(f"DELETE FROM {table.fullname}")
         self._is_kept = False
 
 

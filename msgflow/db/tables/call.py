@@ -1,0 +1,152 @@
+"""Tables of calls: publications, takes, requests, responses."""
+
+from __future__ import annotations
+
+from sqlalchemy import Table
+
+from msgflow.db.tables.column import (
+    STORE,
+    event_order,
+    flag,
+    handle,
+    identity,
+    moment,
+    number,
+    process_id,
+    reference,
+    run_id,
+    text,
+    thread_id,
+    trace_id,
+)
+
+Table(
+    "publication",
+    STORE,
+    identity("publication_id", "Identity of the publication"),
+    run_id(),
+    trace_id(),
+    reference(
+        "publisher_id", "Publisher; NULL: the middleware itself", to="publisher.publisher_id"
+    ),
+    process_id(),
+    thread_id(),
+    moment("start_ns", "First layer seen", required=True, clock="process_id"),
+    moment("end_ns", "Last layer seen", required=True, clock="process_id"),
+    moment("intra_ns", "rclcpp_intra_publish", clock="process_id"),
+    moment("rclcpp_ns", "rclcpp_publish", clock="process_id"),
+    moment("rcl_ns", "rcl_publish", clock="process_id"),
+    moment("rmw_ns", "rmw_publish", clock="process_id"),
+    moment("dds_ns", "dds:write", clock="process_id"),
+    moment("source_timestamp_ns", "Stamp that the middleware gave to the message, clock of ROS"),
+    event_order("start_event_id", "First layer seen"),
+    event_order("end_event_id", "Last layer seen"),
+    event_order("callback_event_id", "Last begin or end of a callback before it; NULL: none"),
+    flag("is_loss_affected", "A gap right before or after it on its thread may hide a layer"),
+    moment(
+        "next_event_ns",
+        "Next event of the thread, where it has no stamp; NULL: none, or a gap may hide it",
+        hidden=True,
+    ),
+    comment="One row per publish() call",
+    info={"view": "Messages at the moment they were published, with the time of each layer seen."},
+)
+
+Table(
+    "take",
+    STORE,
+    identity("take_id", "Identity of the take"),
+    run_id(),
+    trace_id(),
+    reference("subscription_id", "Subscription", to="subscription.subscription_id"),
+    process_id(),
+    thread_id(),
+    moment("taken_ns", "Moment of the hand-over", required=True, clock="process_id"),
+    moment("source_timestamp_ns", "Stamp that came with the message, clock of ROS"),
+    text("method", "'rmw', 'ring_buffer', 'caret' or 'callback_only'", required=True),
+    event_order("start_event_id", "First layer seen"),
+    event_order("end_event_id", "Last layer seen"),
+    flag(
+        "is_loss_affected",
+        "A gap right before or after it on its thread may hide a layer or its callback",
+    ),
+    comment="One row per message handed over to a subscription",
+    info={"view": "Messages at the moment they were handed over to a subscription."},
+)
+
+Table(
+    "failed_take",
+    STORE,
+    run_id(),
+    trace_id(),
+    reference("subscription_id", "Subscription", to="subscription.subscription_id"),
+    process_id(),
+    thread_id(),
+    moment("failed_ns", "Moment of the attempt", required=True, clock="process_id"),
+    comment="One row per attempt that took nothing",
+    info={"view": "Attempts to take from a subscription that got nothing."},
+)
+
+Table(
+    "ring_buffer_event",
+    STORE,
+    run_id(),
+    trace_id(),
+    process_id(),
+    text("kind", "'enqueue', 'dequeue' or 'clear'", required=True),
+    handle("buffer_handle", "Address of the ring buffer"),
+    number("slot", "Index in the buffer; NULL: all"),
+    moment("at_ns", "Moment of the event", required=True),
+    reference(
+        "publication_id",
+        "Message put in; NULL: the replay of one kept for late subscriptions",
+        to="publication.publication_id",
+    ),
+    reference("take_id", "Message taken out", to="take.take_id"),
+    flag("is_overwriting", "An older message was lost from the slot"),
+    event_order("event_id", "The event"),
+    comment="One row per enqueue, dequeue or clearing of an intra-process ring buffer",
+)
+
+Table(
+    "request",
+    STORE,
+    identity("request_id", "Identity of the request"),
+    run_id(),
+    reference("client_id", "Client that sent it", to="client.client_id"),
+    reference("service_id", "Service that took it", to="service.service_id"),
+    number("sequence_number", "Number given by the client"),
+    moment("sent_ns", "rmw_send_request", clock="sender_thread_id"),
+    moment("taken_ns", "rmw_take_request", clock="receiver_thread_id"),
+    thread_id("Thread that sent it", "sender_thread_id", required=False),
+    thread_id("Thread that took it", "receiver_thread_id", required=False),
+    reference(
+        "callback_instance_id",
+        "Service callback it led to",
+        to="callback_instance.callback_instance_id",
+    ),
+    comment="One row per service request",
+    info={"view": "Service requests."},
+)
+
+Table(
+    "response",
+    STORE,
+    identity("response_id", "Identity of the response"),
+    run_id(),
+    reference("client_id", "Client that took it", to="client.client_id"),
+    reference("service_id", "Service that sent it", to="service.service_id"),
+    number("sequence_number", "Number given by the client"),
+    moment("sent_ns", "rmw_send_response", clock="sender_thread_id"),
+    moment("taken_ns", "rmw_take_response", clock="receiver_thread_id"),
+    thread_id("Thread that sent it", "sender_thread_id", required=False),
+    thread_id("Thread that took it", "receiver_thread_id", required=False),
+    reference(
+        "callback_instance_id",
+        "Service callback it came from",
+        to="callback_instance.callback_instance_id",
+    ),
+    reference("request_id", "Request that it answers", to="request.request_id"),
+    comment="One row per service response",
+    info={"view": "Service responses."},
+)

@@ -1,0 +1,107 @@
+"""Tables of callbacks: the objects, their groups, and each run of one."""
+
+from __future__ import annotations
+
+from sqlalchemy import INTEGER, Column, Table
+
+from msgflow.db.tables.column import (
+    STORE,
+    event_order,
+    flag,
+    handle,
+    identity,
+    key,
+    moment,
+    node_id,
+    process_id,
+    reference,
+    run_id,
+    text,
+    thread_id,
+    trace_id,
+)
+
+Table(
+    "callback",
+    STORE,
+    key("callback_id", "Identity of the callback"),
+    run_id(),
+    process_id(),
+    node_id(),
+    text("kind", "'subscription', 'timer', 'service' or 'unknown'", required=True),
+    reference("subscription_id", "Its subscription", to="subscription.subscription_id"),
+    reference("timer_id", "Its timer", to="timer.timer_id"),
+    reference("service_id", "Its service", to="service.service_id"),
+    handle("callback_handle", "Address of the callback object"),
+    text("symbol", "Function registered for it; NULL: none or unresolvable"),
+    moment("created_ns", "First initialisation event", clock="process_id"),
+    comment="One row per callback object",
+    info={"view": "Callback objects and what they belong to."},
+)
+
+Table(
+    "callback_group",
+    STORE,
+    key("callback_group_id", "Identity of the callback group"),
+    run_id(),
+    process_id(),
+    reference("executor_id", "Executor that it was added to", to="executor.executor_id"),
+    text(
+        "kind", "'mutually_exclusive', 'reentrant' or 'unknown', as CARET names it", required=True
+    ),
+    comment="One row per callback group of an executor",
+    info={
+        "view": (
+            "Callback groups, where the trace has them (CARET). Callbacks of a mutually exclusive "
+            "group never run at the same time."
+        )
+    },
+)
+
+Table(
+    "callback_group_member",
+    STORE,
+    run_id(),
+    reference(
+        "callback_group_id",
+        "The callback group",
+        to="callback_group.callback_group_id",
+        required=True,
+    ),
+    reference("callback_id", "The callback", to="callback.callback_id", required=True),
+    comment="One row per callback in a callback group",
+    info={"view": "Callbacks of the callback groups."},
+)
+
+Table(
+    "callback_instance",
+    STORE,
+    identity("callback_instance_id", "Identity of the callback instance"),
+    run_id(),
+    trace_id(),
+    reference("callback_id", "Callback that ran", to="callback.callback_id", required=True),
+    process_id(),
+    thread_id(),
+    moment("start_ns", "callback_start", required=True, clock="process_id"),
+    moment("end_ns", "callback_end; NULL: never seen to end", clock="process_id"),
+    reference("take_id", "Message it was called with", to="take.take_id"),
+    reference("request_id", "Request it was called with", to="request.request_id"),
+    flag("is_intra_process", "Called with an intra-process message"),
+    reference(
+        "parent_id",
+        "Callback instance that it is nested in",
+        to="callback_instance.callback_instance_id",
+    ),
+    Column("depth", INTEGER, nullable=False, comment="Nesting depth on its thread, from 1"),
+    event_order("start_event_id", "callback_start"),
+    event_order("end_event_id", "callback_end; NULL: never seen to end"),
+    event_order(
+        "effective_end_event_id", "callback_end, else the first event that cannot be inside"
+    ),
+    flag(
+        "is_loss_affected",
+        "A gap inside or beside it on its thread may hide its end or what it did",
+    ),
+    comment="One row per callback instance",
+    info={"view": "Callback instances."},
+)

@@ -1,0 +1,162 @@
+"""Kinds of columns that the tables of `store` have, and what the `info` of a column may hold.
+
+| key of `Column.info` | value |
+| --- | --- |
+| `unit` | of the values: `ns`, `epoch ns` (a moment), `event order`, ...; it ends the comment |
+| `clock` | column of the table that leads to the clock that showed this moment |
+| `is_hidden` | True: the public view does not show the column |
+| `sql` | of a column that only the view has: its expression; `self` is the table |
+
+| key of `Table.info` | value |
+| --- | --- |
+| `view` | description of the public view, if that shows the table as it is |
+| `computed` | columns that only this view has, after the others |
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from duckdb_engine.datatypes import UBigInteger
+from sqlalchemy import ARRAY, BIGINT, BOOLEAN, VARCHAR, Column, ForeignKey, MetaData
+from sqlalchemy import text as expression
+
+if TYPE_CHECKING:
+    from sqlalchemy.types import TypeEngine
+
+STORE = MetaData(schema="store")
+
+
+def column(
+    name: str,
+    type_: type[TypeEngine[Any]] | TypeEngine[Any],
+    comment: str,
+    *,
+    unit: str | None = None,
+    required: bool = False,
+    to: str | None = None,
+    **info: object,
+) -> Column[Any]:
+    """Return a column.
+
+    Args:
+        name: of the column.
+        type_: of its values.
+        comment: what they mean.
+        unit: of the values; None if they have none.
+        required: the column is never NULL.
+        to: 'table.column' that has each of the values.
+        info: further keys of `Column.info`.
+    """
+    return Column(
+        name,
+        type_,
+        *([] if to is None else [ForeignKey(f"{STORE.schema}.{to}")]),
+        nullable=not required,
+        comment=comment if unit is None else f"{comment} [{unit}]",
+        info=info if unit is None else {"unit": unit, **info},
+    )
+
+
+def key(name: str, comment: str) -> Column[Any]:
+    """Return the primary key of a table of entities."""
+    return Column(name, BIGINT, primary_key=True, autoincrement=False, comment=comment)
+
+
+def identity(name: str, comment: str) -> Column[Any]:
+    """Return the key of a table of instances: unique, but not worth an index."""
+    return column(name, BIGINT, comment, required=True)
+
+
+def reference(name: str, comment: str, *, to: str, required: bool = False) -> Column[Any]:
+    """Return a column with identities of another table."""
+    return column(name, BIGINT, comment, to=to, required=required)
+
+
+def run_id() -> Column[Any]:
+    """Return the run of a row."""
+    return reference("run_id", "Run that the row belongs to", to="run.run_id", required=True)
+
+
+def trace_id(comment: str = "Trace it was recorded in", required: bool = True) -> Column[Any]:
+    """Return the trace of a row."""
+    return reference("trace_id", comment, to="trace.trace_id", required=required)
+
+
+def process_id() -> Column[Any]:
+    """Return the process of a row."""
+    return reference("process_id", "Process it lives in", to="process.process_id", required=True)
+
+
+def thread_id(
+    comment: str = "Thread it happened on", name: str = "thread_id", required: bool = True
+) -> Column[Any]:
+    """Return a thread of a row."""
+    return reference(name, comment, to="thread.thread_id", required=required)
+
+
+def node_id() -> Column[Any]:
+    """Return the node of an object."""
+    return reference("node_id", "Node it belongs to", to="node.node_id")
+
+
+def moment(
+    name: str,
+    comment: str,
+    *,
+    clock: str | None = None,
+    required: bool = False,
+    hidden: bool = False,
+) -> Column[Any]:
+    """Return a moment, as it was recorded.
+
+    The public view shows it on the common time axis if `clock` is given, else as it was recorded.
+    """
+    more: dict[str, Any] = {} if clock is None else {"clock": clock}
+    if hidden:
+        more["is_hidden"] = True
+    return column(name, BIGINT, comment, unit="epoch ns", required=required, **more)
+
+
+def event_order(name: str, comment: str) -> Column[Any]:
+    """Return a place in the total order of events, which public views do not show."""
+    return column(name, BIGINT, comment, unit="event order", is_hidden=True)
+
+
+def text(name: str, comment: str, *, required: bool = False) -> Column[Any]:
+    """Return a text."""
+    return column(name, VARCHAR, comment, required=required)
+
+
+def number(
+    name: str, comment: str, *, unit: str | None = None, required: bool = False
+) -> Column[Any]:
+    """Return a number."""
+    return column(name, BIGINT, comment, unit=unit, required=required)
+
+
+def flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
+    """Return a truth value, false by default."""
+    return Column(
+        name,
+        BOOLEAN,
+        nullable=False,
+        server_default=expression("false"),
+        comment=comment,
+        info={"is_hidden": True} if hidden else {},
+    )
+
+
+def handle(name: str, comment: str) -> Column[Any]:
+    """Return an address in a process."""
+    return column(name, UBigInteger, f"{comment}; an address, valid in its process until reused")
+
+
+def route() -> Column[Any]:
+    """Return the services that a flow took on its way."""
+    return column(
+        "route",
+        ARRAY(BIGINT),
+        "Node (or, negative, process) that called, then services; empty: by no service",
+        required=True,
+    )

@@ -1,0 +1,67 @@
+"""Tables of executors: their threads, and what these did."""
+
+from __future__ import annotations
+
+from sqlalchemy import Table
+
+from msgflow.db.tables.column import (
+    STORE,
+    event_order,
+    flag,
+    key,
+    moment,
+    process_id,
+    reference,
+    run_id,
+    text,
+    thread_id,
+)
+
+Table(
+    "executor",
+    STORE,
+    key("executor_id", "Identity of the executor"),
+    run_id(),
+    process_id(),
+    text(
+        "kind",
+        "'single_threaded', 'multi_threaded', 'unknown', or as CARET names it",
+        required=True,
+    ),
+    flag("is_inferred", "Deduced from the threads that run the same callbacks"),
+    comment="One row per executor",
+    info={"view": "Executors."},
+)
+
+Table(
+    "executor_thread",
+    STORE,
+    run_id(),
+    reference("executor_id", "The executor", to="executor.executor_id", required=True),
+    thread_id("The thread"),
+    comment="One row per thread of an executor",
+    info={"view": "Threads of the executors."},
+)
+
+Table(
+    "executor_state",
+    STORE,
+    run_id(),
+    reference("executor_id", "Executor", to="executor.executor_id"),
+    thread_id(),
+    text("state", "'wait', 'process' or 'execute'", required=True),
+    moment("start_ns", "Executor event that began it", required=True, clock="thread_id"),
+    moment(
+        "end_ns",
+        "Next executor event of the thread; NULL: not known (the last, or a gap follows)",
+        clock="thread_id",
+    ),
+    reference(
+        "callback_instance_id",
+        "First callback instance in it",
+        to="callback_instance.callback_instance_id",
+    ),
+    event_order("start_event_id", "Executor event that began it"),
+    comment="One row per interval between two executor events of a thread",
+    info={"view": "What executor threads did, as their three events literally say."},
+)

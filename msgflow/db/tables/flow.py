@@ -1,0 +1,72 @@
+"""Tables of the graph of flows, on which queries walk."""
+
+from __future__ import annotations
+
+from sqlalchemy import Table
+
+from msgflow.db.tables.column import STORE, flag, number, reference, route, run_id, text
+
+Table(
+    "flow_call",
+    STORE,
+    run_id(),
+    reference(
+        "publication_id", "What was published", to="publication.publication_id", required=True
+    ),
+    reference("publisher_id", "Its publisher", to="publisher.publisher_id"),
+    text("kind", "Kind of the causal link to the publication", required=True),
+    reference(
+        "callback_instance_id",
+        "Callback instance of the service",
+        to="callback_instance.callback_instance_id",
+        required=True,
+    ),
+    reference(
+        "caller_id",
+        "Callback instance that called",
+        to="callback_instance.callback_instance_id",
+        required=True,
+    ),
+    route(),
+    reference("take_id", "Message that the caller was for; NULL: none", to="take.take_id"),
+    reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
+    comment=(
+        "One row per publication of a service, callback instance that called for it, and way it "
+        "did so"
+    ),
+)
+
+Table(
+    "flow_root",
+    STORE,
+    run_id(),
+    reference("publication_id", "The message", to="publication.publication_id", required=True),
+    reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
+    flag("is_source", "No message that was taken led to it"),
+    text("root_kind", "'callback_instance' or 'publication'", required=True),
+    number("root_id", "Where its flow can be said to begin, of that kind", required=True),
+    route(),
+    comment="One row per publication on a topic of the application",
+)
+
+Table(
+    "flow_hop",
+    STORE,
+    run_id(),
+    reference(
+        "from_subscription_id",
+        "Subscription whose message led on; NULL: none",
+        to="subscription.subscription_id",
+    ),
+    route(),
+    reference("publisher_id", "Publisher", to="publisher.publisher_id", required=True),
+    reference(
+        "subscription_id",
+        "Subscription that took from it",
+        to="subscription.subscription_id",
+        required=True,
+    ),
+    flag("is_source", "Some publication of it was led to by no message"),
+    flag("is_cached", "The message may wait in the node for others"),
+    comment="One row per step of the graph: subscription before, route, publisher and subscription",
+)

@@ -1,0 +1,131 @@
+"""Tables of hosts, processes, threads and nodes."""
+
+from __future__ import annotations
+
+from sqlalchemy import INTEGER, Column, Table
+
+from msgflow.db.tables.column import (
+    STORE,
+    event_order,
+    flag,
+    handle,
+    key,
+    moment,
+    number,
+    process_id,
+    reference,
+    run_id,
+    text,
+    thread_id,
+)
+
+Table(
+    "host",
+    STORE,
+    key("host_id", "Identity of the host"),
+    run_id(),
+    reference("clock_id", "Clock of the host", to="clock.clock_id", required=True),
+    text("hostname", "Name recorded in the trace, or given by the user", required=True),
+    comment="One row per machine or container",
+    info={"view": "Machines and containers."},
+)
+
+Table(
+    "process",
+    STORE,
+    key("process_id", "Identity of the process life"),
+    run_id(),
+    reference("host_id", "Host it ran on", to="host.host_id", required=True),
+    Column(
+        "pid",
+        INTEGER,
+        nullable=False,
+        comment="Process id; the one inside its PID namespace if the trace has no other",
+    ),
+    text("name", "Name of the process (its first thread)"),
+    text("tracetools_version", "Version that rcl_init reported; for display only"),
+    moment("first_seen_ns", "First event", clock="process_id"),
+    moment("last_seen_ns", "Last event", clock="process_id"),
+    number("pid_namespace", "PID namespace, where the trace has it"),
+    Column(
+        "life",
+        INTEGER,
+        nullable=False,
+        comment="Number of this life among those of the pid, from 1",
+    ),
+    comment="One row per process life",
+    info={"view": "Process lives: a pid that is used again is another process."},
+)
+
+Table(
+    "thread",
+    STORE,
+    key("thread_id", "Identity of the thread"),
+    run_id(),
+    process_id(),
+    Column(
+        "tid",
+        INTEGER,
+        nullable=False,
+        comment="Thread id; the one inside its PID namespace if the trace has no other",
+    ),
+    text("name", "Name of the thread"),
+    event_order("first_event_id", "First event"),
+    event_order("last_event_id", "Last event"),
+    moment("first_seen_ns", "First event", clock="process_id"),
+    moment("last_seen_ns", "Last event", clock="process_id"),
+    comment="One row per thread",
+    info={"view": "Threads, each with its last name."},
+)
+
+Table(
+    "node",
+    STORE,
+    key("node_id", "Identity of the node"),
+    run_id(),
+    process_id(),
+    text("name", "Name without namespace"),
+    text("namespace", "Namespace, beginning with /"),
+    text("full_name", "Namespace and name"),
+    handle("node_handle", "rcl node handle"),
+    moment("created_ns", "rcl_node_init", clock="process_id"),
+    flag("is_inferred", "Its initialisation was not traced"),
+    comment="One row per ROS node",
+    info={"view": "ROS nodes."},
+)
+
+Table(
+    "lifecycle_transition",
+    STORE,
+    run_id(),
+    reference("node_id", "The node", to="node.node_id"),
+    moment("at_ns", "Moment of the change", required=True, clock="node_id"),
+    text("start_state", "State that was left"),
+    text("goal_state", "State that was entered"),
+    comment="One row per state change of a managed node",
+    info={"view": "State changes of managed nodes."},
+)
+
+Table(
+    "thread_break",
+    STORE,
+    run_id(),
+    thread_id("Thread whose events may be missing"),
+    moment(
+        "resumed_ns", "First event of the thread behind the gap", required=True, clock="thread_id"
+    ),
+    event_order("resumed_event_id", "First event of the thread behind the gap"),
+    flag(
+        "is_elsewhere",
+        "Only other CPUs lost events, which the thread may have visited meanwhile: pairs may "
+        "reach across",
+    ),
+    comment="One row per gap in the record of a thread",
+    info={
+        "view": (
+            "Where the record of a thread breaks: events of the thread may be missing before these "
+            "moments. No executor state reaches across a break, and pairs of events that do are "
+            "marked."
+        )
+    },
+)

@@ -1,0 +1,157 @@
+"""Tables of links: which take is from which publication, and what caused a publication."""
+
+from __future__ import annotations
+
+from sqlalchemy import INTEGER, Column, Table
+
+from msgflow.db.tables.column import (
+    STORE,
+    flag,
+    key,
+    moment,
+    number,
+    process_id,
+    reference,
+    run_id,
+    text,
+)
+
+Table(
+    "annotation",
+    STORE,
+    key("annotation_id", "Identity of the annotation"),
+    run_id(),
+    text("kind", "'periodic_async' or 'partial_sync'", required=True),
+    text("source", "'trace' or 'file'", required=True),
+    process_id(),
+    comment="One row per declared indirect link",
+    info={"view": "Declared indirect links."},
+)
+
+Table(
+    "annotation_input",
+    STORE,
+    run_id(),
+    reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
+    reference("subscription_id", "Its input", to="subscription.subscription_id", required=True),
+    comment="One row per subscription of an annotation",
+    info={"view": "Subscriptions of the declared indirect links."},
+)
+
+Table(
+    "annotation_output",
+    STORE,
+    run_id(),
+    reference("annotation_id", "The annotation", to="annotation.annotation_id", required=True),
+    reference("publisher_id", "Its output", to="publisher.publisher_id", required=True),
+    comment="One row per publisher of an annotation",
+    info={"view": "Publishers of the declared indirect links."},
+)
+
+Table(
+    "nearest_message",
+    STORE,
+    run_id(),
+    text("topic_name", "Topic of the message", required=True),
+    moment("source_timestamp_ns", "Stamp of the message, clock of ROS", required=True),
+    reference(
+        "publication_id",
+        "Where it came from; NULL: several could be it",
+        to="publication.publication_id",
+    ),
+    number("candidate_count", "Publications that it could have been"),
+    comment="One row per message whose publication was found, or could not be told, by time",
+)
+
+Table(
+    "link_transport",
+    STORE,
+    run_id(),
+    reference(
+        "publication_id",
+        "Where the message came from",
+        to="publication.publication_id",
+        required=True,
+    ),
+    reference("take_id", "Where it was received", to="take.take_id", required=True),
+    reference("publisher_id", "Publisher of the message", to="publisher.publisher_id"),
+    reference(
+        "subscription_id", "Subscription that received it", to="subscription.subscription_id"
+    ),
+    text("method", "'exact', 'exact_stamp', 'nearest' or 'ring_buffer'", required=True),
+    number("candidate_count", "Number of publications that are possible"),
+    flag("is_self_loop", "Received by the publishing node itself"),
+    flag("is_loss_affected", "A gap of the trace may hide a better partner"),
+    flag("is_copy", "A ring buffer carries the same message: no callback gets this one"),
+    comment="One row per take whose publication is known",
+)
+
+Table(
+    "link_packet",
+    STORE,
+    run_id(),
+    reference("sent_trace_id", "Trace of its sender", to="trace.trace_id", required=True),
+    reference("received_trace_id", "Trace of its receiver", to="trace.trace_id", required=True),
+    moment("sent_ns", "Handed to the network device", required=True),
+    moment("received_ns", "Came from the network device", required=True),
+    text("protocol", "'tcp' or 'udp'", required=True),
+    text("source_address", "IP address that it was sent from", required=True),
+    Column("source_port", INTEGER, nullable=False, comment="Port that it was sent from"),
+    text("destination_address", "IP address that it was sent to", required=True),
+    Column("destination_port", INTEGER, nullable=False, comment="Port that it was sent to"),
+    Column(
+        "identification", INTEGER, comment="Identification of the datagram; NULL: IPv6 has none"
+    ),
+    number("sequence_number", "Sequence number of its first byte; NULL: not TCP"),
+    comment="One row per network packet and clock that received it from another",
+)
+
+Table(
+    "link_causal",
+    STORE,
+    run_id(),
+    reference(
+        "callback_instance_id",
+        "Cause; NULL: the take itself",
+        to="callback_instance.callback_instance_id",
+    ),
+    reference("publication_id", "Effect", to="publication.publication_id", required=True),
+    reference(
+        "take_id", "Message that led to it; NULL: none (timers, services)", to="take.take_id"
+    ),
+    reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
+    reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
+    text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
+    reference(
+        "annotation_id",
+        "Annotation that declares it; NULL for direct links",
+        to="annotation.annotation_id",
+    ),
+    number(
+        "candidate_count",
+        "Callback instances that it could have been; one more if it is the input of an "
+        "indirect link and had no message when the publishing callback began",
+    ),
+    flag("is_loss_affected", "A gap of the trace may hide a better partner"),
+    comment="One row per callback instance, or take outside of any, and publication that it led to",
+)
+
+Table(
+    "link_request",
+    STORE,
+    run_id(),
+    reference("request_id", "Effect", to="request.request_id", required=True),
+    reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+    comment="One row per request that a callback instance or thread sent",
+    info={"view": "Requests and what sent them."},
+)
+
+Table(
+    "link_response",
+    STORE,
+    run_id(),
+    reference("response_id", "Effect", to="response.response_id", required=True),
+    reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
+    comment="One row per response and the callback instance that sent it",
+    info={"view": "Responses and the callback instance that sent them."},
+)

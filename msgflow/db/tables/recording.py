@@ -1,0 +1,101 @@
+"""Tables of what was read: runs, traces, packets, gaps, and notes on them."""
+
+from __future__ import annotations
+
+from sqlalchemy import ARRAY, INTEGER, TIMESTAMP, VARCHAR, Column, Table
+
+from msgflow.db.tables.column import STORE, key, moment, number, reference, run_id, text, trace_id
+
+Table(
+    "definition",
+    STORE,
+    Column("name", VARCHAR, primary_key=True, comment="'views': the SQL of all views and macros"),
+    text("hash", "SHA-256 of the SQL that was last applied", required=True),
+    text("msgflow_version", "Version of msgflow that applied it", required=True),
+    comment="One row per part of the schema that is re-applied rather than migrated",
+)
+
+Table(
+    "run",
+    STORE,
+    key("run_id", "Identity of the run"),
+    text("name", "Name given by the user, or the name of the first trace directory", required=True),
+    Column("created_at", TIMESTAMP, nullable=False, comment="When the run was ingested, UTC"),
+    text("msgflow_version", "Version of msgflow that ingested the run", required=True),
+    text("derivation_hash", "SHA-256 of the SQL that derived the links", required=True),
+    moment("start_ns", "First event of any trace"),
+    moment("end_ns", "Last event of any trace"),
+    number("event_count", "Events read"),
+    Column(
+        "labels",
+        ARRAY(VARCHAR),
+        comment="What users say of the run, KEY=VALUE each, sorted; NULL: nothing",
+    ),
+    comment="One row per ingest of traces that belong together",
+)
+
+Table(
+    "trace",
+    STORE,
+    key("trace_id", "Identity of the trace"),
+    run_id(),
+    reference("host_id", "Host that was traced", to="host.host_id", required=True),
+    text("path", "Directory as it was given", required=True),
+    text("uuid", "UUID of the trace"),
+    text("tracer", "Tracer and its version"),
+    text("domain", "'ust' or 'kernel'"),
+    moment("start_ns", "First event or start of a packet", clock="host_id"),
+    moment("end_ns", "Last event or end of a packet", clock="host_id"),
+    number("event_count", "Events read"),
+    number("discarded_event_count", "Events that the tracer counted as discarded"),
+    comment="One row per CTF trace read",
+    info={"view": "CTF traces that were read."},
+)
+
+Table(
+    "packet",
+    STORE,
+    run_id(),
+    trace_id(),
+    number("stream_class_id", "Stream class (channel) of the packet"),
+    number("stream_instance_id", "Stream (buffer) of the packet"),
+    Column("cpu_id", INTEGER, comment="CPU that wrote the packet"),
+    number("position", "Position in its stream, from 0"),
+    moment("begin_ns", "Begin of the packet"),
+    moment("end_ns", "End of the packet"),
+    moment("last_event_ns", "Last event in the packet"),
+    number("event_count", "Events in the packet"),
+    number("discarded_event_count", "Events lost in the packet, after its last event"),
+    number("lost_packet_count", "Packets missing right before it"),
+    comment="One row per packet of a trace; the identity of what was read",
+)
+
+Table(
+    "gap",
+    STORE,
+    run_id(),
+    trace_id("Trace it was recorded in; between two chunks of a recording, the later"),
+    Column("cpu", INTEGER, comment="CPU concerned; NULL: all"),
+    text(
+        "kind",
+        "'loss' (discarded events), 'packets' (lost packets) or 'pause' (not tracing)",
+        required=True,
+    ),
+    moment("start_ns", "Last moment before the gap", clock="trace_id"),
+    moment("end_ns", "First moment after the gap", clock="trace_id"),
+    number("event_count", "Events lost, where the tracer counted them"),
+    comment="One row per gap in a trace",
+    info={"view": "Gaps in the traces: no two events are paired across one."},
+)
+
+Table(
+    "diagnostic",
+    STORE,
+    run_id(),
+    trace_id("Trace it was recorded in; NULL: not one trace alone", required=False),
+    text("name", "What was found", required=True),
+    text("severity", "'info', 'warning', 'data_loss' or 'error'", required=True),
+    number("count", "How often"),
+    text("detail", "Where, and what it means"),
+    comment="One row per finding",
+)

@@ -1,0 +1,117 @@
+"""Tables of ROS objects: publishers, subscriptions, timers, services, clients."""
+
+from __future__ import annotations
+
+from sqlalchemy import BLOB, BOOLEAN, Column, Table
+
+from msgflow.db.tables.column import (
+    STORE,
+    column,
+    flag,
+    handle,
+    key,
+    moment,
+    node_id,
+    number,
+    process_id,
+    run_id,
+    text,
+)
+
+_IS_INFERRED = column(
+    "is_inferred", BOOLEAN, "Its initialisation was not traced", sql="self.created_ns IS NULL"
+)
+
+Table(
+    "publisher",
+    STORE,
+    key("publisher_id", "Identity of the publisher"),
+    run_id(),
+    process_id(),
+    node_id(),
+    text("topic_name", "Fully expanded topic name"),
+    handle("publisher_handle", "rcl publisher handle"),
+    handle("rmw_handle", "rmw publisher handle"),
+    Column("gid", BLOB, comment="Global identifier, 16 bytes; NULL: none"),
+    number("queue_depth", "History depth asked for"),
+    moment("created_ns", "First initialisation event", clock="process_id"),
+    flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
+    flag("is_inferred", "Its initialisation was not traced"),
+    flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
+    comment="One row per publisher",
+    info={"view": "Publishers, those of ROS itself marked as internal."},
+)
+
+Table(
+    "subscription",
+    STORE,
+    key("subscription_id", "Identity of the subscription"),
+    run_id(),
+    process_id(),
+    node_id(),
+    text("topic_name", "Fully expanded topic name"),
+    handle("subscription_handle", "rcl subscription handle"),
+    handle("rmw_handle", "rmw subscription handle"),
+    Column("gid", BLOB, comment="Global identifier, 16 bytes; NULL: none"),
+    number("queue_depth", "History depth asked for"),
+    moment("created_ns", "First initialisation event", clock="process_id"),
+    flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
+    flag("is_inferred", "Its initialisation was not traced"),
+    flag("is_topic_learned", "Its topic was deduced from a link", hidden=True),
+    comment="One row per subscription",
+    info={"view": "Subscriptions, those of ROS itself marked as internal."},
+)
+
+Table(
+    "timer",
+    STORE,
+    key("timer_id", "Identity of the timer"),
+    run_id(),
+    process_id(),
+    node_id(),
+    number("period_ns", "Period; NULL: not known", unit="ns"),
+    handle("timer_handle", "rcl timer handle"),
+    moment("created_ns", "rcl_timer_init", clock="process_id"),
+    comment="One row per timer",
+    info={
+        "view": "Timers. If the initialisation of a timer was not traced, its period is not known.",
+        "computed": (_IS_INFERRED,),
+    },
+)
+
+Table(
+    "service",
+    STORE,
+    key("service_id", "Identity of the service"),
+    run_id(),
+    process_id(),
+    node_id(),
+    text("service_name", "Fully expanded service name"),
+    handle("service_handle", "rcl service handle"),
+    handle("rmw_handle", "rmw service handle"),
+    Column("gid", BLOB, comment="Global identifier, 16 bytes; NULL: none"),
+    moment("created_ns", "rcl_service_init", clock="process_id"),
+    flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+    comment="One row per service",
+    info={"view": "Services, those of ROS itself marked as internal.", "computed": (_IS_INFERRED,)},
+)
+
+Table(
+    "client",
+    STORE,
+    key("client_id", "Identity of the client"),
+    run_id(),
+    process_id(),
+    node_id(),
+    text("service_name", "Fully expanded service name"),
+    handle("client_handle", "rcl client handle"),
+    handle("rmw_handle", "rmw client handle"),
+    Column("gid", BLOB, comment="Identifier that servers see, 16 bytes; NULL: none"),
+    moment("created_ns", "rcl_client_init", clock="process_id"),
+    flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+    comment="One row per service client",
+    info={
+        "view": "Service clients, those of ROS itself marked as internal.",
+        "computed": (_IS_INFERRED,),
+    },
+)
