@@ -53,10 +53,10 @@ Table(
     comment="One row per clock and moment",
     info={
         "view": (
-            "How wrong the correction of a clock can be at most, at any time: at the moments "
-            "listed here by uncertainty_ns, between two of them by what the straight line between "
-            "them gives. Times of two clocks with the same reference can be compared to within the "
-            "sum of both bounds. The reference itself has no error and no rows."
+            "Bounds of the error of each clock's correction: at the moments listed here, "
+            "uncertainty_ns; between two of them, on the straight line. Times of two clocks with "
+            "the same reference can be compared to within the sum of both bounds. The reference "
+            "itself has no error and no rows."
         )
     },
 )
@@ -81,7 +81,7 @@ Table(
     Column(
         "is_sharp",
         BOOLEAN,
-        comment="The drift is known: publications microseconds apart are told apart; NULL: yes",
+        comment="Publications microseconds apart can be distinguished; NULL: yes",
     ),
     comment="One row per stretch of time in which stamps run along a clock of the traces",
 )

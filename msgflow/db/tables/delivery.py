@@ -13,7 +13,10 @@ Table(
     reference("publication_id", "The message", to="publication.publication_id", required=True),
     reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
     reference(
-        "subscription_id", "Who did not take it", to="subscription.subscription_id", required=True
+        "subscription_id",
+        "Subscription that did not take it",
+        to="subscription.subscription_id",
+        required=True,
     ),
     text("reason", "Why; a closed vocabulary", required=True),
     comment=(

@@ -63,5 +63,5 @@ Table(
     ),
     event_order("start_event_id", "Executor event that began it"),
     comment="One row per interval between two executor events of a thread",
-    info={"view": "What executor threads did, as their three events literally say."},
+    info={"view": "What executor threads did, as their three events say."},
 )

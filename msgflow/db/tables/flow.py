@@ -28,7 +28,7 @@ Table(
         required=True,
     ),
     route(),
-    reference("take_id", "Message that the caller was for; NULL: none", to="take.take_id"),
+    reference("take_id", "Message that the caller processed; NULL: none", to="take.take_id"),
     reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
     comment=(
         "One row per publication of a service, callback instance that called for it, and way it "
@@ -44,7 +44,7 @@ Table(
     reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
     flag("is_source", "No message that was taken led to it"),
     text("root_kind", "'callback_instance' or 'publication'", required=True),
-    number("root_id", "Where its flow can be said to begin, of that kind", required=True),
+    number("root_id", "Row of that kind where its flow begins", required=True),
     route(),
     comment="One row per publication on a topic of the application",
 )
@@ -66,7 +66,7 @@ Table(
         to="subscription.subscription_id",
         required=True,
     ),
-    flag("is_source", "Some publication of it was led to by no message"),
+    flag("is_source", "At least one publication of it was caused by no message"),
     flag("is_cached", "The message may wait in the node for others"),
     comment="One row per step of the graph: subscription before, route, publisher and subscription",
 )

@@ -117,8 +117,8 @@ Table(
     event_order("resumed_event_id", "First event of the thread behind the gap"),
     flag(
         "is_elsewhere",
-        "Only other CPUs lost events, which the thread may have visited meanwhile: pairs may "
-        "reach across",
+        "Events were lost only on other CPUs, which the thread may have visited meanwhile: "
+        "pairs may reach across",
     ),
     comment="One row per gap in the record of a thread",
     info={

@@ -60,7 +60,7 @@ Table(
         to="publication.publication_id",
     ),
     number("candidate_count", "Publications that it could have been"),
-    comment="One row per message whose publication was found, or could not be told, by time",
+    comment="One row per message that one publication or several fit by time",
 )
 
 Table(

@@ -29,7 +29,7 @@ Table(
     Column(
         "labels",
         ARRAY(VARCHAR),
-        comment="What users say of the run, KEY=VALUE each, sorted; NULL: nothing",
+        comment="Labels that users gave to the run, KEY=VALUE each, sorted; NULL: no label",
     ),
     comment="One row per ingest of traces that belong together",
 )
