@@ -279,6 +279,38 @@ print("alembic" in sys.modules)
     assert done.stdout == "False\n", done.stderr
 
 
+def test_the_hash_of_definitions_is_of_all_files_that_make_them(tmp_path: Path) -> None:
+    root = resource_directory("schema").parent
+    for name in ("msgflow", "schema"):
+        ignored = shutil.ignore_patterns("__pycache__", "static")
+        shutil.copytree(root / name, tmp_path / name, ignore=ignored)
+    (tmp_path / "pyproject.toml").touch()
+    program = """
+import sys
+from pathlib import Path
+from msgflow.db.objects import definition_hash
+print(definition_hash())
+for path in map(Path, sys.argv[1:]):
+    path.write_text(path.read_text() + "\\n")
+    definition_hash.cache_clear()
+    print(definition_hash())
+"""
+    files = [
+        "msgflow/db/tables/__init__.py", "msgflow/db/tables/call.py", "msgflow/db/table_ddl.py",
+        "msgflow/db/table_view.py", "msgflow/db/diagnostic.py", "schema/public/run.sql",
+        "schema/health/diagnostic/lost_packets.sql",
+    ]  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", program, *files],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert len(set(done.stdout.split())) == len(files) + 1
+
+
 def test_a_new_database_has_every_view_with_comments(database: Path) -> None:
     con = connect(database, read_only=True)
     for header in objects.views():
