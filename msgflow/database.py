@@ -15,10 +15,10 @@ from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.query.result import QueryResult
-from msgflow.query.run import first_line, read_runs, run_query
+from msgflow.query.run import run_query
 from msgflow.query.selection import make_selection
-from msgflow.run.choice import choose_runs
-from msgflow.sql.failure import database_errors, in_words, out_of_memory
+from msgflow.run.choice import choose_runs, read_runs
+from msgflow.sql.failure import database_errors, first_line, in_words, out_of_memory
 from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:

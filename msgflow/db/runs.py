@@ -11,8 +11,7 @@ import duckdb
 from msgflow.db.connection import connect
 from msgflow.db.store import delete
 from msgflow.errors import UsageError
-from msgflow.query.run import read_runs
-from msgflow.run.choice import choose_runs, is_run_name
+from msgflow.run.choice import choose_runs, is_run_name, read_runs
 from msgflow.sql.failure import database_errors
 from msgflow.sql.interrupt import interruptible
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.nearest import nearest
-from msgflow.query.run import read_runs
-from msgflow.run.choice import choose_runs
+from msgflow.run.choice import choose_runs, read_runs
 from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from msgflow.fleet.compact import PACK
 from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
 from msgflow.nearest import nearest
-from msgflow.query.run import first_line
+from msgflow.sql.failure import first_line
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

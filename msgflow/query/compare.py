@@ -14,12 +14,12 @@ from msgflow.errors import QueryError, UsageError
 from msgflow.query.clocks import clock_notes
 from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
-from msgflow.query.run import bind, first_line, read_runs
+from msgflow.query.run import bind
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.resources import resource_directory
-from msgflow.run.choice import Run, choose_one
+from msgflow.run.choice import Run, choose_one, read_runs
 from msgflow.run.window import MAXIMUM_NS
-from msgflow.sql.failure import is_of_the_file, out_of_memory
+from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
 from msgflow.sql.header import Header, read
 from msgflow.sql.statement import program
 

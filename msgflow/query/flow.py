@@ -9,10 +9,10 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.names import require_names
-from msgflow.query.run import bind, first_line, read_runs
-from msgflow.run.choice import Run, choose_one
+from msgflow.query.run import bind
+from msgflow.run.choice import Run, choose_one, read_runs
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
-from msgflow.sql.failure import is_of_the_file, out_of_memory
+from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:

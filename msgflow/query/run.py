@@ -25,9 +25,9 @@ from msgflow.query.selection import (
     selected,
 )
 from msgflow.query.show.human import format_duration
-from msgflow.run.choice import Run, choose_runs
+from msgflow.run.choice import Run, choose_runs, read_runs
 from msgflow.run.window import format_epoch, time_window
-from msgflow.sql.failure import is_of_the_file, out_of_memory
+from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
 from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
 
@@ -51,16 +51,6 @@ _OF_CONDITIONS = (
     duckdb.OutOfRangeException,
     duckdb.InvalidInputException,
 )
-
-
-def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
-    """Return all runs of the database, oldest first."""
-    rows = connection.execute(
-        "SELECT run_id, name, start_ns, coalesce(labels, []) FROM main.run ORDER BY run_id"
-    ).fetchall()
-    return tuple(
-        Run(run_id, name, start_ns, tuple(labels)) for run_id, name, start_ns, labels in rows
-    )
 
 
 def run_query(
@@ -212,13 +202,6 @@ def bind(
                 f"{command} --{param.name.replace('_', '-')} {param.type}",
             )
     return bound
-
-
-def first_line(error: Exception) -> str:
-    """Return what a database error says, without its category and the quoted SQL."""
-    line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-    _, separator, text = line.partition(" Error: ")
-    return (text if separator else line).rstrip(".!")
 
 
 def _fit(command: str, param: Param, value: Value) -> Value:

@@ -11,6 +11,8 @@ from msgflow.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import duckdb
+
 _INTEGER = re.compile(r"-?\d+")
 # More digits than any id or time has, which Python would refuse to read.
 _MOST_DIGITS = 40
@@ -31,6 +33,16 @@ class Run:
     name: str
     start_ns: int | None
     labels: tuple[str, ...] = ()
+
+
+def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
+    """Return all runs of the database, oldest first."""
+    rows = connection.execute(
+        "SELECT run_id, name, start_ns, coalesce(labels, []) FROM main.run ORDER BY run_id"
+    ).fetchall()
+    return tuple(
+        Run(run_id, name, start_ns, tuple(labels)) for run_id, name, start_ns, labels in rows
+    )
 
 
 def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:

@@ -56,12 +56,12 @@ def in_words(error: BaseException, path: Path) -> DatabaseError | None:
         )
     if kind == "mistaken":
         return DatabaseError(
-            f"DuckDB {duckdb.__version__} made a mistake: {_first_line(error)} — {path}",
+            f"DuckDB {duckdb.__version__} made a mistake: {_cause(error)} — {path}",
             "try again, then with another version of DuckDB; the database is as it was before",
         )
     if kind == "damaged":
         return DatabaseError(
-            f"the database is damaged: {_first_line(error)} — {path}",
+            f"the database is damaged: {_cause(error)} — {path}",
             "restore the file from a copy, or ingest the traces into a new one",
         )
     return None
@@ -81,7 +81,7 @@ def database_errors(path: Path) -> Iterator[None]:
         yield
     except duckdb.PermissionException as error:
         raise DatabaseError(
-            f"a view of the database reads more than the database: {_first_line(error)} — {path}",
+            f"a view of the database reads more than the database: {_cause(error)} — {path}",
             f"msgflow db upgrade --db {shlex.quote(str(path))} makes views and macros anew",
         ) from error
     except (duckdb.Error, OSError, UnicodeDecodeError) as error:
@@ -89,6 +89,13 @@ def database_errors(path: Path) -> Iterator[None]:
         if words is None:
             raise
         raise words from error
+
+
+def first_line(error: Exception) -> str:
+    """Return what a database error says, without its category and the quoted SQL."""
+    line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    _, separator, text = line.partition(" Error: ")
+    return (text if separator else line).rstrip(".!")
 
 
 def _kind(error: BaseException) -> str | None:
@@ -115,7 +122,8 @@ def _kind(error: BaseException) -> str | None:
     return None
 
 
-def _first_line(error: BaseException) -> str:
+def _cause(error: BaseException) -> str:
+    """Return the first line of an error of the file, with its category unless that says nothing."""
     line = (str(error).strip().splitlines() or [type(error).__name__])[0]
     return line.removeprefix("INTERNAL Error: ").removeprefix("FATAL Error: ")[:200].rstrip(".")
 

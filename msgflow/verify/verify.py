@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from msgflow.nearest import nearest
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
-from msgflow.query.run import read_runs, run_query
+from msgflow.query.run import run_query
 from msgflow.query.selection import Selection, conditions_of
-from msgflow.run.choice import Run, choose_one
+from msgflow.run.choice import Run, choose_one, read_runs
 from msgflow.run.window import time_window
 from msgflow.sql.header import Column, Header, Param
 from msgflow.verify.condition import format_value

@@ -16,8 +16,8 @@ from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.clocks import clock_notes
 from msgflow.query.compare import compare
-from msgflow.query.run import read_runs, run_query
-from msgflow.run.choice import choose_one
+from msgflow.query.run import run_query
+from msgflow.run.choice import choose_one, read_runs
 from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS
 from msgflow.view.columns import encode
 from msgflow.view.critical import critical_path

@@ -15,8 +15,7 @@ from pyarrow import compute
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.query.run import read_runs
-from msgflow.run.choice import choose_one
+from msgflow.run.choice import choose_one, read_runs
 from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query

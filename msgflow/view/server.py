@@ -29,7 +29,7 @@ from starlette.routing import Route
 from msgflow.db.connection import connect
 from msgflow.db.memory import default_limit
 from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
-from msgflow.query.run import first_line
+from msgflow.sql.failure import first_line
 from msgflow.view import assets
 from msgflow.view.pages import Pages
 
