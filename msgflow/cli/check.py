@@ -86,8 +86,8 @@ def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
 
 def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterator[str]:
     from msgflow.cli.output import is_screen
-    from msgflow.query.show.human import format_cell
-    from msgflow.query.show.wrapping import wrap
+    from msgflow.text.values import format_cell
+    from msgflow.text.wrapping import wrap
 
     def fitting(text: str, room: int) -> list[str]:
         # In a pipe what people search for stays in one line.

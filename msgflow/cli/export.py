@@ -21,7 +21,7 @@ from msgflow.cli.options import (
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.export.series import What
-from msgflow.query.show.times import Times
+from msgflow.query.times import Times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

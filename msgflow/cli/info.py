@@ -42,8 +42,8 @@ def command(
     Each section is a named query, `msgflow query info-topics` for instance.
     """
     from msgflow.cli.output import is_screen, print_lines, print_note
+    from msgflow.cli.show.layout import screen_width
     from msgflow.database import Database
-    from msgflow.query.show.present import screen_width
 
     with Database(database) as opened:
         results = {
@@ -74,15 +74,15 @@ def _json(results: dict[str, QueryResult]) -> Iterator[str]:
 
 
 def _for_screen(results: dict[str, QueryResult], width: int) -> Iterator[str]:
-    from msgflow.query.show.present import present
-    from msgflow.query.show.screen import screen_lines
-    from msgflow.query.show.wrapping import wrap
+    from msgflow.cli.show.layout import lay_out
+    from msgflow.cli.show.screen import screen_lines
+    from msgflow.text.wrapping import wrap
 
     for position, (section, result) in enumerate(results.items()):
         if position:
             yield ""
         yield section.upper()
-        shown = present(result, width)
+        shown = lay_out(result, width)
         yield from screen_lines(shown, width)
         notes = shown.notes if len(result) else ("none",)
         for note in notes:
@@ -90,7 +90,7 @@ def _for_screen(results: dict[str, QueryResult], width: int) -> Iterator[str]:
 
 
 def _sections(results: dict[str, QueryResult], form: InfoFormat) -> Iterator[str]:
-    from msgflow.query.show.table import markdown_lines, table_lines
+    from msgflow.export.table import markdown_lines, table_lines
 
     for position, (section, result) in enumerate(results.items()):
         if position:

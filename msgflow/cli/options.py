@@ -9,7 +9,7 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.export.formats import Format
-from msgflow.query.show.times import Times
+from msgflow.query.times import Times
 
 SELECTION = "Which part of the data"
 OUTPUT = "Output"

@@ -12,9 +12,9 @@ from typing import IO, TYPE_CHECKING, cast
 import typer
 from rich.cells import cell_len
 
+from msgflow.cli.show.layout import MOST_ROWS, screen_width
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
-from msgflow.query.show.present import MOST_ROWS, screen_width
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -111,11 +111,11 @@ def is_screen() -> bool:
 
 
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:
-    from msgflow.query.show.present import present
-    from msgflow.query.show.screen import screen_lines
+    from msgflow.cli.show.layout import lay_out
+    from msgflow.cli.show.screen import screen_lines
 
     width = screen_width()
-    shown = present(result, width, most_rows=most_rows, is_chosen=is_chosen)
+    shown = lay_out(result, width, most_rows=most_rows, is_chosen=is_chosen)
     print_lines(screen_lines(shown, width))
     for note in shown.notes:
         print_note(note)
@@ -175,7 +175,7 @@ def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None =
     Raises:
         UsageError: stdout is closed.
     """
-    from msgflow.query.show.wrapping import wrap
+    from msgflow.text.wrapping import wrap
 
     every = [*([titles] if titles else []), *rows]
     width = max(cell_len(name) for name, _ in every)
@@ -247,7 +247,7 @@ def terminal(stream: IO[bytes]) -> IO[bytes]:
 def _shown(text: str) -> str:
     if text.isprintable():
         return text
-    from msgflow.query.show.human import printable
+    from msgflow.text.values import printable
 
     return printable(text, keep="\n\r\t")
 
@@ -266,7 +266,7 @@ def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
     """Return the lines of a text that goes to stderr: on a terminal none is wider than it."""
     if sys.stderr is None or not sys.stderr.isatty() or "\n" in text:
         return [text]
-    from msgflow.query.show.wrapping import wrap
+    from msgflow.text.wrapping import wrap
 
     width = _width_of_stderr()
     if used + cell_len(text) <= width:

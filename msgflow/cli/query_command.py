@@ -25,10 +25,10 @@ from msgflow.cli.options import (
     WideOption,
 )
 from msgflow.cli.selecting import selecting_options
+from msgflow.cli.show.layout import MOST_ROWS
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.query.selection import KINDS
-from msgflow.query.show.present import MOST_ROWS
 
 if TYPE_CHECKING:
     from msgflow.sql.header import Header

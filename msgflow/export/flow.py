@@ -11,7 +11,7 @@ from msgflow.export.flow_rows import FlowRows
 from msgflow.export.flow_tree import tree_text
 from msgflow.query.clocks import clock_notes
 from msgflow.query.flow import STEPS_PER_MESSAGE, flow_parameters, read_steps, require_start
-from msgflow.query.show.plain import plain
+from msgflow.text.json_value import json_value
 
 if TYPE_CHECKING:
     import duckdb
@@ -43,8 +43,8 @@ class Flow(FlowRows):
             "start": {"kind": self.start.kind, "id": self.start.id},
             "direction": self.direction,
             "is_cut": self.is_cut,
-            "nodes": plain(list(self.nodes.values())),
-            "edges": plain(self.edges),
+            "nodes": json_value(list(self.nodes.values())),
+            "edges": json_value(self.edges),
         }
 
     def to_json(self) -> str:

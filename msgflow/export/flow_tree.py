@@ -12,9 +12,9 @@ from rich.text import Text
 from rich.tree import Tree
 
 from msgflow.export.flow_layout import lay_out_flow, walk
-from msgflow.query.show.human import format_cell, format_duration, short_symbol
-from msgflow.query.show.wrapping import words
 from msgflow.run.window import format_epoch
+from msgflow.text.values import format_cell, format_duration, short_symbol
+from msgflow.text.wrapping import words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

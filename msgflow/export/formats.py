@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
-from msgflow.query.show.plain import plain
+from msgflow.text.json_value import json_value
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -86,11 +86,11 @@ def json_rows(result: QueryResult) -> Iterator[str]:
     encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
     for batch in result.table.to_batches(max_chunksize=_ROWS_AT_ONCE):
         for row in batch.to_pylist():
-            yield encode(plain(row))
+            yield encode(json_value(row))
 
 
 def _lines(result: QueryResult, form: Format) -> Iterable[str]:
-    from msgflow.query.show.table import markdown_lines, table_lines
+    from msgflow.export.table import markdown_lines, table_lines
 
     if form is Format.TABLE:
         return table_lines(result)
@@ -153,7 +153,7 @@ def _csv_column(column: pa.Array) -> pa.Array:
 
 
 def _csv_text(value: object) -> str | None:
-    simple = plain(value)
+    simple = json_value(value)
     if simple is None or isinstance(simple, str):
         return simple
     return json.dumps(simple, ensure_ascii=False)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from msgflow.export.formats import by_suffix
 from msgflow.export.graph_rows import GraphRows
-from msgflow.query.show.human import printable
-from msgflow.query.show.plain import plain
+from msgflow.text.json_value import json_value
+from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,8 +57,8 @@ class Graph(GraphRows):
             "run_id": self.run.run_id,
             "run": self.run.name,
             "executors": [{"id": key, "name": name} for key, name in self.executors.items()],
-            "vertices": [plain(vars(vertex)) for vertex in self.vertices.values()],
-            "edges": [plain(vars(edge)) for edge in self.edges],
+            "vertices": [json_value(vars(vertex)) for vertex in self.vertices.values()],
+            "edges": [json_value(vars(edge)) for edge in self.edges],
         }
         return json.dumps(content, ensure_ascii=False, indent=1)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from msgflow.query.show.human import printable
+from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from msgflow.query.result import QueryResult

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape, quoteattr
 
-from msgflow.query.show.human import printable
+from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from msgflow.export.graph_rows import Edge, GraphRows, Vertex

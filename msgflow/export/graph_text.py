@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.query.show.human import printable
+from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

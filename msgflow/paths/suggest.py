@@ -7,8 +7,8 @@ import re
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any
 
-from msgflow.query.show.human import format_duration, printable
-from msgflow.query.show.wrapping import ARROW, wrap_path
+from msgflow.text.values import format_duration, printable
+from msgflow.text.wrapping import ARROW, wrap_path
 from msgflow.yaml_file import list_lines
 
 if TYPE_CHECKING:

@@ -1,15 +1,14 @@
-"""What a query returns: an Arrow table, and what to say about it."""
+"""Result of a query: an Arrow table, with the units of its columns, its runs and notes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.nearest import column_named
-from msgflow.query.rows import Rows
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -17,30 +16,59 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from msgflow.run.choice import Run
+    from msgflow.sql.header import Header
+
 
 @dataclass(frozen=True, repr=False)
-class QueryResult(Rows):
+class QueryResult:
     """Rows in the order of the query. Times are integers in nanoseconds.
 
-    `print` shows what a terminal shows of them: a table that fits it (the variable COLUMNS counts;
-    100 columns where there is no terminal). A notebook shows the first rows.
+    `print` shows what a terminal shows: a table that fits its width (the variable COLUMNS decides;
+    100 columns without a terminal). A notebook shows the first rows.
 
-    Its attributes are those of `Rows`.
+    Attributes:
+        table: the rows.
+        header: of the named query, with the units of its columns; None for plain SQL.
+        runs: the runs that were read; empty for plain SQL.
+        notes: what the rows do not say (hidden rows, rows that are cut), a sentence each.
+        when_empty: what to say when there are no rows.
     """
+
+    table: pa.Table
+    header: Header | None = None
+    runs: tuple[Run, ...] = ()
+    notes: list[str] = field(default_factory=list)
+    when_empty: str = "no rows"
+
+    def __len__(self) -> int:
+        return int(self.table.num_rows)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.table.column_names)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each column that has one ('ns' for a duration, 'epoch ns' for a moment)."""
+        if self.header is None:
+            return {}
+        return {column.name: column.unit for column in self.header.columns if column.unit}
 
     def __repr__(self) -> str:
         name = "SQL" if self.header is None else self.header.name
         return f"<QueryResult of {name}: {len(self)} rows>"
 
     def __str__(self) -> str:
-        from msgflow.query.show.shown import shown_text
+        from msgflow.cli.show.result_text import result_text
 
-        return shown_text(self)
+        return result_text(self)
 
     def _repr_html_(self) -> str:
-        from msgflow.query.show.shown import shown_html
+        from msgflow.cli.show.result_text import result_html
 
-        return shown_html(self)
+        return result_html(self)
 
     def with_times(self, times: str) -> QueryResult:
         """Return the rows with points in time and durations in another form.
@@ -52,7 +80,7 @@ class QueryResult(Rows):
         Raises:
             UsageError: no such form, or the rows do not say which columns are times.
         """
-        from msgflow.query.show.times import Times, converted
+        from msgflow.query.times import Times, converted
 
         try:
             form = Times(times)
@@ -60,7 +88,12 @@ class QueryResult(Rows):
             raise UsageError(
                 f"there are no such times — {times}", f"choose one of {', '.join(Times)}"
             ) from None
-        return replace(self, table=converted(self, form))
+        if self.header is None and form is not Times.NS:
+            raise UsageError(
+                "plain SQL does not say which numbers are times",
+                "use a query: msgflow query --list",
+            )
+        return replace(self, table=converted(self.table, self.units, self.runs, form))
 
     def with_columns(self, names: Sequence[str]) -> QueryResult:
         """Return the rows with these columns only, in this order.

@@ -24,12 +24,12 @@ from msgflow.query.selection import (
     Selection,
     selected,
 )
-from msgflow.query.show.human import format_duration
 from msgflow.run.choice import Run, choose_runs, read_runs
 from msgflow.run.window import format_epoch, time_window
 from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
 from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
+from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from msgflow.nearest import nearest
-from msgflow.query.show.human import format_duration
+from msgflow.text.values import format_duration
 
 OPERATORS = ("<", "<=", ">", ">=")
 _SAME = {"≤": "<=", "≥": ">="}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
-from msgflow.query.show.human import format_duration, printable
 from msgflow.run.window import format_epoch
+from msgflow.text.values import format_duration, printable
 
 if TYPE_CHECKING:
     from typing import Any

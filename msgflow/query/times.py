@@ -1,4 +1,4 @@
-"""Points in time and durations of a result as other programs read them."""
+"""Times of a result as other programs read them: seconds, or UTC as text."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
     import pyarrow as pa
 
-    from msgflow.query.rows import Rows
+    from msgflow.run.choice import Run
 
 _NS = "_ns"
 _SECOND = 1e9
@@ -30,26 +32,28 @@ class Times(StrEnum):
     ISO = "iso"
 
 
-def converted(result: Rows, times: Times) -> pa.Table:
-    """Return the rows of a result with its times in another form; `_ns` becomes `_s` or `_utc`.
+def converted(
+    table: pa.Table, units: Mapping[str, str], runs: Sequence[Run], times: Times
+) -> pa.Table:
+    """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names.
+
+    Args:
+        table: the rows, with times in nanoseconds.
+        units: of columns: 'ns' for durations, 'epoch ns' for points in time.
+        runs: the runs of the rows.
+        times: the form.
 
     Raises:
-        UsageError: the result does not say which of its columns are times, or of which run.
+        UsageError: times count from the start of a run, and no row says which run it is of.
     """
-    table = result.table
     if times is Times.NS:
         return table
-    if result.header is None:
-        raise UsageError(
-            "plain SQL does not say which numbers are times", "use a query: msgflow query --list"
-        )
-    units = result.units
     columns, names = [], []
     for name, column in zip(table.column_names, table.columns, strict=True):
         unit = units.get(name)
         suffix = ""
         if unit == "epoch ns":
-            column, suffix = _moment(result, column, times)
+            column, suffix = _moment(column, times, lambda: _starts(table, runs))
         elif unit == "ns":
             column, suffix = _seconds(column), "_s"
         renamed = name.removesuffix(_NS) + suffix if name.endswith(_NS) and suffix else name
@@ -60,14 +64,14 @@ def converted(result: Rows, times: Times) -> pa.Table:
     return pyarrow.table(columns, names=names)
 
 
-def _moment(result: Rows, column: Any, times: Times) -> tuple[Any, str]:
+def _moment(column: Any, times: Times, starts: Callable[[], Any]) -> tuple[Any, str]:
     import pyarrow
     from pyarrow import compute
 
     if times is Times.SECONDS:
         return _seconds(column), "_s"
     if times is Times.RELATIVE:
-        return _seconds(compute.subtract(column, _starts(result))), "_s"
+        return _seconds(compute.subtract(column, starts())), "_s"
     stamps = column.cast(pyarrow.timestamp("ns"))
     return compute.strftime(stamps, format="%Y-%m-%dT%H:%M:%SZ"), "_utc"
 
@@ -79,15 +83,15 @@ def _seconds(column: Any) -> Any:
     return compute.divide(column.cast(pyarrow.float64(), safe=False), _SECOND)
 
 
-def _starts(result: Rows) -> Any:
-    """Return when the run of each row began."""
+def _starts(table: pa.Table, runs: Sequence[Run]) -> Any:
+    """Return when the run of each row started."""
     import pyarrow
     from pyarrow import compute
 
-    starts = {run.run_id: run.start_ns for run in result.runs}
-    if "run_id" in result.columns and len(starts) > 1:
+    starts = {run.run_id: run.start_ns for run in runs}
+    if "run_id" in table.column_names and len(starts) > 1:
         place = compute.index_in(
-            result.table["run_id"], value_set=pyarrow.array(list(starts), pyarrow.int64())
+            table["run_id"], value_set=pyarrow.array(list(starts), pyarrow.int64())
         )
         return pyarrow.array(list(starts.values()), pyarrow.int64()).take(place.combine_chunks())
     if len(starts) != 1:

@@ -11,10 +11,10 @@ import pyarrow as pa
 import pytest
 from rich.cells import cell_len
 
+from msgflow.cli.show.layout import MOST_ROWS, lay_out
+from msgflow.cli.show.screen import screen_lines
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
-from msgflow.query.show.present import MOST_ROWS, present
-from msgflow.query.show.screen import screen_lines
 from msgflow.run.choice import Run
 from msgflow.sql.header import Header
 
@@ -118,7 +118,7 @@ CASES = {
 
 
 def lines_of(result: QueryResult, width: int, **more: Any) -> list[str]:
-    shown = present(result, width, **more)
+    shown = lay_out(result, width, **more)
     return [*screen_lines(shown, width), *(f"note: {note}" for note in shown.notes)]
 
 
@@ -136,13 +136,13 @@ def test_what_is_shown(name: str, width: int) -> None:
 @pytest.mark.parametrize("width", range(40, 200, 7))
 @pytest.mark.parametrize("name", CASES)
 def test_no_line_is_wider_than_the_terminal(name: str, width: int) -> None:
-    shown = present(CASES[name], width)
+    shown = lay_out(CASES[name], width)
     assert max(map(cell_len, screen_lines(shown, width))) <= width
 
 
 def test_every_column_is_shown_or_named() -> None:
     for name, result in CASES.items():
-        shown = present(result, 80)
+        shown = lay_out(result, 80)
         said = " ".join([*(column.title for column in shown.columns), *shown.notes, *shown.paths])
         for column in set(result.columns) - {"run_id", "path"}:
             assert column.removesuffix("_ns") in said, (name, column)
@@ -150,11 +150,11 @@ def test_every_column_is_shown_or_named() -> None:
 
 def test_long_results_stop_and_say_how_many_rows_there_are() -> None:
     result = result_of("info-topics", [{"topic_name": f"/{n}", "take_count": n} for n in range(60)])
-    shown = present(result, 100)
+    shown = lay_out(result, 100)
     assert len(shown.columns[0].cells) == MOST_ROWS == 50
     assert shown.notes[0] == "the first 50 of 60 rows: --wide shows all"
-    assert len(present(result, 100, most_rows=None).columns[0].cells) == 60
-    assert len(present(result, 100, most_rows=55).columns[0].cells) == 55
+    assert len(lay_out(result, 100, most_rows=None).columns[0].cells) == 60
+    assert len(lay_out(result, 100, most_rows=55).columns[0].cells) == 55
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
@@ -163,8 +163,8 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
         "data-quality",
         [{"scope": "run", "subject": "morning", "measure": "orphan_takes", "total": 4214}] * 2,
     )
-    assert "affected" in [column.title for column in present(quality, width).columns]
-    assert all("affected," not in note for note in present(quality, width).notes)
+    assert "affected" in [column.title for column in lay_out(quality, width).columns]
+    assert all("affected," not in note for note in lay_out(quality, width).notes)
     delivery = result_of(
         "delivery",
         [
@@ -175,7 +175,7 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
             },
         ] * 2,
     )  # fmt: skip
-    titles = {column.title for column in present(delivery, width).columns}
+    titles = {column.title for column in lay_out(delivery, width).columns}
     assert {"delivered", "lost", "unknown"} <= titles
     assert width < 100 or "delivered_percent" in titles
     assert "skipped" not in titles
@@ -206,22 +206,22 @@ def test_what_holds_of_several_rows_stands_above_them_once() -> None:
     ]
     assert lines[2].split()[:2] == ["rank", "at"]
     assert any(line.startswith("path 2  /camera/driver") for line in lines)
-    assert present(several, 100, is_chosen=True).headings == ()
-    assert present(several.with_columns(["rank", "share"]), 100).headings == ()
+    assert lay_out(several, 100, is_chosen=True).headings == ()
+    assert lay_out(several.with_columns(["rank", "share"]), 100).headings == ()
 
 
 def test_rows_of_which_each_has_its_own_heading_have_none() -> None:
     rows = [pieces(rank, 12_000_000, CAMERA)[0] for rank in (1, 2)]
-    assert present(result_of("critical-path", rows), 100).headings == ()
-    assert present(result_of("critical-path", []), 100).headings == ()
+    assert lay_out(result_of("critical-path", rows), 100).headings == ()
+    assert lay_out(result_of("critical-path", []), 100).headings == ()
 
 
 def test_columns_that_somebody_chose_are_all_shown() -> None:
     chosen = CASES["paths"].with_columns(["lost", "run_id", "p95", "path"])
-    shown = present(chosen, 100, is_chosen=True)
+    shown = lay_out(chosen, 100, is_chosen=True)
     assert {column.name for column in shown.columns} == {"lost", "run_id", "p95_ns", "path"}
     assert shown.notes == ()
-    narrow = present(CASES["paths"], 60, is_chosen=True)
+    narrow = lay_out(CASES["paths"], 60, is_chosen=True)
     assert narrow.widths is None
     assert len(narrow.columns) == len(CASES["paths"].columns)
 
@@ -241,7 +241,7 @@ def callbacks(*nodes: str) -> QueryResult:
 
 
 def titles_of(result: QueryResult, width: int) -> list[str]:
-    return [column.title for column in present(result, width).columns]
+    return [column.title for column in lay_out(result, width).columns]
 
 
 def test_names_are_broken_for_the_six_most_important_columns_alone() -> None:
@@ -278,7 +278,7 @@ def test_short_text_is_not_broken_for_a_less_important_column() -> None:
 
 def test_what_a_note_says_of_all_rows_takes_no_room_from_the_rest() -> None:
     rows = [latency(SHORT, 13_035_000), latency(CAMERA, 21_070_000)]
-    shown = present(result_of("e2e-latency", rows), 100)
+    shown = lay_out(result_of("e2e-latency", rows), 100)
     titles = [column.title for column in shown.columns]
     assert {"min", "mean", "p99"} <= set(titles)
     assert "cut_by_recording" not in titles
@@ -290,16 +290,16 @@ def test_what_a_note_says_of_all_rows_takes_no_room_from_the_rest() -> None:
 def test_plain_sql_is_a_table_where_broken_names_make_it_one() -> None:
     label = "Service(/camera/driver/get_parameter_types_atomically)"
     table = pa.table({"id": [1, 2], "node": ["/camera/driver"] * 2, "label": [label] * 2})
-    assert present(QueryResult(table), 60).widths is not None
-    assert present(QueryResult(table), 40).widths is None
+    assert lay_out(QueryResult(table), 60).widths is not None
+    assert lay_out(QueryResult(table), 40).widths is None
 
 
 def test_plain_sql_keeps_every_column() -> None:
     table = pa.table({"a": [0, 0], "b": [None, None], "path": ["x x" * 10, "y"]})
-    shown = present(QueryResult(table), 60)
+    shown = lay_out(QueryResult(table), 60)
     assert [column.title for column in shown.columns] == ["a", "b", "path"]
-    assert present(QueryResult(table), 30).widths is not None
-    assert present(QueryResult(pa.table({f"c{n}": [1] for n in range(40)})), 80).widths is None
+    assert lay_out(QueryResult(table), 30).widths is not None
+    assert lay_out(QueryResult(pa.table({f"c{n}": [1] for n in range(40)})), 80).widths is None
 
 
 def test_a_result_without_rows_has_no_lines() -> None:
@@ -312,16 +312,16 @@ def test_moments_are_whole_where_the_rows_tell_when_runs_began() -> None:
     lines = lines_of(result_of("info-runs", rows), 200)
     assert "2023-11-14T22:13:20.000000000Z" in "".join(lines)
     # Rounded down: --start with it leaves nothing out.
-    (start,) = (c.cells for c in present(CASES["waits"], 120).columns if c.name == "start_ns")
+    (start,) = (c.cells for c in lay_out(CASES["waits"], 120).columns if c.name == "start_ns")
     assert start == ("1.234567 s", "-0.000001 s")
 
 
 def test_the_order_of_importance_is_that_of_the_header() -> None:
     header = load_query("e2e-latency")
-    first = present(CASES["paths"], 60)
+    first = lay_out(CASES["paths"], 60)
     assert "median" in [column.title for column in first.columns]
     turned: Header = replace(header, brief=("path", "min_ns", "mean_ns", "sink_event"))
-    other = present(replace(CASES["paths"], header=turned), 60)
+    other = lay_out(replace(CASES["paths"], header=turned), 60)
     titles = [column.title for column in other.columns]
     assert {"min", "mean", "sink_event"} <= set(titles)
     assert "median" not in titles or "max" not in titles

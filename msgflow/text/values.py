@@ -1,12 +1,15 @@
-"""Values as people read them, for tables and Markdown only; every other format is exact."""
+"""Values as people read them: durations, cells of tables, titles of columns, printable text.
+
+Tables and Markdown use them; all other formats are exact.
+"""
 
 from __future__ import annotations
 
 import re
 from typing import Any
 
-from msgflow.query.show.plain import plain
 from msgflow.run.window import format_epoch
+from msgflow.text.json_value import json_value
 
 _BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")
 
@@ -35,8 +38,8 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
     """Return one cell of a table.
 
     Args:
-        value: as Arrow gives it to Python.
-        unit: of the column, 'ns' for durations, 'epoch ns' for points in time, 'share' for parts
+        value: a Python value made by Arrow.
+        unit: of the column: 'ns' for durations, 'epoch ns' for points in time, 'share' for parts
             of 1.
         is_handle: an address, shown in hexadecimal.
     """
@@ -49,7 +52,7 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
     # A map, such as labels.
     if isinstance(value, list) and value and all(isinstance(item, tuple) for item in value):
         return ", ".join("=".join(map(format_cell, item)) for item in value)
-    value = plain(value)
+    value = json_value(value)
     if value is None:
         return NULL
     if isinstance(value, int | float):
@@ -62,7 +65,7 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
 def short_symbol(symbol: str) -> str:
     """Return the name of a function without arguments and template parameters.
 
-    Of a bound method C++ tells the class alone: `Camera::*`.
+    For a bound method, C++ keeps only the class: `Camera::*`.
     """
     if bound := _BOUND.match(symbol):
         return f"{bound['owner']}::*"
@@ -75,8 +78,8 @@ def short_symbol(symbol: str) -> str:
     return name.strip() or symbol
 
 
-def shown_name(name: str, unit: str | None, names: tuple[str, ...]) -> str:
-    """Return the title of a column: `_ns` goes where the unit stands in the cells instead."""
+def column_title(name: str, unit: str | None, names: tuple[str, ...]) -> str:
+    """Return the title of a column, without `_ns` if its cells have units."""
     short = name.removesuffix("_ns")
     if unit in (DURATION, MOMENT) and short and (short == name or short not in names):
         return printable(short)
@@ -98,8 +101,9 @@ def _number(value: float, unit: str | None, is_handle: bool) -> str:
 
 
 def printable(text: str, keep: str = "") -> str:
-    """Return text without control characters, which stand there as in Python: names come from
-    traces, and no terminal shall obey what is in them.
+    """Return text with control characters escaped as in Python.
+
+    Names come from traces: no terminal may obey what is in them.
 
     Args:
         text: any.

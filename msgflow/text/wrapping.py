@@ -1,4 +1,4 @@
-"""Text in lines of a given width, as a terminal counts it."""
+"""Wrapping of text: lines of a given width, counted in cells of a terminal."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import re
 from rich.cells import cell_len, set_cell_size
 
 ARROW = " → "
-# Where a text may be broken: at a space, but for that between a number and its unit.
+# Where a text may be broken: at a space, but not between a number and its unit.
 _SPACE = re.compile(r"(?<!\d) | (?!(?:ns|µs|ms|s|Hz|%|ppb)(?!\w))")
 # Where a name may be broken: behind a parenthesis, before a slash.
 _PIECE = re.compile(r"[/(]?[^/(]*\(?")
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Return `text` in lines of at most `width` cells, broken at spaces, else within names.
+    """Return lines of at most `width` cells, broken at spaces, and within names if need be.
 
     A number stays with its unit.
     """
@@ -51,23 +51,23 @@ def wrap_path(path: str, width: int) -> list[str]:
 
 
 def words(text: str) -> list[str]:
-    """Return what of `text` stays together: its words, and a number with its unit."""
+    """Return the parts of `text` that stay together: words, and numbers with their units."""
     return _SPACE.split(text)
 
 
 def longest_word(text: str) -> int:
-    """Return how many cells the longest word of `text` takes."""
+    """Return the cells of the longest word of `text`."""
     return max(map(cell_len, words(text)))
 
 
 def longest_piece(text: str) -> int:
-    """Return how many cells the longest part of a name in `text` takes."""
+    """Return the cells of the longest part of a name in `text`."""
     return max(cell_len(piece) for word in words(text) for piece in _PIECE.findall(word))
 
 
 def _head(word: str, width: int) -> str:
-    """Return the longest beginning of a word that fits, if need be one character too wide."""
-    # The name in parentheses stays whole where it can: people copy it.
+    """Return the longest begin of a word that fits, at least one character."""
+    # If it fits, the name in parentheses stays whole: people copy it.
     outer, bracket, inner = word.partition("(")
     if bracket and cell_len(inner) <= width and cell_len(outer) < width:
         return outer + bracket
@@ -76,5 +76,5 @@ def _head(word: str, width: int) -> str:
         if cell_len(head + piece) > width:
             break
         head += piece
-    # What is cut through the middle of a wide character is filled with a space.
+    # A cut through a wide character leaves a space.
     return head or set_cell_size(word, width).rstrip() or word[:1]

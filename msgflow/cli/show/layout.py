@@ -1,9 +1,9 @@
-"""What a terminal shows of a result: the stage between the rows and their lines.
+"""Layout of a result on a terminal: which columns have a place, and how wide they are.
 
-Columns that say nothing are left out and named, unless `answer` in the header of the query has
-them: that nothing was lost is an answer. Paths are numbered and stand below the table once.
-What then still does not fit loses its least important columns, as `brief` in the header of the
-query has it; where not even the most important ones have a place, every row is a record.
+Columns with nothing in them are left out and named in a note, unless the header of the query lists
+them under `answer`: that nothing was lost is an answer. Paths get numbers and stand once, below the
+table. A table that is still too wide loses its least important columns, by the order of `brief` in
+the header. If not even the most important columns fit, every row becomes a record.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.query.show.human import MOMENT, NULL, format_cell, short_symbol, shown_name
-from msgflow.query.show.wrapping import ARROW, longest_piece, longest_word, wrap
+from msgflow.text.values import MOMENT, NULL, column_title, format_cell, short_symbol
+from msgflow.text.wrapping import ARROW, longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     import pyarrow as pa
 
-    from msgflow.query.rows import Rows
+    from msgflow.query.result import QueryResult
 
 MOST_ROWS = 50
 _NARROWEST = 40
@@ -33,15 +33,14 @@ PATH = "path"
 PATH_ID = "path_id"
 RUN = "run_id"
 _SYMBOLS = ("symbol", "symbols")
-# So many of the most important columns have to fit, for a table to be one. For so many, names are
-# broken if need be.
+# A table needs room for so many of its most important columns. For so many, names may be broken.
 _ESSENTIAL = 3
 _WANTED = 6
-# Text is not made narrower than so many cells, nor into more lines than that; of plain SQL, which
-# does not say what is important, into more.
+# The narrowest column of text, in cells, and the most lines of a cell. Plain SQL does not say what
+# is important: its cells may have more lines.
 _NARROW = 16
 _WORD = 40
-# Text of so few cells is broken for the most important columns alone, as names are.
+# Shorter text is broken only to make room for the most important columns, as names are.
 _SHORT = 20
 _LINES = 4
 _LINES_OF_SQL = 10
@@ -49,16 +48,16 @@ _LINES_OF_SQL = 10
 
 @dataclass(frozen=True)
 class ShownColumn:
-    """A column as people read it.
+    """A column as people read it; widths are in cells of the terminal.
 
     Attributes:
-        name: as the result has it.
-        title: as the table has it.
+        name: in the result.
+        title: in the table.
         cells: one for each row that is shown.
         is_number: aligned to the right, and never in several lines.
-        width: as wide as its content.
-        least: as narrow as it may become.
-        broken: as narrow as it may become where names are broken.
+        width: the width of its content.
+        least: the least width.
+        broken: the least width if names may be broken.
     """
 
     name: str
@@ -71,14 +70,14 @@ class ShownColumn:
 
 
 @dataclass(frozen=True)
-class Presentation:
-    """What is shown of a result.
+class Layout:
+    """The part of a result that a terminal shows.
 
     Attributes:
-        headings: what stands above the rows, a line each.
-        columns: in the order of the result, the number of the path first.
-        widths: of the columns; None where each row is a record.
-        paths: that the numbers mean, from 1 on.
+        headings: lines above the rows.
+        columns: in the order of the result, after the number of the path.
+        widths: of the columns, in cells; None if each row is a record.
+        paths: the paths with the numbers 1, 2, …
         notes: what is left out, a sentence each.
     """
 
@@ -90,26 +89,26 @@ class Presentation:
 
 
 def screen_width() -> int:
-    """Return how many cells a line of the terminal has, or the variable COLUMNS says; else 100."""
+    """Return the width of a line in cells: the variable COLUMNS, else the terminal's, else 100."""
     return max(_NARROWEST, shutil.get_terminal_size((100, 24)).columns)
 
 
-def present(
-    result: Rows,
+def lay_out(
+    result: QueryResult,
     width: int,
     *,
     most_rows: int | None = MOST_ROWS,
     is_chosen: bool = False,
     remedy: str = "--wide shows all",
-) -> Presentation:
-    """Return what to show of `result`.
+) -> Layout:
+    """Return the layout of a result.
 
     Args:
         result: the rows.
         width: of the terminal, in cells.
         most_rows: how many rows are shown; all when None.
-        is_chosen: somebody asked for these columns, so that all of them are shown.
-        remedy: what notes say of where the rest is.
+        is_chosen: the user asked for these columns: show all of them.
+        remedy: how to see the rest, for notes.
     """
     keeps_all = is_chosen or result.header is None
     kept, nothing = _that_say_something(result, keeps_all)
@@ -138,11 +137,11 @@ def present(
         notes.append(f"0 or empty in all rows: {', '.join(nothing)}")
     notes += _of_columns_left_out(left_out, remedy) if first.num_rows else []
     widths = tuple(_widths(shown, width)) if is_table else None
-    return Presentation(headings, tuple(shown), widths, paths, tuple(notes))
+    return Layout(headings, tuple(shown), widths, paths, tuple(notes))
 
 
-def _that_say_something(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
-    """Return the columns that have something to say, and those that are 0 or empty throughout."""
+def _that_say_something(result: QueryResult, keeps_all: bool) -> tuple[list[str], list[str]]:
+    """Return the columns with content, and the titles of those that are 0 or empty in all rows."""
     if keeps_all or not len(result):
         return list(result.columns), []
     answer = () if result.header is None else result.header.answer
@@ -176,11 +175,11 @@ def _is_nothing(column: pa.ChunkedArray) -> bool:
     return bool(types.is_string(kind) and compute.max(column).as_py() == "")
 
 
-def _title(result: Rows, name: str) -> str:
-    return shown_name(name, result.units.get(name), result.columns)
+def _title(result: QueryResult, name: str) -> str:
+    return column_title(name, result.units.get(name), result.columns)
 
 
-def _column(result: Rows, name: str, values: pa.ChunkedArray) -> ShownColumn:
+def _column(result: QueryResult, name: str, values: pa.ChunkedArray) -> ShownColumn:
     import pyarrow.types as types
 
     kind = values.type
@@ -191,7 +190,7 @@ def _column(result: Rows, name: str, values: pa.ChunkedArray) -> ShownColumn:
         title, is_number = "run", False
         cells = [format_cell(names.get(value, value)) for value in listed]
     elif name in _SYMBOLS:
-        cells = [NULL if value is None else format_cell(_symbols(value)) for value in listed]
+        cells = [NULL if value is None else format_cell(short_symbol(value)) for value in listed]
     else:
         unit = result.units.get(name)
         is_handle = name.endswith("_handle")
@@ -223,27 +222,23 @@ def _measured(
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
 
 
-def _run_names(result: Rows) -> dict[int, str]:
-    """Return the name of each run by its id; nothing where the rows are about the runs."""
+def _run_names(result: QueryResult) -> dict[int, str]:
+    """Return the name of each run by its id; nothing if the rows themselves are runs."""
     if result.header is None or result.header.grain == "one row per run":
         return {}
     names = {run.run_id: run.name for run in result.runs}
     return names if len(set(names.values())) == len(names) else {}
 
 
-def _symbols(text: str) -> str:
-    return short_symbol(text)
-
-
-def _begin(result: Rows) -> int | None:
-    """Return what points in time count from: the start of the only run, unless rows tell it."""
+def _begin(result: QueryResult) -> int | None:
+    """Return the start of the only run, from which times count; None if the rows are runs."""
     if len(result.runs) != 1 or result.header is None or result.header.grain == "one row per run":
         return None
     return result.runs[0].start_ns
 
 
 def _since(duration_ns: int) -> str:
-    # Rounded down, so that what is given to --start or --at does not leave this moment out.
+    # Rounded down: given to --start or --at, the time must include this moment.
     microseconds = duration_ns // 1_000
     sign = "-" if microseconds < 0 else ""
     seconds, rest = divmod(abs(microseconds), 1_000_000)
@@ -265,9 +260,9 @@ def _with_numbered_paths(
 
 
 def _with_headings(
-    result: Rows, columns: list[ShownColumn]
+    result: QueryResult, columns: list[ShownColumn]
 ) -> tuple[list[ShownColumn], tuple[str, ...]]:
-    """Return the columns without those that stand above the rows, and what stands there."""
+    """Return the columns of the table, and the headings made of the other ones."""
     by_name = {column.name: column for column in columns}
     names = () if result.header is None else result.header.heading
     said = [by_name[name] for name in names if name in by_name]
@@ -279,7 +274,7 @@ def _with_headings(
         rows.setdefault(number, tuple(cells))
     if len(rows) == len(key.cells) > 1:
         return columns, ()
-    # What one row says needs no number; else the number says which rows it is of.
+    # A single heading needs no number; otherwise the number says which rows it belongs to.
     is_alone = len(rows) == 1
     lines = tuple(
         ("" if is_alone else f"{key.title} {number}: ")
@@ -294,8 +289,8 @@ def _with_headings(
     return left, lines
 
 
-def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn]:
-    """Return the columns, the most important first; what a note can say of all rows comes last."""
+def _by_importance(result: QueryResult, columns: list[ShownColumn]) -> list[ShownColumn]:
+    """Return the columns, the most important first; those alike in all rows come last."""
     header = result.header
     brief = () if header is None else header.brief
     kept = {PATH, RUN, *brief[:_WANTED], *(() if header is None else header.answer)}
@@ -310,14 +305,14 @@ def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn
     )
 
 
-def _that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
-    """Return the most important columns that have a place, in their own order."""
+def _that_fit(result: QueryResult, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
+    """Return the most important columns that fit, in the order of the result."""
     if _least(columns) <= width:
         return columns
     ranked = _by_importance(result, columns)
     chosen = _greedy(ranked, width)
     if any(column not in chosen for column in ranked[:_WANTED]):
-        # Names are broken for the columns that are wanted, and for no other.
+        # Names are broken for the wanted columns only.
         wanted = {column.name for column in _greedy(_broken(ranked[:_WANTED]), width)}
         first = [column for column in ranked if column.name in wanted]
         rest = [column for column in ranked if column.name not in wanted]
@@ -345,12 +340,12 @@ def _least(columns: list[ShownColumn]) -> int:
 
 
 def _widths(columns: list[ShownColumn], width: int) -> list[int]:
-    """Return the widths of columns that fit, so that the rows take few lines."""
+    """Return widths with which the columns fit and the rows take few lines."""
     widths = [column.width for column in columns]
     free = width - GAP * (len(columns) - 1)
     if sum(widths) <= free:
         return widths
-    # The widest are made narrower first; then what one does not need goes to another.
+    # First the widest columns become narrower; then columns trade cells.
     while sum(widths) > free:
         widest = max(
             (place for place, column in enumerate(columns) if widths[place] > column.least),
@@ -361,7 +356,7 @@ def _widths(columns: list[ShownColumn], width: int) -> list[int]:
 
 
 def _balanced(columns: list[ShownColumn], widths: list[int]) -> list[int]:
-    """Return widths of the same sum with which the rows take fewer lines, if there are any."""
+    """Return widths of the same sum with which the rows take the fewest lines."""
     texts = [place for place, column in enumerate(columns) if not column.is_number]
     heights = [_heights(columns[place]) for place in range(len(columns))]
 
@@ -384,17 +379,17 @@ def _balanced(columns: list[ShownColumn], widths: list[int]) -> list[int]:
 
 
 def _heights(column: ShownColumn) -> Callable[[int], list[int]]:
-    """Return a function: in how many lines each of the first cells is at a width."""
+    """Return a function of a width: the number of lines of each of the first cells."""
     return cache(lambda width: [len(wrap(cell, width)) for cell in column.cells[:MOST_ROWS]])
 
 
 def _is_alike(column: ShownColumn) -> bool:
-    """Tell whether a note can say what stands in all rows."""
+    """Tell whether all rows have the same cell, short enough for a note."""
     return len(column.cells) > 1 and len(set(column.cells)) == 1 and column.width <= _WORD
 
 
 def _of_columns_left_out(columns: list[ShownColumn], remedy: str) -> list[str]:
-    """Say which columns have no place, and what stands in those that are alike in all rows."""
+    """Return notes about columns that do not fit, with the value of those alike in all rows."""
     alike = [column for column in columns if _is_alike(column)]
     others = [column.title for column in columns if column not in alike]
     notes = []

@@ -1,4 +1,4 @@
-"""A result for people: as text, and for a notebook. Long ones are cut, which they say."""
+"""Text and HTML of a result: how it prints itself, and how a notebook shows it."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
-from msgflow.query.show.human import printable
-from msgflow.query.show.present import MOST_ROWS, present, screen_width
-from msgflow.query.show.screen import screen_lines
-from msgflow.query.show.table import cells
-from msgflow.query.show.wrapping import wrap
+from msgflow.cli.show.layout import MOST_ROWS, lay_out, screen_width
+from msgflow.cli.show.screen import screen_lines
+from msgflow.export.table import cells
+from msgflow.text.values import printable
+from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from msgflow.query.rows import Rows
+    from msgflow.query.result import QueryResult
 
 _STYLE = "text-align: {}; white-space: pre-wrap"
 
 
-def shown_text(result: Rows) -> str:
-    """Return what a terminal would show: the first rows as a table that fits, and notes."""
+def result_text(result: QueryResult) -> str:
+    """Return the text of a terminal: runs, the first rows as a table that fits, notes."""
     width = screen_width()
-    shown = present(result, width, remedy="to_arrow() has all")
+    shown = lay_out(result, width, remedy="to_arrow() has all")
     runs = ", ".join(f"{run.name} ({run.run_id})" for run in result.runs)
     head = [("run: " if len(result.runs) == 1 else "runs: ", runs)] if runs else []
     notes = [*shown.notes, *([] if len(result) else [result.when_empty]), *result.notes]
@@ -38,8 +38,8 @@ def _labelled(label: str, text: str, width: int) -> list[str]:
     return [f"{label}{first}", *(" " * len(label) + line for line in more)]
 
 
-def shown_html(result: Rows) -> str:
-    """Return the first rows as an HTML table; names from a trace are never more than text."""
+def result_html(result: QueryResult) -> str:
+    """Return the first rows as an HTML table; names from a trace are always text in it."""
     names, columns, right = cells(_first(result))
     styles = [_STYLE.format("right" if is_right else "left") for is_right in right]
     parts = ["<table>"]
@@ -63,11 +63,11 @@ def shown_html(result: Rows) -> str:
     return "".join(parts)
 
 
-def _first(result: Rows) -> Rows:
+def _first(result: QueryResult) -> QueryResult:
     return replace(result, table=result.table.slice(0, MOST_ROWS))
 
 
-def _notes(result: Rows) -> list[str]:
+def _notes(result: QueryResult) -> list[str]:
     count = len(result)
     if not count:
         return [result.when_empty, *result.notes]

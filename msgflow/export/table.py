@@ -1,4 +1,4 @@
-"""A result as an aligned table or as Markdown: as wide as its content, never cut."""
+"""Tables and Markdown of a result: as wide as its content, never cut."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.query.show.human import format_cell, shown_name
+from msgflow.text.values import column_title, format_cell
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     import pyarrow as pa
 
-    from msgflow.query.rows import Rows
+    from msgflow.query.result import QueryResult
 
 _GAP = "  "
 
 
-def table_lines(result: Rows) -> Iterator[str]:
+def table_lines(result: QueryResult) -> Iterator[str]:
     """Yield the lines of a table: names, a rule, one line per row, numbers to the right."""
     names, columns, right = cells(result)
     if not names:
@@ -33,7 +33,7 @@ def table_lines(result: Rows) -> Iterator[str]:
     yield from lines
 
 
-def markdown_lines(result: Rows) -> Iterator[str]:
+def markdown_lines(result: QueryResult) -> Iterator[str]:
     """Yield the lines of a Markdown table."""
     names, columns, right = cells(result)
     if not names:
@@ -44,18 +44,18 @@ def markdown_lines(result: Rows) -> Iterator[str]:
         yield _markdown_line(row)
 
 
-def cells(result: Rows) -> tuple[list[str], list[list[str]], list[bool]]:
-    """Return titles, columns as people read them, and which of them are numbers."""
+def cells(result: QueryResult) -> tuple[list[str], list[list[str]], list[bool]]:
+    """Return the titles, the cells of each column, and whether each column has numbers."""
     import pyarrow.types
 
     units = result.units
-    names = [shown_name(name, units.get(name), result.columns) for name in result.columns]
+    names = [column_title(name, units.get(name), result.columns) for name in result.columns]
     columns: list[list[str]] = []
     right: list[bool] = []
     for field, column in zip(result.table.schema, result.table.columns, strict=True):
         is_handle = field.name.endswith("_handle") and pyarrow.types.is_uint64(field.type)
         cell = partial(format_cell, unit=units.get(field.name), is_handle=is_handle)
-        # Of the texts in a column most are alike.
+        # Most texts of a column repeat.
         texts = cache(cell) if pyarrow.types.is_string(field.type) else cell
         columns.append(list(map(texts, column.to_pylist())))
         right.append(_is_number(field.type))
@@ -73,7 +73,7 @@ def _is_number(kind: pa.DataType) -> bool:
 
 
 def _aligned(name: str, column: Sequence[str], is_right: bool) -> tuple[Iterator[str], int]:
-    """Return the title and cells of a column, all of one width, and that width."""
+    """Return the title and cells of a column padded to one width, and that width."""
     texts = [name, *column]
     characters = "".join(texts)
     if characters.isascii() or all(cell_len(character) == 1 for character in set(characters)):

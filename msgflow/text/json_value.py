@@ -1,4 +1,4 @@
-"""Values as JSON and CSV can hold them, without loss for integers."""
+"""JSON values: what JSON and CSV can hold, with every digit of integers."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from decimal import Decimal
 from typing import Any
 
 
-def plain(value: Any) -> Any:
-    """Return `value` made of None, bool, int, float, str, list and dict only.
+def json_value(value: Any) -> Any:
+    """Return a value made of None, bool, int, float, str, list and dict only.
 
-    Bytes become hexadecimal text, whole decimals integers, NaN and infinities None.
+    Bytes become hexadecimal text, whole decimals become integers, NaN and infinities become None.
     """
     if value is None or isinstance(value, bool | int | str):
         return value
@@ -24,7 +24,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, datetime | date | time):
         return value.isoformat()
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): json_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [json_value(item) for item in value]
     return str(value)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from msgflow.query.show.wrapping import wrap
+from msgflow.text.wrapping import wrap
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from msgflow.query.show.human import format_cell, format_duration, short_symbol, shown_name
+from msgflow.text.values import column_title, format_cell, format_duration, short_symbol
 
 
 @pytest.mark.parametrize(
@@ -74,15 +74,15 @@ def test_a_map_has_its_keys() -> None:
 
 
 def test_the_suffix_goes_where_the_unit_stands_in_the_cells() -> None:
-    assert shown_name("median_ns", "ns", ("median_ns",)) == "median"
-    assert shown_name("start_ns", "epoch ns", ("start_ns",)) == "start"
-    assert shown_name("median_ns", None, ("median_ns",)) == "median_ns"
-    assert shown_name("delay_ns", "ns", ("delay", "delay_ns")) == "delay_ns"
+    assert column_title("median_ns", "ns", ("median_ns",)) == "median"
+    assert column_title("start_ns", "epoch ns", ("start_ns",)) == "start"
+    assert column_title("median_ns", None, ("median_ns",)) == "median_ns"
+    assert column_title("delay_ns", "ns", ("delay", "delay_ns")) == "delay_ns"
 
 
 def test_no_terminal_obeys_a_title() -> None:
-    assert shown_name("a\tb", None, ("a\tb",)) == "a\\tb"
-    assert shown_name("\x1b[31m_ns", "ns", ("\x1b[31m_ns",)) == "\\x1b[31m"
+    assert column_title("a\tb", None, ("a\tb",)) == "a\\tb"
+    assert column_title("\x1b[31m_ns", "ns", ("\x1b[31m_ns",)) == "\\x1b[31m"
 
 
 @pytest.mark.parametrize(

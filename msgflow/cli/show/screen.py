@@ -1,4 +1,4 @@
-"""The lines of what is shown of a result: a table or records, and the paths below."""
+"""Lines of a result on a terminal: headings, a table or records, and the paths below."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.query.show.present import GAP
-from msgflow.query.show.wrapping import ARROW, wrap, wrap_path
+from msgflow.cli.show.layout import GAP
+from msgflow.text.wrapping import ARROW, wrap, wrap_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from msgflow.query.show.present import Presentation, ShownColumn
+    from msgflow.cli.show.layout import Layout, ShownColumn
 
-# A path that begins or ends as one above is cut, where that spares more than so many steps.
+# A path that begins or ends like an earlier one is cut if that saves more than so many steps.
 _SPARED = 4
 
 
-def screen_lines(shown: Presentation, width: int) -> Iterator[str]:
-    """Yield the lines of what is shown, none longer than `width`."""
+def screen_lines(shown: Layout, width: int) -> Iterator[str]:
+    """Yield the lines of a layout, none longer than `width` cells."""
     for heading in shown.headings:
         yield from wrap(heading, width)
     if shown.columns and shown.columns[0].cells:
@@ -78,7 +78,7 @@ def _paths(paths: Sequence[str], width: int) -> Iterator[str]:
 
 
 def _shortened(steps: list[str], before: Sequence[list[str]]) -> str:
-    """Return a path without what it begins and ends with as one before it does."""
+    """Return a path without the begin and the end that it shares with earlier paths."""
     head, first = _most_shared(steps, before)
     tail, last = _most_shared(steps[head:], before, is_end=True)
     parts = steps[head : len(steps) - tail]
@@ -92,15 +92,15 @@ def _shortened(steps: list[str], before: Sequence[list[str]]) -> str:
 def _most_shared(
     steps: list[str], before: Sequence[list[str]], *, is_end: bool = False
 ) -> tuple[int, int]:
-    """Return how many steps another path begins or ends with too, at most, and its number.
+    """Return the most steps that an earlier path has in common at its begin or end, and its number.
 
-    0 where that spares too little.
+    The steps are 0 if cutting them saves too little.
     """
     most, of = 0, 0
     for number, other in enumerate(before, start=1):
         one, two = (steps[::-1], other[::-1]) if is_end else (steps, other)
         count = _shared(one, two)
-        # A topic may be called as its node: where to cut is clear only behind both.
+        # A topic may have the name of its node: the cut is clear only behind both.
         while 0 < count < len(two) and two[count] == two[count - 1]:
             count -= 1
         if count > max(most, _SPARED):

@@ -1,1 +1,0 @@
-"""Results for people: words for values, tables that fit a screen, text and HTML."""

@@ -1,0 +1,1 @@
+"""Text: values as people and JSON read them, and where lines are broken."""
