@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from msgflow.query.result import QueryResult
+    from msgflow.run.slice import Slice
 
 __all__ = [
     "Database",
@@ -33,6 +34,7 @@ __all__ = [
     "MsgflowError",
     "QueryError",
     "QueryResult",
+    "Slice",
     "TraceError",
     "UsageError",
     "__version__",
@@ -49,6 +51,7 @@ _HOME = {
     "TraceError": "msgflow.errors",
     "UsageError": "msgflow.errors",
     "QueryResult": "msgflow.query.result",
+    "Slice": "msgflow.run.slice",
 }
 
 

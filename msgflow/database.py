@@ -17,7 +17,8 @@ from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.query.result import QueryResult
 from msgflow.query.run import run_query
 from msgflow.query.selection import make_selection
-from msgflow.run.choice import choose_runs, read_runs
+from msgflow.run.choice import read_runs
+from msgflow.run.slice import Slice
 from msgflow.sql.failure import database_errors, first_line, in_words, out_of_memory
 from msgflow.sql.interrupt import interruptible
 
@@ -291,11 +292,7 @@ class Database:
 
         Args:
             name: as `list_queries` has it.
-            run: 'all', a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`.
             internal: show the rows of ROS's own topics and services too.
             node: rows that name one of these nodes.
             topic: rows that name one of these topics.
@@ -319,13 +316,14 @@ class Database:
         """
         header = load_query(name, public_names)
         connection = self.connection
+        part = Slice(run, start, end, skip_first)
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):
                 raise UsageError(
                     f"a path with a name goes without others — {path}",
                     "leave out --from, --to, --via and --without",
                 )
-            words = self._ask(lambda: self._named_path(header, path, Path(paths), run))
+            words = self._ask(lambda: self._named_path(header, path, Path(paths), part))
             via, without = words.pop("via", None), words.pop("without", None)
             parameters |= words
         selection = {
@@ -346,19 +344,14 @@ class Database:
                 connection,
                 header,
                 parameters,
-                run=run,
-                start=start,
-                end=end,
-                skip_first=skip_first,
+                part,
                 internal=internal,
                 selection=make_selection(selection),
             )
 
         return self._ask(ask)
 
-    def _named_path(
-        self, header: Header, name: str, file: Path, run: str | int | None
-    ) -> dict[str, str]:
+    def _named_path(self, header: Header, name: str, file: Path, part: Slice) -> dict[str, str]:
         """Return the words of `query` that a named path stands for."""
         from msgflow.paths import read_paths
 
@@ -366,7 +359,7 @@ class Database:
             raise UsageError(f"{header.name} has no paths — --path {name}", "leave it out")
         named = read_paths(file)
         path = named.named(name)
-        named.require(self.connection, choose_runs(read_runs(self.connection), run), path)
+        named.require(self.connection, part.runs(self.connection), path)
         return path.words()
 
     def flow(
@@ -486,11 +479,7 @@ class Database:
         """Return who sends what to whom, to be written as DOT, Mermaid, SVG or JSON.
 
         Args:
-            run: a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
             internal: show ROS's own topics and services too.
 
         Raises:
@@ -498,15 +487,11 @@ class Database:
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.export.graph import Graph
-        from msgflow.run.choice import choose_one
+        from msgflow.export.graph import read_graph
 
         connection = self.connection
-        one = self._ask(lambda: choose_one(read_runs(connection), run, "a graph"))
-        result = self.query(
-            "graph", run=one.run_id, start=start, end=end, skip_first=skip_first, internal=internal
-        )
-        return Graph(one, result, result.notes)
+        part = Slice(run, start, end, skip_first)
+        return self._ask(lambda: read_graph(connection, part, internal=internal))
 
     def compare(
         self,
@@ -586,11 +571,7 @@ class Database:
         Args:
             targets: YAML; docs/verify.md has its form.
             paths: the file with the paths that `targets` calls by their names.
-            run: a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
 
         Returns:
             The verdicts: one row per requirement and thing of the run that it is of.
@@ -605,21 +586,12 @@ class Database:
 
         file = read_targets(Path(targets))
         connection = self.connection
-        places = self._ask(lambda: self._places(file, Path(paths), run))
-        return self._ask(
-            lambda: verify(
-                connection,
-                file,
-                paths=places,
-                run=run,
-                start=start,
-                end=end,
-                skip_first=skip_first,
-            )
-        )
+        part = Slice(run, start, end, skip_first)
+        places = self._ask(lambda: self._places(file, Path(paths), part))
+        return self._ask(lambda: verify(connection, file, part, paths=places))
 
     def _places(
-        self, targets: TargetsFile, file: Path, run: str | int | None
+        self, targets: TargetsFile, file: Path, part: Slice
     ) -> dict[str, dict[str, list[str]]]:
         """Return topics and nodes of the paths that requirements call by their names."""
         from msgflow.paths import read_paths
@@ -628,7 +600,7 @@ class Database:
         if not called:
             return {}
         named = read_paths(file)
-        runs = choose_runs(read_runs(self.connection), run)
+        runs = part.runs(self.connection)
         found = {}
         for text in called:
             try:
@@ -647,8 +619,7 @@ class Database:
         """Return a file of requirements that a run meets, to review and to change.
 
         Args:
-            run: a name or an id; the latest run when None.
-            skip_first: seconds to leave out at the begin of the run.
+            run, skip_first: what to read, see `msgflow.Slice`; one run.
             margin: by how much more than measured is allowed, as a share.
 
         Raises:
@@ -656,13 +627,12 @@ class Database:
             QueryError: the database could not run a query.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.run.choice import choose_one
         from msgflow.verify.suggest import suggest_targets
 
         if not margin >= 0:
             raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")
         connection = self.connection
-        one = self._ask(lambda: choose_one(read_runs(connection), run, "a file of requirements"))
+        one = self._ask(lambda: Slice(run).one_run(connection, "a file of requirements"))
         results = {
             name: self.query(name, run=one.run_id, skip_first=skip_first).to_arrow().to_pylist()
             for name in ("e2e-latency", "timers", "publication-rate", "service-latency")
@@ -684,11 +654,8 @@ class Database:
 
         Args:
             path: the file; one that exists is replaced.
-            run: a name or an id; the latest run when None.
+            run, start, end: what to read, see `msgflow.Slice`; one run.
             compare: another run to compare it with.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time.
-            end: its end, likewise.
             path_text: only paths with this text in them: a topic, or a node.
             max_size: most bytes of the file; what does not fit is left out, which it says.
 
@@ -700,15 +667,14 @@ class Database:
         from msgflow.view.report import write_report
 
         connection = self.connection
+        part = Slice(run, start, end)
         return interruptible(
             connection,
             lambda: write_report(
                 connection,
                 Path(path),
-                run=run,
+                part,
                 compare=compare,
-                start=start,
-                end=end,
                 through=path_text,
                 max_size=max_size,
             ),
@@ -762,11 +728,10 @@ class Database:
             run: 'all', a name or an id; the latest run when None.
         """
         from msgflow.db.finding import find
-        from msgflow.run.choice import choose_runs
 
         connection = self.connection
-        run_ids = [chosen.run_id for chosen in choose_runs(self.runs(), run)]
-        return self._ask(lambda: find(connection, run_ids))
+        runs = self._ask(lambda: Slice(run).runs(connection))
+        return self._ask(lambda: find(connection, [one.run_id for one in runs]))
 
     def export_parquet(
         self,
@@ -784,12 +749,9 @@ class Database:
         Args:
             directory: created if missing.
             views: names of views; all when empty.
-            run: 'all', a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time. Links belong to the time of their cause; objects, runs and
-                traces are always written.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice` (all runs
+                without a `run`). Links belong to the time of their cause; objects, runs and traces
+                are always written.
             force: replace views that an export has written there.
 
         Raises:
@@ -800,11 +762,10 @@ class Database:
         from msgflow.export.views import select_views
 
         connection = self.connection
+        part = Slice(run, start, end, skip_first)
 
         def export() -> tuple[ExportedView, ...]:
-            selection = select_views(
-                connection, views, run=run, start=start, end=end, skip_first=skip_first
-            )
+            selection = select_views(connection, views, part)
             return export_parquet(connection, Path(directory), selection, force=force)
 
         return self._ask(export)
@@ -823,11 +784,7 @@ class Database:
         Args:
             what: 'paths' (latency of first arrivals), 'callbacks' (duration) or 'topics' (latency
                 from publication to take).
-            run: a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, a time that cannot be read, or nothing of that kind.
@@ -835,19 +792,12 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.series import What, read_series
-        from msgflow.run.choice import choose_one
-        from msgflow.run.window import time_window
 
         if what not in set(What):
             raise UsageError(f"there are no series of that — {what}", f"one of {', '.join(What)}")
         connection = self.connection
-
-        def read() -> QueryResult:
-            one = choose_one(read_runs(connection), run, "a file of series")
-            window = time_window((one,), start, end, skip_first)
-            return read_series(connection, one, What(what), window)
-
-        return self._ask(read)
+        part = Slice(run, start, end, skip_first)
+        return self._ask(lambda: read_series(connection, What(what), part))
 
     def export_perfetto(
         self,
@@ -862,11 +812,8 @@ class Database:
 
         Args:
             path: the file; one that exists is replaced.
-            run: a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time. What begins in the window is written.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
+                Everything that begins in the time window is written.
 
         Raises:
             UsageError: not exactly one run, a time that cannot be read, a file that cannot be
@@ -874,17 +821,10 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.perfetto import write_perfetto
-        from msgflow.run.choice import choose_one
-        from msgflow.run.window import time_window
 
         connection = self.connection
-
-        def export() -> PerfettoTrace:
-            one = choose_one(read_runs(connection), run, "a Perfetto trace")
-            window = time_window((one,), start, end, skip_first)
-            return write_perfetto(connection, Path(path), one, window)
-
-        return self._ask(export)
+        part = Slice(run, start, end, skip_first)
+        return self._ask(lambda: write_perfetto(connection, Path(path), part))
 
     def export_csv(
         self,
@@ -902,12 +842,9 @@ class Database:
         Args:
             directory: created if missing.
             views: names of views; all when empty.
-            run: 'all', a name or an id; the latest run when None.
-            start: begin of the time window: epoch ns, an offset from the run's start such as
-                '2.5s', or ISO time. Links belong to the time of their cause; objects, runs and
-                traces are always written.
-            end: its end, likewise.
-            skip_first: seconds to leave out at the begin of the run.
+            run, start, end, skip_first: what to read, see `msgflow.Slice` (all runs
+                without a `run`). Links belong to the time of their cause; objects, runs and traces
+                are always written.
             force: replace files that exist.
 
         Raises:
@@ -918,11 +855,10 @@ class Database:
         from msgflow.export.views import select_views
 
         connection = self.connection
+        part = Slice(run, start, end, skip_first)
 
         def export() -> tuple[ExportedView, ...]:
-            selection = select_views(
-                connection, views, run=run, start=start, end=end, skip_first=skip_first
-            )
+            selection = select_views(connection, views, part)
             return export_csv(connection, Path(directory), selection, force=force)
 
         return self._ask(export)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,16 +13,14 @@ from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
     DatabaseOption,
-    EndOption,
     MemoryLimitOption,
-    RunOption,
-    SkipFirstOption,
-    StartOption,
 )
+from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.export.series import What
 from msgflow.query.times import Times
+from msgflow.run.slice import ALL_RUNS, LATEST, Slice
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,13 +57,11 @@ def group() -> None:
 
 
 @app.command("parquet")
+@with_slice(run=_RunOption)
 def parquet(
     directory: _DirectoryArgument,
     views: _ViewsArgument = None,
-    run: _RunOption = "all",
-    start: StartOption = None,
-    end: EndOption = None,
-    skip_first: SkipFirstOption = None,
+    part: Slice = ALL_RUNS,
     force: _ForceOption = False,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
@@ -83,23 +80,18 @@ def parquet(
         exported = opened.export_parquet(
             directory,
             views or (),
-            run=run,
-            start=start,
-            end=end,
-            skip_first=skip_first,
+            **asdict(part),
             force=force,
         )
     _report(exported, directory)
 
 
 @app.command("csv")
+@with_slice(run=_RunOption)
 def csv(
     directory: _DirectoryArgument,
     views: _ViewsArgument = None,
-    run: _RunOption = "all",
-    start: StartOption = None,
-    end: EndOption = None,
-    skip_first: SkipFirstOption = None,
+    part: Slice = ALL_RUNS,
     force: _ForceOption = False,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
@@ -117,16 +109,14 @@ def csv(
         exported = opened.export_csv(
             directory,
             views or (),
-            run=run,
-            start=start,
-            end=end,
-            skip_first=skip_first,
+            **asdict(part),
             force=force,
         )
     _report(exported, directory)
 
 
 @app.command("perfetto")
+@with_slice()
 def perfetto(
     output: Annotated[
         Path,
@@ -138,10 +128,7 @@ def perfetto(
             rich_help_panel=OUTPUT,
         ),
     ] = Path("msgflow.pftrace"),
-    run: RunOption = None,
-    start: StartOption = None,
-    end: EndOption = None,
-    skip_first: SkipFirstOption = None,
+    part: Slice = LATEST,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -157,7 +144,7 @@ def perfetto(
     from msgflow.database import Database
 
     with Database(database, memory_limit=memory_limit) as opened:
-        trace = opened.export_perfetto(output, run=run, start=start, end=end, skip_first=skip_first)
+        trace = opened.export_perfetto(output, **asdict(part))
     print_runs([trace.run])
     print_status(
         f"{count(trace.slices, 'slice')}, {count(trace.arrows, 'arrow')},"
@@ -167,6 +154,7 @@ def perfetto(
 
 
 @app.command("series")
+@with_slice()
 def series(
     output: Annotated[
         Path,
@@ -181,10 +169,7 @@ def series(
             rich_help_panel=SELECTION,
         ),
     ] = What.PATHS,
-    run: RunOption = None,
-    start: StartOption = None,
-    end: EndOption = None,
-    skip_first: SkipFirstOption = None,
+    part: Slice = LATEST,
     times: Annotated[
         Times,
         typer.Option(
@@ -209,7 +194,7 @@ def series(
     if form not in (Format.CSV, Format.PARQUET):
         raise UsageError(f"series are written as CSV or Parquet — {output}", "FILE.csv")
     with Database(database, memory_limit=memory_limit) as opened:
-        result = opened.series(what, run=run, start=start, end=end, skip_first=skip_first)
+        result = opened.series(what, **asdict(part))
     print_result(result.with_times(times), form, output)
 
 

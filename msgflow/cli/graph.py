@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated
 
 import typer
@@ -9,22 +10,18 @@ import typer
 from msgflow.cli.options import (
     OUTPUT,
     DatabaseOption,
-    EndOption,
     InternalOption,
     OutputOption,
-    RunOption,
-    SkipFirstOption,
-    StartOption,
 )
+from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.export.graph import GraphFormat
+from msgflow.run.slice import LATEST, Slice
 
 
+@with_slice()
 def command(
-    run: RunOption = None,
-    start: StartOption = None,
-    end: EndOption = None,
-    skip_first: SkipFirstOption = None,
+    part: Slice = LATEST,
     internal: InternalOption = False,
     form: Annotated[
         GraphFormat | None,
@@ -51,9 +48,7 @@ def command(
 
     form = form or graph_format(output)
     with Database(database) as opened:
-        graph = opened.graph(
-            run=run, start=start, end=end, skip_first=skip_first, internal=internal
-        )
+        graph = opened.graph(**asdict(part), internal=internal)
     print_runs([graph.run])
     print_text(lambda width, color: graph.to(form), output)
     if not graph.rows:

@@ -39,35 +39,6 @@ RunOption = Annotated[
         rich_help_panel=SELECTION,
     ),
 ]
-StartOption = Annotated[
-    str | None,
-    typer.Option(
-        "--start",
-        metavar="TIME",
-        help="Start of the time window: seconds from the start of the run, 100ms, ISO time,"
-        " or epoch ns (16 digits or more)",
-        rich_help_panel=SELECTION,
-    ),
-]
-EndOption = Annotated[
-    str | None,
-    typer.Option(
-        "--end",
-        metavar="TIME",
-        help="End of the time window, in the same formats as --start",
-        rich_help_panel=SELECTION,
-    ),
-]
-SkipFirstOption = Annotated[
-    float | None,
-    typer.Option(
-        "--skip-first",
-        metavar="SECONDS",
-        min=0,
-        help="Skip the first SECONDS of the run (warm-up)",
-        rich_help_panel=SELECTION,
-    ),
-]
 InternalOption = Annotated[
     bool,
     typer.Option(

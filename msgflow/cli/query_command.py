@@ -13,19 +13,16 @@ from msgflow.cli.options import (
     OUTPUT,
     ColumnsOption,
     DatabaseOption,
-    EndOption,
     FormatOption,
     InternalOption,
     MemoryLimitOption,
     OutputOption,
-    RunOption,
-    SkipFirstOption,
-    StartOption,
     TimesOption,
     WideOption,
 )
 from msgflow.cli.selecting import selecting_options
 from msgflow.cli.show.layout import MOST_ROWS
+from msgflow.cli.slice_options import SLICE_OPTIONS
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.query.selection import KINDS
@@ -38,23 +35,20 @@ if TYPE_CHECKING:
 COMMON_OPTIONS = frozenset(
     (
         *KINDS,
+        *SLICE_OPTIONS,
         "path",
         "paths",
         "limit",
         "sort",
         "where",
         "db",
-        "end",
         "format",
         "help",
         "internal",
         "list",
         "memory_limit",
         "output",
-        "run",
         "show",
-        "skip_first",
-        "start",
         "times",
         "columns",
         "wide",
@@ -110,10 +104,7 @@ def build_command(header: Header) -> Any:
             for name, annotation in selecting_options(header).items()
             if name not in own_names
         ),
-        ("run", RunOption, None),
-        ("start", StartOption, None),
-        ("end", EndOption, None),
-        ("skip_first", SkipFirstOption, None),
+        *((name, annotation, None) for name, annotation in SLICE_OPTIONS.items()),
         ("internal", InternalOption, False),
         ("form", FormatOption, None),
         ("output", OutputOption, None),
@@ -156,10 +147,7 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:
         result = database.query(
             header.name,
-            run=given["run"],
-            start=given["start"],
-            end=given["end"],
-            skip_first=given["skip_first"],
+            **{name: given[name] for name in SLICE_OPTIONS},
             internal=given["internal"],
             **{word: given[word] for word in _SELECTING if given.get(word)},
             **own,

@@ -12,16 +12,16 @@ from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
     DatabaseOption,
-    EndOption,
     LakePageOption,
     LakeWhereOption,
     MemoryLimitOption,
     RunOption,
-    StartOption,
 )
+from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
+from msgflow.run.slice import LATEST, Slice
 
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(B|kB|KB|MB|GB)?")
 _UNITS = {None: 1, "B": 1, "kB": 1_000, "KB": 1_000, "MB": 1_000_000, "GB": 1_000_000_000}
@@ -29,6 +29,7 @@ _UNITS = {None: 1, "B": 1, "kB": 1_000, "KB": 1_000, "MB": 1_000_000, "GB": 1_00
 _MOST = 1_000_000_000
 
 
+@with_slice("start", "end")
 def command(
     output: Annotated[
         Path,
@@ -50,8 +51,7 @@ def command(
             rich_help_panel=SELECTION,
         ),
     ] = None,
-    start: StartOption = None,
-    end: EndOption = None,
+    part: Slice = LATEST,
     path: Annotated[
         str | None,
         typer.Option(
@@ -86,7 +86,7 @@ def command(
         raise UsageError(f"a report is a page: its name ends with .html — {output}", "-o FILE.html")
     size = read_size(max_size)
     if lake is not None:
-        if not run is compare is start is end is path is None:
+        if part.has_window or not run is compare is path is None:
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
@@ -101,7 +101,13 @@ def command(
     require_no_where(where)
     with Database(database, memory_limit=memory_limit) as opened:
         report = opened.report(
-            output, run=run, compare=compare, start=start, end=end, path_text=path, max_size=size
+            output,
+            run=run,
+            compare=compare,
+            start=part.start,
+            end=part.end,
+            path_text=path,
+            max_size=size,
         )
     print_runs([report.run])
     for note in report.notes:

@@ -6,8 +6,10 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, OutputOption, RunOption, SkipFirstOption
+from msgflow.cli.options import DatabaseOption, OutputOption
+from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
+from msgflow.run.slice import LATEST, Slice
 
 app = typer.Typer(help="Write requirements for verify.")
 
@@ -18,9 +20,9 @@ def group() -> None:
 
 
 @app.command("suggest")
+@with_slice("run", "skip_first")
 def suggest(
-    run: RunOption = None,
-    skip_first: SkipFirstOption = None,
+    part: Slice = LATEST,
     margin: Annotated[
         float,
         typer.Option(
@@ -38,5 +40,5 @@ def suggest(
     from msgflow.database import Database
 
     with Database(database) as opened:
-        text = opened.suggest_targets(run=run, skip_first=skip_first, margin=margin / 100)
+        text = opened.suggest_targets(run=part.run, skip_first=part.skip_first, margin=margin / 100)
     print_text(lambda width, color: text, output)

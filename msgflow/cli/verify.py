@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -12,14 +13,13 @@ from msgflow.cli.completion import complete
 from msgflow.cli.options import (
     OUTPUT,
     DatabaseOption,
-    EndOption,
     OutputOption,
-    SkipFirstOption,
-    StartOption,
     WideOption,
 )
+from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
 from msgflow.errors import ExitCode
+from msgflow.run.slice import LATEST, Slice
 
 
 class VerifyFormat(StrEnum):
@@ -32,24 +32,25 @@ class VerifyFormat(StrEnum):
     JUNIT = "junit"
 
 
+_RunArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="[RUN]",
+        help="Name or id of the run",
+        show_default="the latest",
+        autocompletion=complete("run"),
+    ),
+]
+
+
+@with_slice(run=_RunArgument)
 def command(
     targets: Annotated[Path, typer.Argument(metavar="TARGETS", help="Requirements, as YAML")],
-    run: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[RUN]",
-            help="Name or id of the run",
-            show_default="the latest",
-            autocompletion=complete("run"),
-        ),
-    ] = None,
+    part: Slice = LATEST,
     paths: Annotated[
         Path,
         typer.Option("--paths", metavar="FILE", help="The file with the paths that have names"),
     ] = Path(DEFAULT_PATHS),
-    start: StartOption = None,
-    end: EndOption = None,
-    skip_first: SkipFirstOption = None,
     allow_not_measured: Annotated[
         bool,
         typer.Option(
@@ -80,9 +81,7 @@ def command(
     from msgflow.export.formats import Format
 
     with Database(database) as opened:
-        verification = opened.verify(
-            targets, paths=paths, run=run, start=start, end=end, skip_first=skip_first
-        )
+        verification = opened.verify(targets, paths=paths, **asdict(part))
     if form is None and output is not None and output.suffix.lower() == ".xml":
         form = VerifyFormat.JUNIT
     if form is VerifyFormat.JUNIT:

@@ -1,4 +1,4 @@
-"""Which events of a set of traces are listed."""
+"""Selection of events by name and time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pyarrow.compute as pc
 
 from msgflow.errors import UsageError
 from msgflow.run.choice import Run
-from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
+from msgflow.run.slice import Slice
+from msgflow.run.window import WHOLE
 from msgflow.trace import COMMON_SCHEMA, PACKET, EventBatch
 
 if TYPE_CHECKING:
@@ -33,8 +34,7 @@ class Selection:
 
     Attributes:
         traces: the set.
-        lost_event_count: events that the tracer lost, as far as they have been read and whatever
-            their names, which nobody knows.
+        lost_event_count: events that the tracer lost, of any name, as far as they have been read.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class Selection:
                 )
         begins = [info.begin_ns for info in traces.traces if info.begin_ns is not None]
         whole = Run(0, "", min(begins, default=None))
-        self._start_ns, self._end_ns = time_window([whole], start, end)
+        self._window = Slice(start=start, end=end).window([whole])
         self._names = _matching(patterns, {n for t in traces.traces for n in t.event_names})
 
     def rounds(
@@ -85,7 +85,7 @@ class Selection:
             TraceError: a trace is damaged.
         """
         counts: Counter[str] = Counter()
-        if (self._start_ns, self._end_ns) == (MINIMUM_NS, MAXIMUM_NS):
+        if self._window == WHOLE:
             for _ in self._read({}, None):
                 pass
             for (_, name), count in self.traces.event_counts.items():
@@ -113,7 +113,7 @@ class Selection:
                 else:
                     events.append(item)
             begins = [item.batch.column(_TIME)[0].as_py() for item in events]
-            if begins and min(begins) >= self._end_ns:
+            if begins and min(begins) >= self._window.end_ns:
                 return
             events = [self._within_window(item) for item in events]
             events = [item for item in events if item.batch.num_rows]
@@ -123,12 +123,10 @@ class Selection:
     def _within_window(self, item: EventBatch) -> EventBatch:
         times = item.batch.column(_TIME)
         first, last = times[0].as_py(), times[-1].as_py()
-        if self._start_ns <= first and last < self._end_ns:
+        start_ns, end_ns = self._window.start_ns, self._window.end_ns
+        if start_ns <= first and last < end_ns:
             return item
-        inside = pc.and_(
-            pc.greater_equal(times, self._start_ns),
-            pc.less(times, self._end_ns),
-        )
+        inside = pc.and_(pc.greater_equal(times, start_ns), pc.less(times, end_ns))
         return EventBatch(item.name, item.batch.filter(inside), item.round)
 
 

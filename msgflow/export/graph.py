@@ -1,19 +1,24 @@
-"""The graph of nodes, topics and services: what `msgflow graph` writes, in any of its formats."""
+"""Graph of nodes, topics and services, in each format of `msgflow graph`."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from msgflow.export.formats import by_suffix
 from msgflow.export.graph_rows import GraphRows
+from msgflow.query.catalogue import load_query
+from msgflow.query.run import run_query
+from msgflow.run.slice import LATEST, Slice
 from msgflow.text.json_value import json_value
 from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import duckdb
 
 
 class GraphFormat(StrEnum):
@@ -102,3 +107,23 @@ class Graph(GraphRows):
 
     def _repr_html_(self) -> str:
         return self.to_svg()
+
+
+def read_graph(
+    connection: duckdb.DuckDBPyConnection, part: Slice = LATEST, *, internal: bool = False
+) -> Graph:
+    """Return the graph of a run.
+
+    Args:
+        connection: to a database with the public views.
+        part: one run, and the times to read.
+        internal: with ROS's own topics and services.
+
+    Raises:
+        UsageError: not exactly one run, or a time that cannot be read.
+        QueryError: the database could not run it.
+    """
+    run = part.one_run(connection, "a graph")
+    header = load_query("graph")
+    result = run_query(connection, header, {}, replace(part, run=run.run_id), internal=internal)
+    return Graph(run, result, result.notes)

@@ -1,4 +1,4 @@
-"""A run as a trace for the Perfetto UI, written event by event."""
+"""Perfetto trace of a run, for the Perfetto UI."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
+from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
@@ -16,10 +17,11 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.run.choice import Run
+    from msgflow.run.window import Window
 
 _AT_ONCE = 20_000
 _SEQUENCE = 1
-# Identities of things, by the code of the slice.
+# Ids of things, by the code of the Perfetto slice.
 _IDENTITIES = (
     "callback_instance_id",
     "publication_id",
@@ -41,7 +43,7 @@ class PerfettoTrace:
     Attributes:
         path: the file.
         run: what it is of.
-        slices: callbacks, publications, takes, requests, responses and states of executors in it.
+        slices: callbacks, publications, takes, requests, responses and states of executors.
         arrows: links between them.
         values: values of counters.
         gaps: stretches of a host in which something was not recorded.
@@ -56,19 +58,21 @@ class PerfettoTrace:
 
 
 def write_perfetto(
-    connection: duckdb.DuckDBPyConnection, path: Path, run: Run, window: tuple[int, int]
+    connection: duckdb.DuckDBPyConnection, path: Path, part: Slice = LATEST
 ) -> PerfettoTrace:
-    """Write a run as a Perfetto trace; it never lies in memory as a whole.
+    """Write a run as a Perfetto trace, event by event: memory never holds all of it.
 
     Args:
         connection: to a database with the public views.
         path: the file; one that exists is replaced.
-        run: the run.
-        window: (begin, end) in epoch ns; what begins in it is written, and of gaps what lies in it.
+        part: one run, and the times to write: everything that begins there, and gaps cut to them.
 
     Raises:
-        UsageError: the package perfetto is not installed, or the file cannot be written.
+        UsageError: not exactly one run, a time that cannot be read, a file that cannot be written,
+            or the package perfetto is not installed.
     """
+    run = part.one_run(connection, "a Perfetto trace")
+    window = part.window([run])
     try:
         from perfetto.trace_builder.proto_builder import StreamingTraceProtoBuilder
     except ImportError:
@@ -91,14 +95,14 @@ class _Writer:
         builder: Any,
         connection: duckdb.DuckDBPyConnection,
         run: Run,
-        window: tuple[int, int],
+        window: Window,
     ) -> None:
         from perfetto.protos.perfetto.trace import perfetto_trace_pb2
 
         self.builder = builder
         self.connection = connection
         self.run = run
-        self.bindings = {"run_id": run.run_id, "start_ns": window[0], "end_ns": window[1]}
+        self.bindings = {"run_id": run.run_id, **window.bindings}
         self.packets = perfetto_trace_pb2
 
     def rows(self, name: str) -> Iterator[dict[str, Any]]:

@@ -1,6 +1,6 @@
-"""Measured values side by side: a row per moment, a column per path, callback or topic.
+"""Series of measured values: a row per moment, a column per path, callback or topic.
 
-Programs that plot columns over a time column read that: PlotJuggler, spreadsheets.
+Programs that plot columns over a time column read them: PlotJuggler, spreadsheets.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from msgflow.errors import UsageError
 from msgflow.query.clocks import clock_notes
 from msgflow.query.result import QueryResult
+from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.header import Column
 from msgflow.sql.statement import program
 
@@ -19,9 +20,7 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.run.choice import Run
-
-# More columns than that no program shows.
+# No program shows more columns.
 MOST_COLUMNS = 1_000
 
 
@@ -41,21 +40,22 @@ _STATEMENTS = {
 
 
 def read_series(
-    connection: duckdb.DuckDBPyConnection, run: Run, what: What, window: tuple[int, int]
+    connection: duckdb.DuckDBPyConnection, what: What, part: Slice = LATEST
 ) -> QueryResult:
     """Return a row per moment (`at_ns`) with a column per thing that was measured [ns].
 
     Args:
         connection: to a database with the public views.
-        run: the run.
         what: latency of paths by the start of the flow, duration of callbacks by their start, or
             latency from publication to take of topics by the take.
-        window: (begin, end) in epoch ns.
+        part: one run, and the times to read.
 
     Raises:
-        UsageError: more things than columns that any program reads.
+        UsageError: not exactly one run, a time that cannot be read, or more things than any program
+            has columns for.
     """
-    bindings = {"runs": [run.run_id], "start_ns": window[0], "end_ns": window[1]}
+    run = part.one_run(connection, "a file of series")
+    bindings = {"runs": [run.run_id], **part.window([run]).bindings}
     table = program().run(connection, _STATEMENTS[what], bindings).to_arrow_table()
     subjects = sorted(table["subject"].unique().to_pylist())
     if len(subjects) > MOST_COLUMNS:

@@ -1,4 +1,4 @@
-"""The public views, chosen for an export, run by run, within a time window."""
+"""Public views to export: their rows, run by run, within a time window."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.nearest import nearest
-from msgflow.run.choice import choose_runs, read_runs
-from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
+from msgflow.run.window import WHOLE, Window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from msgflow.run.choice import Run
+    from msgflow.run.slice import Slice
 
 _ROWS_AT_ONCE = 100_000
 _VIEWS = """
@@ -32,11 +32,11 @@ WHERE views.database_name = current_database() AND views.schema_name = 'main'
 GROUP BY views.view_name
 ORDER BY views.view_name
 """
-# When the thing of a row happened, by the first of these columns that a view has …
+# The time of a row is the first of these columns that the view has …
 _TIMES = ("start_ns", "sent_ns", "taken_ns", "at_ns", "from_ns")
-# (of a request or response whose sending was not seen: when it was taken)
+# (for a request or response whose sending was not seen: when it was taken)
 _SENT = "coalesce(sent_ns, taken_ns)"
-# … else when the first of these things happened: of a link, its cause.
+# … else the time of the first of these things: for a link, of its cause.
 _THINGS = (
     ("request", _SENT),
     ("response", _SENT),
@@ -44,13 +44,13 @@ _THINGS = (
     ("publication", "start_ns"),
     ("take", "taken_ns"),
 )
-# Views whose times say how far a recording reaches: a window leaves them whole.
+# The times of these views say how far a recording reaches: a window does not cut them.
 _WHOLE = ("run", "trace")
 
 
 @dataclass(frozen=True)
 class ExportedView:
-    """What was written of one view.
+    """One view that was written.
 
     Attributes:
         view: its name.
@@ -65,39 +65,37 @@ class ExportedView:
 
 @dataclass(frozen=True)
 class Selection:
-    """Views to export, of which runs and which time.
+    """Views to export, with their runs and times.
 
     Attributes:
         views: names of the views, sorted.
         columns: columns of each.
-        runs: the chosen runs, at least one.
-        start_ns: begin of the time window.
-        end_ns: its end, exclusive.
+        runs: the runs, at least one.
+        window: the time window.
     """
 
     views: tuple[str, ...]
     columns: dict[str, list[str]]
     runs: tuple[Run, ...]
-    start_ns: int
-    end_ns: int
+    window: Window
 
     def read(
         self, connection: duckdb.DuckDBPyConnection, view: str, runs: Sequence[Run]
     ) -> pa.RecordBatchReader:
-        """Return the rows of a view, sorted by all columns, so that equal content comes equally."""
+        """Return the rows of a view, sorted by all columns: equal content gives equal rows."""
         # The name comes from the catalogue of the database, never from the user.
         text = f'SELECT * FROM main."{view}" WHERE list_contains($runs, run_id)'
         bindings: dict[str, object] = {"runs": [run.run_id for run in runs]}
         condition = self._condition(view)
         if condition is not None:
             text += f" AND {condition}"
-            bindings |= {"start_ns": self.start_ns, "end_ns": self.end_ns}
+            bindings |= self.window.bindings
         relation = connection.sql(f"{text} ORDER BY ALL", params=bindings)
         return relation.to_arrow_reader(_ROWS_AT_ONCE)
 
     def _condition(self, view: str) -> str | None:
         columns = self.columns[view]
-        if view in _WHOLE or (self.start_ns, self.end_ns) == (MINIMUM_NS, MAXIMUM_NS):
+        if view in _WHOLE or self.window == WHOLE:
             return None
         for name in _TIMES:
             if name in columns:
@@ -113,23 +111,14 @@ class Selection:
 
 
 def select_views(
-    connection: duckdb.DuckDBPyConnection,
-    views: Sequence[str] = (),
-    *,
-    run: str | int | None = "all",
-    start: str | int | None = None,
-    end: str | int | None = None,
-    skip_first: float | None = None,
+    connection: duckdb.DuckDBPyConnection, views: Sequence[str], part: Slice
 ) -> Selection:
-    """Return what to export.
+    """Return the views to export.
 
     Args:
         connection: to the database.
         views: names of views; all when empty.
-        run: 'all', a name or an id; the latest run when None.
-        start: begin of the time window: epoch ns, offset from the run's start, or ISO time.
-        end: its end, likewise.
-        skip_first: seconds to leave out at the begin of the run.
+        part: runs and times to export.
 
     Raises:
         UsageError: a view, run or time that does not exist, or no run at all.
@@ -140,9 +129,8 @@ def select_views(
             near = nearest(view, list(columns))
             hint = f"did you mean {' or '.join(near)}" if near else "msgflow db schema"
             raise UsageError(f"there is no such view — {view}", hint)
-    runs = choose_runs(read_runs(connection), run)
+    runs = part.runs(connection)
     if not runs:
         raise UsageError("the database holds no run yet", "msgflow ingest TRACE")
-    start_ns, end_ns = time_window(runs, start, end, skip_first)
     chosen = tuple(sorted(set(views)) or sorted(columns))
-    return Selection(chosen, columns, runs, start_ns, end_ns)
+    return Selection(chosen, columns, runs, part.window(runs))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.finding import Finding, find
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
+from msgflow.run.slice import Slice
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def _statement(name: str) -> Callable[[duckdb.DuckDBPyConnection, int], pa.Table
 
 def _query(name: str) -> Callable[[duckdb.DuckDBPyConnection, int], pa.Table]:
     def read(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
-        return run_query(con, load_query(name), {}, run=run_id, internal=True).to_arrow()
+        return run_query(con, load_query(name), {}, Slice(run_id), internal=True).to_arrow()
 
     return read
 

@@ -10,7 +10,8 @@ import duckdb
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.names import require_names
 from msgflow.query.run import bind
-from msgflow.run.choice import Run, choose_one, read_runs
+from msgflow.run.choice import Run, read_runs
+from msgflow.run.slice import Slice
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
 from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
 from msgflow.sql.statement import program
@@ -74,7 +75,7 @@ def find_start(
     Raises:
         UsageError: no such run or topic, a time that cannot be read, or no message then.
     """
-    one = choose_one(read_runs(connection), run, "a message")
+    one = Slice(run).one_run(connection, "a message")
     require_names(connection, (one,), "topic", [topic])
     at_ns = MINIMUM_NS if at is None else time_point(at, (one,), "--at")
     bindings = {"run_id": one.run_id, "topic": topic}

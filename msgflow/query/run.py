@@ -24,8 +24,8 @@ from msgflow.query.selection import (
     Selection,
     selected,
 )
-from msgflow.run.choice import Run, choose_runs, read_runs
-from msgflow.run.window import format_epoch, time_window
+from msgflow.run.slice import LATEST, Slice
+from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
 from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from msgflow.run.choice import Run
+    from msgflow.run.window import Window
     from msgflow.sql.header import Header, Param
     from msgflow.sql.value import Value
 
@@ -57,11 +59,8 @@ def run_query(
     connection: duckdb.DuckDBPyConnection,
     header: Header,
     parameters: Mapping[str, Value],
+    part: Slice = LATEST,
     *,
-    run: str | int | None = None,
-    start: str | int | None = None,
-    end: str | int | None = None,
-    skip_first: float | None = None,
     internal: bool = False,
     selection: Selection | None = None,
 ) -> QueryResult:
@@ -71,10 +70,7 @@ def run_query(
         connection: to a database with the public views.
         header: the query.
         parameters: its own parameters by name; text is read as the declared type.
-        run: 'all', a name or an id; the latest run when None.
-        start: begin of the time window: epoch ns, offset from the run's start, or ISO time.
-        end: its end, likewise.
-        skip_first: seconds to leave out at the begin of the run.
+        part: runs and times to read.
         internal: show the rows of ROS's own topics and services too.
         selection: which rows are wanted; all when None.
 
@@ -84,18 +80,14 @@ def run_query(
         QueryError: the database could not run it.
     """
     used = [parsed(connection, statement).named_parameters for statement in header.statements]
-    if not header.has_window and not start is end is skip_first is None:
+    if part.has_window and not header.has_window:
         raise UsageError(
             f"the query has no time window — {header.name}",
             "leave out --start, --end and --skip-first",
         )
-    runs = choose_runs(read_runs(connection), run)
-    start_ns, end_ns = time_window(runs, start, end, skip_first)
-    reserved: dict[str, Value] = {
-        "runs": [chosen.run_id for chosen in runs],
-        "start_ns": start_ns,
-        "end_ns": end_ns,
-    }
+    runs = part.runs(connection)
+    window = part.window(runs)
+    reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)
     require_places(connection, runs, own)
     require_identities(connection, runs, own)
@@ -124,8 +116,8 @@ def run_query(
     if not internal and INTERNAL_COLUMN in table.column_names:
         table = table.drop_columns([INTERNAL_COLUMN])
     notes = [] if runs else ["the database holds no run yet"]
-    if not start is end is skip_first is None:
-        notes += _beside(connection, runs, start_ns, end_ns)
+    if part.has_window:
+        notes += _beside(connection, runs, window)
     if table.num_rows < total:
         notes.append(f"{table.num_rows:,} of {total:,} rows")
     if hidden:
@@ -231,15 +223,15 @@ def _fit(command: str, param: Param, value: Value) -> Value:
 
 
 def _beside(
-    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], start_ns: int, end_ns: int
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], window: Window
 ) -> list[str]:
-    """Say so where a time window has nothing of any of the runs."""
+    """Return a note if the runs have nothing in the time window."""
     rows = connection.execute(
         "SELECT start_ns, end_ns FROM main.run WHERE list_contains($runs, run_id)",
         {"runs": [run.run_id for run in runs]},
     ).fetchall()
     seen = [(first, last) for first, last in rows if first is not None and last is not None]
-    if any(first < end_ns and last >= start_ns for first, last in seen):
+    if any(first < window.end_ns and last >= window.start_ns for first, last in seen):
         return []
     if len(runs) > 1:
         return ["none of the runs has anything in this time window"]

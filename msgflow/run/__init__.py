@@ -1,1 +1,1 @@
-"""Which runs, and between which times: what commands and queries are asked for."""
+"""Runs, their choice, and time windows: the slice of a database that is read."""

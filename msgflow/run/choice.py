@@ -1,4 +1,4 @@
-"""Which runs a command or query reads."""
+"""Runs of a database, and the choice of those that a command reads."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     import duckdb
 
 _INTEGER = re.compile(r"-?\d+")
-# More digits than any id or time has, which Python would refuse to read.
+# No id or time has more digits. Python refuses to read numbers with thousands of them.
 _MOST_DIGITS = 40
 
 
 @dataclass(frozen=True)
 class Run:
-    """One ingest, as far as choosing it needs to know.
+    """A run: one ingest.
 
     Attributes:
         run_id: its key.
@@ -46,12 +46,12 @@ def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
 
 
 def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:
-    """Return the runs that `wanted` means: 'all', an id, a name, a label, or None for the latest.
+    """Return the runs that a user wants.
 
     Args:
         runs: all runs of the database.
-        wanted: what the user said; a name wins over an id. A label, KEY=VALUE, means all runs that
-            have it.
+        wanted: 'all', a name, a label KEY=VALUE (all runs that have it), or an id; the latest run
+            when None. A name wins over an id.
 
     Raises:
         UsageError: no such run, or a name that several runs have.
@@ -79,12 +79,12 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
 
 
 def choose_one(runs: Sequence[Run], wanted: str | int | None, what: str) -> Run:
-    """Return the run that `wanted` means, for what can be of one only.
+    """Return the run that a user wants, for something that reads one run.
 
     Args:
         runs: all runs of the database.
-        wanted: what the user said, as of `choose_runs`.
-        what: what it is for, as in 'a graph'.
+        wanted: see `choose_runs`.
+        what: that something for messages, such as 'a graph'.
 
     Raises:
         UsageError: no such run, none at all, or several.
@@ -98,10 +98,10 @@ def choose_one(runs: Sequence[Run], wanted: str | int | None, what: str) -> Run:
 
 
 def integer(text: str) -> int | None:
-    """Return the number that a text writes out, None where it is none."""
+    """Return the integer in a text, None if the text is something else."""
     return int(text) if len(text) <= _MOST_DIGITS and _INTEGER.fullmatch(text) else None
 
 
 def is_run_name(text: str) -> bool:
-    """Tell whether a run may have this name: whether `choose_runs` can mean nothing else by it."""
+    """Tell whether a run may have this name: `choose_runs` reads it as a name only."""
     return text not in ("", "all") and not _INTEGER.fullmatch(text)

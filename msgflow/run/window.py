@@ -1,8 +1,9 @@
-"""Between which times a command or query reads."""
+"""Time window, and points in time as users write them."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 MINIMUM_NS = -(2**63)
 MAXIMUM_NS = 2**63 - 1
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-# What is less is no time since the epoch in nanoseconds: in 1970, it would be 12 days. As seconds
-# it would be 30 million years.
+# Smaller numbers are seconds: as nanoseconds since the epoch they would lie in the first 12 days of
+# 1970. As seconds, this number would be 30 million years.
 LEAST_EPOCH_NS = 10**15
 _OFFSET = re.compile(
     r"(?P<sign>\+?)(?P<number>\d{1,40}(?:\.\d{1,40})?)(?P<unit>ns|us|µs|ms|s|min|h)?"
@@ -36,56 +37,60 @@ _UNIT_NS = {
 _FRACTION = re.compile(r"(?P<head>.*:\d\d)\.(?P<fraction>\d{1,9})(?P<tail>.*)")
 
 
-def time_window(
-    runs: Sequence[Run],
-    start: str | int | None = None,
-    end: str | int | None = None,
-    skip_first: float | None = None,
-) -> tuple[int, int]:
-    """Return (start, end) in epoch ns, the widest possible where nothing is said.
+@dataclass(frozen=True)
+class Window:
+    """A time window.
 
-    Args:
-        runs: the chosen runs; times relative to a start need exactly one.
-        start: an offset from the run's start ('2.5' seconds, '100ms'), ISO time, or epoch ns (an
-            integer, or a text of 16 digits or more).
-        end: likewise.
-        skip_first: seconds to leave out at the begin of the run, in place of `start`.
-
-    Raises:
-        UsageError: a time that cannot be read or is out of range, or an empty window.
+    Attributes:
+        start_ns: its begin, epoch ns.
+        end_ns: its end, epoch ns, exclusive.
     """
-    if start is not None and skip_first is not None:
-        raise UsageError("--start and --skip-first exclude each other", "give one of them")
-    if skip_first is not None:
-        start_ns = _in_range(
-            _run_start(runs, "--skip-first") + _seconds_to_ns(skip_first),
-            skip_first,
-            "--skip-first",
-        )
-    else:
-        start_ns = MINIMUM_NS if start is None else time_point(start, runs, "--start")
-    end_ns = MAXIMUM_NS if end is None else time_point(end, runs, "--end")
-    if start_ns > end_ns:
-        raise UsageError(
-            f"the window ends before it starts — {start_ns} to {end_ns} ns",
-            "give an --end that is later than the start",
-        )
-    return start_ns, end_ns
+
+    start_ns: int = MINIMUM_NS
+    end_ns: int = MAXIMUM_NS
+
+    @property
+    def bindings(self) -> dict[str, int]:
+        """The parameters $start_ns and $end_ns of a statement."""
+        return {"start_ns": self.start_ns, "end_ns": self.end_ns}
+
+
+WHOLE = Window()
+"""The window without limits."""
 
 
 def time_point(text: str | int, runs: Sequence[Run], option: str) -> int:
-    """Return the point in time, in epoch ns, that `text` means.
+    """Return a point in time in epoch ns.
 
     Args:
         text: an offset from the run's start ('2.5' seconds, '100ms'), ISO time, or epoch ns (an
             integer, or a text of 16 digits or more).
         runs: the chosen runs; an offset needs exactly one.
-        option: what errors call it, such as '--start'.
+        option: its name in messages, such as '--start'.
 
     Raises:
         UsageError: it cannot be read or is out of range.
     """
     return _in_range(_read(text, runs, option), text, option)
+
+
+def skipped_to(seconds: float, runs: Sequence[Run]) -> int:
+    """Return the point in time, in epoch ns, that comes so many seconds after the start of a run.
+
+    Args:
+        seconds: 0 or more.
+        runs: exactly one run.
+
+    Raises:
+        UsageError: there is not one run, or the time is out of range.
+    """
+    # Some floats are too large for an integer of 64 bits.
+    start_ns = _run_start(runs, "--skip-first")
+    if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:
+        raise UsageError(
+            f"--skip-first takes the seconds to leave out — {seconds}", "--skip-first 2.5"
+        )
+    return _in_range(start_ns + round(seconds * 1_000_000_000), seconds, "--skip-first")
 
 
 def _in_range(time_ns: int, given: str | float, option: str) -> int:
@@ -94,15 +99,6 @@ def _in_range(time_ns: int, given: str | float, option: str) -> int:
             f"the time of {option} is out of range — {given}", "times reach from 1677 to 2262"
         )
     return time_ns
-
-
-def _seconds_to_ns(seconds: float) -> int:
-    # Not all that float can hold is a number that int can.
-    if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:
-        raise UsageError(
-            f"--skip-first takes the seconds to leave out — {seconds}", "--skip-first 2.5"
-        )
-    return round(seconds * 1_000_000_000)
 
 
 def _read(text: str | int, runs: Sequence[Run], option: str) -> int:
@@ -144,7 +140,7 @@ def _to_ns(number: str, unit: str) -> int:
 
 
 def _iso_ns(text: str) -> int:
-    # datetime keeps microseconds only: the fraction is taken off before and added afterwards.
+    # datetime keeps microseconds only: we take the fraction off before, and add it afterwards.
     nanoseconds = 0
     if match := _FRACTION.fullmatch(text):
         nanoseconds = int(match["fraction"].ljust(9, "0"))
@@ -156,7 +152,7 @@ def _iso_ns(text: str) -> int:
 
 
 def format_epoch(time_ns: int) -> str:
-    """Return a point in time as UTC in ISO 8601 with nanoseconds, which `--start` reads back."""
+    """Return a point in time as ISO 8601 in UTC with nanoseconds; `--start` reads it, too."""
     seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
     return f"{_second(seconds)}.{nanoseconds:09d}Z"
 

@@ -1,4 +1,4 @@
-"""Holds the requirements of a file against a run; named queries measure everything."""
+"""Verification of a run: its verdicts on the requirements of a file, measured by named queries."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.run import run_query
 from msgflow.query.selection import Selection, conditions_of
-from msgflow.run.choice import Run, choose_one, read_runs
-from msgflow.run.window import time_window
+from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 
     import duckdb
 
+    from msgflow.run.choice import Run
+    from msgflow.run.window import Window
     from msgflow.sql.value import Value
     from msgflow.verify.file import Requirement, Target, TargetsFile
     from msgflow.yaml_file import Text
@@ -110,31 +111,25 @@ class Verification:
 def verify(
     connection: duckdb.DuckDBPyConnection,
     targets: TargetsFile,
+    part: Slice = LATEST,
     *,
     paths: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
-    run: str | int | None = None,
-    start: str | int | None = None,
-    end: str | int | None = None,
-    skip_first: float | None = None,
 ) -> Verification:
     """Return whether a run meets the requirements of a file.
 
     Args:
         connection: to a database with the public views.
         targets: the requirements.
+        part: one run, and the times to read.
         paths: topics and nodes, or globs, by 'from', 'to', 'via' and 'without', of each path that
             the requirements call by a name.
-        run: a name or an id; the latest run when None.
-        start: begin of the time window: epoch ns, an offset from the run's start, or ISO time.
-        end: its end, likewise.
-        skip_first: seconds to leave out at the begin of the run.
 
     Raises:
         UsageError: no such run, time, topic, node, callback, service or process.
         QueryError: the database could not run a query.
     """
-    one = choose_one(read_runs(connection), run, "a verification")
-    window = time_window((one,), start, end, skip_first)
+    one = part.one_run(connection, "a verification")
+    window = part.window([one])
     _require_names(connection, targets, one)
     work = _Work(connection, one, window, paths or {})
     rows = [row for target in targets.targets for row in work.rows(target)]
@@ -159,7 +154,7 @@ class _Work:
         self,
         connection: duckdb.DuckDBPyConnection,
         run: Run,
-        window: tuple[int, int],
+        window: Window,
         paths: Mapping[str, Mapping[str, Sequence[str]]],
     ) -> None:
         self._connection = connection
@@ -251,17 +246,10 @@ class _Work:
             own |= {word: ",".join(places[word]) for word in ("from", "to") if word in places}
         elif target.kind == PATH:
             own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
-        start, end = self._window
-        has_window = header.has_window
-        result = run_query(
-            self._connection,
-            around,
-            own,
-            run=self._run.run_id,
-            start=start if has_window else None,
-            end=end if has_window else None,
-            internal=True,
-        )
+        part = Slice(self._run.run_id)
+        if header.has_window:
+            part = replace(part, start=self._window.start_ns, end=self._window.end_ns)
+        result = run_query(self._connection, around, own, part, internal=True)
         self.notes.update(dict.fromkeys(result.notes))
         rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
         return rows

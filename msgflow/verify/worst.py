@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     import duckdb
 
+    from msgflow.run.window import Window
+
 
 @dataclass(frozen=True)
 class Worst:
@@ -54,7 +56,7 @@ ORDER BY root_ns, root_id LIMIT 1
 
 
 def find_worst(
-    connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: tuple[int, int]
+    connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: Window
 ) -> Worst | None:
     """Return the worst case of a kind, None where there is none.
 
@@ -62,9 +64,9 @@ def find_worst(
         connection: to a database with the public views.
         kind: a key of KEYS that is not of flows.
         key: of the row that failed.
-        window: begin and end, epoch ns.
+        window: the time window.
     """
-    asked = {"key": key, "start_ns": window[0], "end_ns": window[1]}
+    asked = {"key": key, **window.bindings}
     rows = program().run(connection, f"worst_{kind}", asked).fetchall()
     return worst_of(rows[0]) if rows else None
 

@@ -9,6 +9,7 @@ import pyarrow as pa
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
+from msgflow.run.slice import Slice
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 
@@ -49,7 +50,7 @@ def critical_path(
         "detail": "full",
     }
     header = load_query("critical-path")
-    result = run_query(connection, header, asked, run=str(run.run_id))
+    result = run_query(connection, header, asked, Slice(str(run.run_id)))
     options = " ".join(
         f"--{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in asked.items()
     )

@@ -9,6 +9,7 @@ from pyarrow import compute
 
 from msgflow.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
+from msgflow.run.window import Window
 from msgflow.view.columns import encode
 from msgflow.view.critical import critical_path
 from msgflow.view.page_query import run_page_query
@@ -66,7 +67,7 @@ def write_flow_page(
     end = compute.max(compute.add(bars["start_at"], bars["length"])).as_py() or 0
     known = compute.is_valid(flow["from_id"])
     edges = flow.filter(known).select(["kind", "id", "from_kind", "from_id", "link_kind"])
-    window = (extent.origin_ns + begin - 1, extent.origin_ns + end + 1)
+    window = Window(extent.origin_ns + begin - 1, extent.origin_ns + end + 1)
     values = pages.recorded(connection, extent, window)
     rows = run_page_query(connection, "row", frame)
     links = run_page_query(connection, "links", values | {"limit": 2**40})

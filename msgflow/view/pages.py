@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import OrderedDict
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import duckdb
@@ -17,8 +17,8 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.clocks import clock_notes
 from msgflow.query.compare import compare
 from msgflow.query.run import run_query
-from msgflow.run.choice import choose_one, read_runs
-from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS
+from msgflow.run.slice import Slice
+from msgflow.run.window import WHOLE, Window
 from msgflow.view.columns import encode
 from msgflow.view.critical import critical_path
 from msgflow.view.page_query import page_query, run_page_query
@@ -61,6 +61,10 @@ class Extent:
     run: Run
     origin_ns: int
     length_ns: int
+
+    def frame(self, window: Window) -> Params:
+        """Return the parameters that most page queries need."""
+        return {"run": self.run.run_id, "origin_ns": self.origin_ns, **window.bindings}
 
 
 class Scratch:
@@ -114,15 +118,13 @@ class Pages:
     A pages object may be used by several threads, each with a connection of its own.
 
     Args:
-        window: (begin, end) in epoch ns that everything is cut to; the whole of each run when None.
-        most_bars: bars that a window may have to be sent one by one.
+        window: the times that pages show.
+        most_bars: bars of a window that are sent one by one.
     """
 
-    def __init__(
-        self, window: tuple[int, int] | None = None, *, most_bars: int = MOST_BARS
-    ) -> None:
+    def __init__(self, window: Window = WHOLE, *, most_bars: int = MOST_BARS) -> None:
         self._scratch = Scratch()
-        self._window = window or (MINIMUM_NS, MAXIMUM_NS)
+        self._window = window
         self._most_bars = most_bars
         self._kept: OrderedDict[str, bytes] = OrderedDict()
         self._guard = threading.Lock()
@@ -166,7 +168,7 @@ class Pages:
 
     def extent(self, connection: duckdb.DuckDBPyConnection, params: Params) -> Extent:
         """Return the run that the page is about."""
-        run = choose_one(read_runs(connection), params.get("run"), "a page")
+        run = Slice(params.get("run")).one_run(connection, "a page")
         ((start_ns, end_ns),) = connection.execute(
             "SELECT start_ns, end_ns FROM main.run WHERE run_id = ?", [run.run_id]
         ).fetchall()
@@ -174,13 +176,13 @@ class Pages:
             return Extent(run, 0, 0)
         return Extent(run, start_ns, max(end_ns - start_ns, 0))
 
-    def window(self, extent: Extent, params: Params) -> tuple[int, int]:
-        """Return (begin, end) in epoch ns that the page asks for, within what is to be shown."""
+    def window(self, extent: Extent, params: Params) -> Window:
+        """Return the window that the page asks for, within the times that pages show."""
         start = _whole(params, "start", 0)
         end = _whole(params, "end", extent.length_ns + 1)
-        return (
-            max(extent.origin_ns + start, self._window[0]),
-            min(extent.origin_ns + end, self._window[1]),
+        return Window(
+            max(extent.origin_ns + start, self._window.start_ns),
+            min(extent.origin_ns + end, self._window.end_ns),
         )
 
     def _run(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
@@ -192,12 +194,10 @@ class Pages:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
         extent = self.extent(connection, params)
-        has_window = header.has_window and self._window != (MINIMUM_NS, MAXIMUM_NS)
-        start, end = self._window if has_window else (None, None)
-        result = run_query(
-            connection, header, {}, run=str(extent.run.run_id), start=start, end=end,
-            internal=bool(params.get("internal")),
-        )  # fmt: skip
+        part = Slice(str(extent.run.run_id))
+        if header.has_window and self._window != WHOLE:
+            part = replace(part, start=self._window.start_ns, end=self._window.end_ns)
+        result = run_query(connection, header, {}, part, internal=bool(params.get("internal")))
         return encode(
             result.to_arrow(),
             meta={
@@ -254,29 +254,24 @@ class Pages:
         )
 
     def recorded(
-        self, connection: duckdb.DuckDBPyConnection, extent: Extent, window: tuple[int, int]
+        self, connection: duckdb.DuckDBPyConnection, extent: Extent, window: Window
     ) -> Params:
         """Return the parameters that all queries of a window need."""
-        values = {
-            "run": extent.run.run_id,
-            "origin_ns": extent.origin_ns,
-            "start_ns": window[0],
-            "end_ns": window[1],
-        }
+        values = extent.frame(window)
         recorded: Params = run_page_query(connection, "recorded_window", values).to_pylist()[0]
         return values | recorded
 
     def _segments(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
         window = self.window(extent, params)
-        width = max(window[1] - window[0], 1)
+        width = max(window.end_ns - window.start_ns, 1)
         bin_ns = -(-width // MOST_BINS)
         level_ns = extent.length_ns // LEVEL_BINS + 1
         values = self.recorded(connection, extent, window)
         # Whether a window is drawn one by one does not depend on what is known of the run already.
         (count,) = run_page_query(connection, "segment_count", values)["count"].to_pylist()
-        meta: dict[str, Any] = {"start": window[0] - extent.origin_ns, "count": count}
-        meta["end"] = window[1] - extent.origin_ns
+        meta: dict[str, Any] = {"start": window.start_ns - extent.origin_ns, "count": count}
+        meta["end"] = window.end_ns - extent.origin_ns
         if count <= self._most_bars:
             table = run_page_query(connection, "segments", values)
         elif bin_ns < level_ns:
@@ -291,7 +286,7 @@ class Pages:
     def fill_level(self, connection: duckdb.DuckDBPyConnection, extent: Extent) -> None:
         """Count the bars of the whole run in bins, once."""
         level_ns = extent.length_ns // LEVEL_BINS + 1
-        whole = (extent.origin_ns, extent.origin_ns + extent.length_ns + 1)
+        whole = Window(extent.origin_ns, extent.origin_ns + extent.length_ns + 1)
         self._scratch.fill(
             "level",
             extent.run.run_id,
@@ -326,12 +321,7 @@ class Pages:
 
     def fill_flows(self, connection: duckdb.DuckDBPyConnection, extent: Extent) -> None:
         """Find the flows of all paths of a run, once."""
-        values = {
-            "run": extent.run.run_id,
-            "origin_ns": extent.origin_ns,
-            "start_ns": self._window[0],
-            "end_ns": self._window[1],
-        }
+        values = extent.frame(self._window)
         self._scratch.fill(
             "flow", extent.run.run_id, lambda: run_page_query(connection, "path_flow", values)
         )
@@ -342,13 +332,7 @@ class Pages:
 
     def _plain(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        start_ns, end_ns = self.window(extent, params)
-        values = {
-            "run": extent.run.run_id,
-            "origin_ns": extent.origin_ns,
-            "start_ns": start_ns,
-            "end_ns": end_ns,
-        }
+        values = extent.frame(self.window(extent, params))
         table = run_page_query(connection, name, values | _own(name, params, values))
         return encode(table, units=_units(name))
 

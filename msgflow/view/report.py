@@ -15,8 +15,8 @@ from pyarrow import compute
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.run.choice import choose_one, read_runs
-from msgflow.run.window import MAXIMUM_NS, MINIMUM_NS, time_window
+from msgflow.run.slice import LATEST, Slice
+from msgflow.run.window import WHOLE, Window
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
@@ -60,11 +60,9 @@ class Report:
 def write_report(
     connection: duckdb.DuckDBPyConnection,
     path: Path,
+    part: Slice = LATEST,
     *,
-    run: str | int | None = None,
     compare: str | int | None = None,
-    start: str | int | None = None,
-    end: str | int | None = None,
     through: str | None = None,
     max_size: int,
     progress: Callable[[str], None] = lambda step: None,
@@ -74,10 +72,8 @@ def write_report(
     Args:
         connection: to a database with the public views.
         path: the file; one that exists is replaced.
-        run: a name or an id; the latest run when None.
+        part: one run, and the times to show.
         compare: another run to compare with; the page is left out when None.
-        start: begin of the time window: epoch ns, an offset from the run's start, or ISO time.
-        end: its end, likewise.
         through: only paths with this text in them, and the rows of the timeline on these.
         max_size: most bytes of the file.
         progress: called with what is being done.
@@ -86,8 +82,8 @@ def write_report(
         UsageError: no such run or path, a window without events, or a size that is too small.
         QueryError: the database could not run a query.
     """
-    one = choose_one(read_runs(connection), run, "a report")
-    window = time_window((one,), start, end)
+    one = part.one_run(connection, "a report")
+    window = part.window([one])
     maker = _Maker(connection, str(one.run_id), window, through, max_size, progress)
     try:
         content, notes = maker.make(None if compare is None else str(compare))
@@ -109,7 +105,7 @@ class _Maker:
         self,
         connection: duckdb.DuckDBPyConnection,
         run: str,
-        window: tuple[int, int],
+        window: Window,
         through: str | None,
         max_size: int,
         progress: Callable[[str], None],
@@ -134,14 +130,14 @@ class _Maker:
 
     def make(self, compare: str | None) -> tuple[str, list[str]]:
         extent = self.extent
-        begin = max(extent.origin_ns, self.window[0])
-        end = min(extent.origin_ns + extent.length_ns + 1, self.window[1])
+        begin = max(extent.origin_ns, self.window.start_ns)
+        end = min(extent.origin_ns + extent.length_ns + 1, self.window.end_ns)
         if extent.length_ns and begin >= end:
             raise UsageError(
                 "nothing was recorded in the time window",
                 f"the run lasts {extent.length_ns / 1e9:.3f} s: --start 0s",
             )
-        if self.window != (MINIMUM_NS, MAXIMUM_NS):
+        if self.window != WHOLE:
             self.notes.append(
                 f"Only {(begin - extent.origin_ns) / 1e9:.3f} s to"
                 f" {(end - extent.origin_ns) / 1e9:.3f} s of the run are in this report"
@@ -160,14 +156,14 @@ class _Maker:
             self.progress("comparison")
             self.compared(compare, chosen)
         self.progress("timeline")
-        head = self.timeline((begin, end), chosen)
+        head = self.timeline(Window(begin, end), chosen)
         return single_page(self.parts, head), self.notes
 
     def runs(self, compare: str | None) -> None:
         table = run_page_query(self.connection, "run", {})
         wanted = [self.extent.run.run_id]
         if compare is not None:
-            other = choose_one(read_runs(self.connection), compare, "the other side")
+            other = Slice(compare).one_run(self.connection, "the other side")
             if other.run_id == self.extent.run.run_id:
                 raise UsageError("a run is not compared with itself", "give another --compare")
             wanted.insert(0, other.run_id)
@@ -227,7 +223,7 @@ class _Maker:
             self.parts.add(f"critical?id={take}&kind=take", content)
 
     def compared(self, compare: str, chosen: list[int]) -> None:
-        other = choose_one(read_runs(self.connection), compare, "the other side")
+        other = Slice(compare).one_run(self.connection, "the other side")
         for what in ("paths", "callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
         params = {"run": str(other.run_id)}
@@ -248,12 +244,12 @@ class _Maker:
             if number not in chosen:
                 self.keep("path_share", path=number)
 
-    def timeline(self, window: tuple[int, int], paths: list[int]) -> dict[str, Any]:
+    def timeline(self, window: Window, paths: list[int]) -> dict[str, Any]:
         """Keep bars, arrows and links; return the head that says which."""
         origin = self.extent.origin_ns
         head: dict[str, Any] = {
-            "start": window[0] - origin,
-            "end": window[1] - origin,
+            "start": window.start_ns - origin,
+            "end": window.end_ns - origin,
             "stretches": [],
             "count": 0,
         }
@@ -277,15 +273,13 @@ class _Maker:
         if count * _BYTES_PER_BAR <= room or rows is not None:
             self.stretch(0, window, rows)
             self.edges(window)
-            head["stretches"] = [
-                {"start": window[0] - origin, "end": window[1] - origin, "whole": True}
-            ]
+            head["stretches"] = [{"start": head["start"], "end": head["end"], "whole": True}]
         else:
             self.thinned(head, window, room, count)
         head["notes"] = self.notes
         return head
 
-    def stretch(self, place: int, window: tuple[int, int], rows: list[int] | None) -> int:
+    def stretch(self, place: int, window: Window, rows: list[int] | None) -> int:
         values = self.pages.recorded(self.connection, self.extent, window)
         table = run_page_query(self.connection, "segments", values)
         links = run_page_query(self.connection, "links", values | {"limit": 2**40})
@@ -302,7 +296,7 @@ class _Maker:
         self.parts.add(f"links?place={place}", encode(links))
         return int(table.num_rows)
 
-    def edges(self, window: tuple[int, int]) -> None:
+    def edges(self, window: Window) -> None:
         values = self.pages.recorded(self.connection, self.extent, window)
         self.parts.add("edge?", encode(run_page_query(self.connection, "edge", values)))
 
@@ -324,13 +318,13 @@ class _Maker:
             or (row["kind"] == "thread" and row["process_id"] in processes)
         ]
 
-    def thinned(self, head: dict[str, Any], window: tuple[int, int], room: int, count: int) -> None:
+    def thinned(self, head: dict[str, Any], window: Window, room: int, count: int) -> None:
         """Keep the run in bins, and single bars around the slowest flows."""
         origin = self.extent.origin_ns
         values = self.pages.recorded(self.connection, self.extent, window)
         bins = LEVEL_BINS
         while True:
-            bin_ns = (window[1] - window[0]) // bins + 1
+            bin_ns = (window.end_ns - window.start_ns) // bins + 1
             table = run_page_query(self.connection, "segments", values | {"bin_ns": bin_ns})
             level = encode(table, units={})
             size = len(gzip.compress(level, compresslevel=1)) * 4 // 3
@@ -340,18 +334,19 @@ class _Maker:
         self.parts.add("level?", level)
         head["bin"] = bin_ns
         room -= size
-        each = window[1] - window[0]
+        each = window.end_ns - window.start_ns
         share = max(room, 0) / (count * _BYTES_PER_BAR)
-        middles = self.slow_moments()[:_STRETCHES] or [window[0] - origin + each // 2]
+        middles = self.slow_moments()[:_STRETCHES] or [window.start_ns - origin + each // 2]
         length = max(int(each * share / len(middles)), 1)
-        stretches: list[tuple[int, int]] = []
+        stretches: list[Window] = []
         for middle in sorted(middles):
-            low = max(middle + origin - length // 4, window[0])
-            high = min(low + length, window[1])
-            if stretches and low <= stretches[-1][1]:
-                stretches[-1] = (stretches[-1][0], max(high, stretches[-1][1]))
+            low = max(middle + origin - length // 4, window.start_ns)
+            high = min(low + length, window.end_ns)
+            if stretches and low <= stretches[-1].end_ns:
+                last = stretches[-1]
+                stretches[-1] = Window(last.start_ns, max(high, last.end_ns))
             else:
-                stretches.append((low, high))
+                stretches.append(Window(low, high))
         held = sum(self.stretch(place, stretch, None) for place, stretch in enumerate(stretches))
         tables = [self._edge_table(stretch) for stretch in stretches]
         edges = pa.concat_tables(tables)
@@ -362,7 +357,8 @@ class _Maker:
         ]
         self.parts.add("edge?", encode(distinct.sort_by(order)))
         head["stretches"] = [
-            {"start": low - origin, "end": high - origin} for low, high in stretches
+            {"start": stretch.start_ns - origin, "end": stretch.end_ns - origin}
+            for stretch in stretches
         ]
         self.notes.append(
             f"The timeline of {count:,} bars does not fit into {self.max_size:,} bytes: single bars"
@@ -372,7 +368,7 @@ class _Maker:
             " --start and --end, keep more; msgflow ui has everything."
         )
 
-    def _edge_table(self, window: tuple[int, int]) -> pa.Table:
+    def _edge_table(self, window: Window) -> pa.Table:
         values = self.pages.recorded(self.connection, self.extent, window)
         return run_page_query(self.connection, "edge", values)
 

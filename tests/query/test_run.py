@@ -9,6 +9,7 @@ from msgflow.db import objects
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.run import bind, run_query
 from msgflow.query.selection import make_selection
+from msgflow.run.slice import Slice
 from msgflow.sql.header import Header, parse
 from msgflow.sql.value import Value
 
@@ -61,8 +62,9 @@ def header(text: str) -> Header:
 
 
 def starts(con: duckdb.DuckDBPyConnection, **options: object) -> list[int]:
-    parameters = options.pop("parameters", {})
-    result = run_query(con, header(QUERY), parameters, **options)  # type: ignore[arg-type]
+    parameters, internal = options.pop("parameters", {}), options.pop("internal", False)
+    part = Slice(**options)  # type: ignore[arg-type]
+    result = run_query(con, header(QUERY), parameters, part, internal=internal)  # type: ignore[arg-type]
     return result.to_arrow()["start_ns"].to_pylist()
 
 
@@ -81,10 +83,10 @@ def test_runs_window_and_parameters_select(connection: duckdb.DuckDBPyConnection
 
 
 def test_internal_rows_are_hidden_and_counted(connection: duckdb.DuckDBPyConnection) -> None:
-    hidden = run_query(connection, header(QUERY), {}, run="first")
+    hidden = run_query(connection, header(QUERY), {}, Slice("first"))
     assert hidden.columns == ("topic", "start_ns")
     assert hidden.notes == ["1 internal row is hidden; --internal shows them"]
-    shown = run_query(connection, header(QUERY), {}, run="first", internal=True)
+    shown = run_query(connection, header(QUERY), {}, Slice("first"), internal=True)
     assert shown.to_arrow()["is_internal"].to_pylist() == [False, False, True, None]
     assert shown.notes == []
 
@@ -121,7 +123,7 @@ def test_a_window_without_data_is_said(
     end: int | None,
     note: str | None,
 ) -> None:
-    result = run_query(connection, header(QUERY), {}, run=run, start=start, end=end, internal=True)
+    result = run_query(connection, header(QUERY), {}, Slice(run, start, end), internal=True)
     assert [said.startswith(note or "") for said in result.notes] == (
         [] if note is None else [True]
     )
@@ -130,7 +132,7 @@ def test_a_window_without_data_is_said(
 def test_a_query_without_a_window_refuses_one(connection: duckdb.DuckDBPyConnection) -> None:
     plain = header("-- name: example\n-- description: x\nSELECT 1 AS one\n")
     with pytest.raises(UsageError, match="no time window — example"):
-        run_query(connection, plain, {}, skip_first=0.0)
+        run_query(connection, plain, {}, Slice(skip_first=0.0))
     assert run_query(connection, plain, {}).to_arrow().to_pylist() == [{"one": 1}]
 
 
@@ -189,7 +191,7 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
 def test_topics_of_the_chosen_runs_will_do(
     with_topics: duckdb.DuckDBPyConnection, run: str, given: dict[str, Value]
 ) -> None:
-    (row,) = run_query(with_topics, header(TOPICS), given, run=run).to_arrow().to_pylist()
+    (row,) = run_query(with_topics, header(TOPICS), given, Slice(run)).to_arrow().to_pylist()
     assert (row["first"], row["last"]) == (given["from"], given.get("to"))
 
 
@@ -215,7 +217,7 @@ def test_topics_that_no_run_has_are_refused(
     hint: str,
 ) -> None:
     with pytest.raises(UsageError) as raised:
-        run_query(with_topics, header(TOPICS), given, run=run)
+        run_query(with_topics, header(TOPICS), given, Slice(run))
     assert raised.value.message == f"there is no such topic or node {message}"
     assert hint in (raised.value.hint or "")
 
@@ -229,11 +231,11 @@ def test_takes_that_no_run_has_are_refused(connection: duckdb.DuckDBPyConnection
         "SELECT $flow AS id, $runs AS runs\n"
     )
     for run, given in (("first", 7), ("all", 8), ("first", None)):
-        (row,) = run_query(connection, query, {"flow": given}, run=run).to_arrow().to_pylist()
+        (row,) = run_query(connection, query, {"flow": given}, Slice(run)).to_arrow().to_pylist()
         assert row["id"] == given
     for run, number, where in (("first", 8, "the run"), ("all", 9, "these runs")):
         with pytest.raises(UsageError) as raised:
-            run_query(connection, query, {"flow": number}, run=run)
+            run_query(connection, query, {"flow": number}, Slice(run))
         assert raised.value.message == f"there is no such take in {where} — {number}"
         assert "msgflow query flows" in (raised.value.hint or "")
 
@@ -255,7 +257,7 @@ def test_names_that_no_run_has_are_refused(
             with_topics,
             header(NAMED.format(kind=kind)),
             {},
-            run="first",
+            Slice("first"),
             selection=make_selection({kind: name}),
         )
     assert raised.value.message == message
@@ -267,7 +269,7 @@ def test_a_pattern_may_be_a_name_with_brackets(
     """Of a process whose node is not known: as a pattern it would be one of these characters."""
     query = header(NAMED.format(kind="node").replace("'/a'", "'[main 812]'"))
     selection = make_selection({"node": "[main 812]"})
-    assert len(run_query(with_topics, query, {}, run="first", selection=selection)) == 1
+    assert len(run_query(with_topics, query, {}, Slice("first"), selection=selection)) == 1
 
 
 def test_a_run_without_topics_has_none(with_topics: duckdb.DuckDBPyConnection) -> None:
@@ -313,10 +315,10 @@ def test_clocks_that_differ_are_named(
         " that are not synchronised: times between their hosts are not comparable;"
         f" msgflow clocks apply {'FILE' if in_vain else 'messages'}"
     )
-    result = run_query(connection, header(query), {}, run=run, internal=True)
+    result = run_query(connection, header(query), {}, Slice(run), internal=True)
     assert result.notes == [f"{note}{rest}" for note in notes]
-    assert run_query(connection, header(QUERY), {}, run=run, internal=True).notes == []
-    late = run_query(connection, header(query), {"channel": "/none"}, run=run)
+    assert run_query(connection, header(QUERY), {}, Slice(run), internal=True).notes == []
+    late = run_query(connection, header(query), {"channel": "/none"}, Slice(run))
     assert late.notes == []
 
 
@@ -348,7 +350,7 @@ def test_how_far_corrected_clocks_can_be_wrong_is_said(
     for bound in bounds:
         connection.execute("INSERT INTO clock_uncertainty VALUES (2, ?)", [bound])
     query = QUERY.replace("-- param", "-- note: clocks\n-- param")
-    result = run_query(connection, header(query), {}, run="first", internal=True)
+    result = run_query(connection, header(query), {}, Slice("first"), internal=True)
     assert result.notes == [
         f"times between alpha, inside and beta are {wrong_by}; msgflow clocks show"
     ]
@@ -418,7 +420,7 @@ def test_a_query_goes_in_steps(connection: duckdb.DuckDBPyConnection) -> None:
     assert [step.table for step in asked.steps] == ["example_message", "example_topic"]
     assert asked.has_window
     for _ in range(2):  # What was made on the way is gone.
-        result = run_query(connection, asked, {"least": "/b"}, run="first")
+        result = run_query(connection, asked, {"least": "/b"}, Slice("first"))
         assert result.to_arrow()["topic"].to_pylist() == ["/b", "/c"]
     assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
 
@@ -426,5 +428,5 @@ def test_a_query_goes_in_steps(connection: duckdb.DuckDBPyConnection) -> None:
 def test_a_step_that_fails_leaves_nothing(connection: duckdb.DuckDBPyConnection) -> None:
     asked = header(STEPS.replace("DISTINCT run_id", "DISTINCT error('no') AS run_id"))
     with pytest.raises(QueryError, match="no"):
-        run_query(connection, asked, {}, run="first")
+        run_query(connection, asked, {}, Slice("first"))
     assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()

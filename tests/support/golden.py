@@ -32,7 +32,7 @@ import io
 import json
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,7 @@ from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.run import run_query
+from msgflow.run.slice import Slice
 from msgflow.sql.statement import program
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Scratch
@@ -66,7 +67,7 @@ BASE: dict[str, dict[str, str]] = {
 SYSTEMS = Path(__file__).parent / "systems"
 FLOW = {header.name for header in objects.load("flow")}
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
-_SELECTION = ("run", "start", "end", "skip_first", "internal")
+_SLICE = tuple(field.name for field in fields(Slice))
 _PAGE_QUERY = "view."
 _PROGRAM = "program."
 _HEALTH = ("finding.", "check.")
@@ -386,8 +387,9 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
         source = name if case.parameters is None else f"{name}({arguments})"
         relation = connection.sql(f"SELECT * FROM {source} ORDER BY ALL", params=given)
         return QueryResult(relation.to_arrow_table())
-    selection = {key: given.pop(key) for key in _SELECTION if key in given}
-    return run_query(connection, load_query(name), given, **selection)
+    part = Slice(**{key: given.pop(key) for key in _SLICE if key in given})
+    internal = given.pop("internal", False)
+    return run_query(connection, load_query(name), given, part, internal=internal)
 
 
 def _make_scratch(connection: duckdb.DuckDBPyConnection, case: Case) -> None:

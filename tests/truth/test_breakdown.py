@@ -13,6 +13,7 @@ from thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.run import run_query
+from msgflow.run.slice import Slice
 from msgflow.sim import scenarios
 
 WINDOW = "-9223372036854775807, 9223372036854775807"
@@ -199,6 +200,6 @@ def measured(
     con: duckdb.DuckDBPyConnection, query: str, start: int | None = None
 ) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = (
-        run_query(con, load_query(query), {}, start=start).to_arrow().to_pylist()
+        run_query(con, load_query(query), {}, Slice(start=start)).to_arrow().to_pylist()
     )
     return rows

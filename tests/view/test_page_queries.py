@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -240,7 +241,7 @@ def test_arrows_of_a_window_are_those_that_overlap_it(demo: Path, read: Read) ->
             window = pages.window(extent, {"start": start, "end": start + width})
             known = pages.recorded(connection, extent, window) | {"limit": 10**6}
             found = run_page_query(connection, "links", known).to_pylist()
-            begin, end = (at - extent.origin_ns for at in window)
+            begin, end = (at - extent.origin_ns for at in astuple(window))
             assert found == [
                 arrow
                 for arrow in arrows
