@@ -15,7 +15,7 @@ from msgflow.default_files import DEFAULT_PATHS
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.query.result import QueryResult
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.choice import read_runs
 from msgflow.run.slice import Slice
@@ -627,7 +627,7 @@ class Database:
             QueryError: the database could not run a query.
             DatabaseError: the file cannot be opened.
         """
-        from msgflow.verify.suggest import suggest_targets
+        from msgflow.verify.suggestion import suggest_targets
 
         if not margin >= 0:
             raise UsageError(f"a margin is 0 or more — {margin}", "0.2 allows a fifth more")

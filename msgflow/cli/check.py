@@ -48,7 +48,7 @@ def command(
     """
     from msgflow.cli.output import count, print_lines, print_status
     from msgflow.database import Database
-    from msgflow.query.clocks import clock_verdicts
+    from msgflow.query.clock_notes import clock_verdicts
 
     with Database(database, memory_limit=memory_limit) as opened:
         findings = opened.findings(run=run)

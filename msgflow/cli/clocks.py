@@ -70,7 +70,7 @@ def show(
     """List the clocks and their corrections (the query clocks), and say whether times compare."""
     from msgflow.cli.output import print_result, print_status
     from msgflow.database import Database
-    from msgflow.query.clocks import clock_verdicts
+    from msgflow.query.clock_notes import clock_verdicts
 
     with Database(database) as opened:
         result = opened.query("clocks", run=run)

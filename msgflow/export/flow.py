@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from msgflow.export.flow_rows import FlowRows
 from msgflow.export.flow_tree import tree_text
-from msgflow.query.clocks import clock_notes
+from msgflow.export.flow_vertices import FlowVertices
+from msgflow.query.clock_notes import clock_notes
 from msgflow.query.flow import STEPS_PER_MESSAGE, flow_parameters, read_steps, require_start
 from msgflow.text.json_value import json_value
 
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.export.flow_rows import Row
+    from msgflow.export.flow_vertices import Row
     from msgflow.query.flow import Start
     from msgflow.sql.value import Value
 
 
 @dataclass(frozen=True, repr=False)
-class Flow(FlowRows):
+class Flow(FlowVertices):
     """What one message caused and was caused by. Times are integers in nanoseconds.
 
     `str` of it is the tree that `msgflow flow` prints.
 
-    Its attributes are those of `FlowRows`.
+    Its attributes are those of `FlowVertices`.
     """
 
     def to_arrow(self) -> pa.Table:

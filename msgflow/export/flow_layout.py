@@ -6,12 +6,12 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from msgflow.export.flow_rows import NOT_TAKEN
+from msgflow.export.flow_vertices import NOT_TAKEN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from msgflow.export.flow_rows import FlowRows, Key, Row
+    from msgflow.export.flow_vertices import FlowVertices, Key, Row
 
 
 @dataclass(eq=False)
@@ -59,7 +59,7 @@ class Branch:
     children: list[Branch] = field(default_factory=list)
 
 
-def lay_out_flow(flow: FlowRows) -> list[Branch]:
+def lay_out_flow(flow: FlowVertices) -> list[Branch]:
     """Return one branch for each item to begin with: all that have no cause, or the start."""
     items = _items(flow)
     if flow.direction == "both":
@@ -78,7 +78,7 @@ def walk(branches: Sequence[Branch]) -> Iterator[Branch]:
         stack += reversed(branch.children)
 
 
-def _items(flow: FlowRows) -> dict[Key, Item]:
+def _items(flow: FlowVertices) -> dict[Key, Item]:
     calls: dict[Key, list[Row]] = defaultdict(list)
     for edge in flow.edges:
         if edge["link_kind"] == "callback":

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from msgflow.export.flow_layout import Branch, Item, Line
-    from msgflow.export.flow_rows import FlowRows, Row
+    from msgflow.export.flow_vertices import FlowVertices, Row
 
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 44
@@ -49,7 +49,7 @@ _NOT_SEEN = {
 
 
 def tree_text(
-    flow: FlowRows, *, is_absolute: bool = False, width: int | None = None, color: bool = False
+    flow: FlowVertices, *, is_absolute: bool = False, width: int | None = None, color: bool = False
 ) -> str:
     """Return the tree of a flow; a line begins with its time since the first line.
 
@@ -100,7 +100,7 @@ class _Painter:
     """Turns items into styled text."""
 
     def __init__(
-        self, flow: FlowRows, branches: Sequence[Branch], is_absolute: bool, width: int
+        self, flow: FlowVertices, branches: Sequence[Branch], is_absolute: bool, width: int
     ) -> None:
         self.flow = flow
         self.is_absolute = is_absolute

@@ -8,9 +8,9 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from msgflow.export.formats import by_suffix
-from msgflow.export.graph_rows import GraphRows
+from msgflow.export.graph_vertices import GraphVertices
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import LATEST, Slice
 from msgflow.text.json_value import json_value
 from msgflow.text.values import printable
@@ -50,10 +50,10 @@ def graph_format(path: Path | None) -> GraphFormat:
 
 
 @dataclass(frozen=True, repr=False)
-class Graph(GraphRows):
+class Graph(GraphVertices):
     """Nodes, topics and services of a run, and what passes between them.
 
-    Its attributes are those of `GraphRows`.
+    Its attributes are those of `GraphVertices`.
     """
 
     def to_json(self) -> str:

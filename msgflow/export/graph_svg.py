@@ -9,7 +9,7 @@ from xml.sax.saxutils import escape, quoteattr
 from msgflow.text.values import printable
 
 if TYPE_CHECKING:
-    from msgflow.export.graph_rows import Edge, GraphRows, Vertex
+    from msgflow.export.graph_vertices import Edge, GraphVertices, Vertex
 
 _LETTER = 6.6
 _LINE = 14
@@ -67,7 +67,7 @@ class _Box:
         return len(self.lines) * _LINE + 12
 
 
-def svg(graph: GraphRows) -> str:
+def svg(graph: GraphVertices) -> str:
     """Return a graph as SVG. It holds no scripts and fetches nothing."""
     boxes = {vertex.id: _box(vertex) for vertex in graph.vertices.values()}
     _choose_columns(boxes, graph.edges)
@@ -138,7 +138,7 @@ def _choose_columns(boxes: dict[str, _Box], edges: list[Edge]) -> None:
                 boxes[target].column = max(boxes[target].column, boxes[key].column + 1)
 
 
-def _choose_lanes(boxes: dict[str, _Box], graph: GraphRows) -> list[str | None]:
+def _choose_lanes(boxes: dict[str, _Box], graph: GraphVertices) -> list[str | None]:
     """Give each executor a lane; a topic or service lies in that of who sends to it."""
     executors = sorted(
         graph.executors,

@@ -9,7 +9,7 @@ from msgflow.text.values import printable
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from msgflow.export.graph_rows import Edge, GraphRows, Vertex
+    from msgflow.export.graph_vertices import Edge, GraphVertices, Vertex
 
 _SHAPES = {
     "node": "shape=box",
@@ -25,7 +25,7 @@ _BOXES = {"node": ("[", "]"), "topic": ("([", "])"), "service": ("{{", "}}")}
 _PLAIN = set(" /_.,:-·%()→+*")
 
 
-def dot(graph: GraphRows) -> str:
+def dot(graph: GraphVertices) -> str:
     """Return a graph in the language of Graphviz: executors are clusters."""
     lines = ["digraph msgflow {", "  rankdir=LR;", "  node [fontname=sans, fontsize=10];"]
     lines.append("  edge [fontname=sans, fontsize=8];")
@@ -53,7 +53,7 @@ def dot(graph: GraphRows) -> str:
     return "\n".join([*lines, "}"])
 
 
-def mermaid(graph: GraphRows) -> str:
+def mermaid(graph: GraphVertices) -> str:
     """Return a graph as a Mermaid flowchart: executors are subgraphs."""
     lines = ["flowchart LR"]
     for number, (title, members) in enumerate(_groups(graph)):
@@ -77,7 +77,7 @@ def _arrow(edge: Edge) -> str:
     return "==>" if edge.is_service else "-->"
 
 
-def _groups(graph: GraphRows) -> Iterator[tuple[str | None, list[Vertex]]]:
+def _groups(graph: GraphVertices) -> Iterator[tuple[str | None, list[Vertex]]]:
     """Yield each executor with its nodes, and at last what belongs to none."""
     for executor, title in graph.executors.items():
         yield title, [one for one in graph.vertices.values() if one.executor == executor]

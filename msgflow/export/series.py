@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.query.clocks import clock_notes
+from msgflow.query.clock_notes import clock_notes
 from msgflow.query.result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.header import Column

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db.finding import Finding, find
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.sql.statement import program
 

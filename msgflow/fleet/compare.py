@@ -47,7 +47,7 @@ class FleetComparison:
         Args:
             only_different: leave out paths without a proven difference.
         """
-        from msgflow.query.changes import changes
+        from msgflow.query.comparison_summary import changes
 
         return changes(self.result, only_different)
 

@@ -31,7 +31,7 @@ from msgflow.fleet.layout import VIEWS
 from msgflow.nearest import nearest
 from msgflow.query.catalogue import query_names
 from msgflow.query.result import QueryResult
-from msgflow.query.run import bind, without_counts
+from msgflow.query.runner import bind, without_counts
 from msgflow.query.selection import CUT_COLUMN, INTERNAL_COLUMN, make_selection, selected
 from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, relations_of

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from msgflow.links.apply import AppliedLinks, apply_links, declare_links
+from msgflow.links.annotations import AppliedLinks, apply_links, declare_links
 from msgflow.links.file import DeclaredLink, LinksFile, read_links
-from msgflow.links.suggest import suggest_links
+from msgflow.links.suggestion import suggest_links
 
 __all__ = [
     "AppliedLinks",

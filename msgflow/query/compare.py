@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.clocks import clock_notes
+from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
-from msgflow.query.run import bind
+from msgflow.query.runner import bind
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.resources import resource_directory
 from msgflow.run.choice import Run, choose_one, read_runs
@@ -103,7 +103,7 @@ class Comparison:
         Args:
             only_different: leave out those of which no difference is shown.
         """
-        from msgflow.query.changes import changes
+        from msgflow.query.comparison_summary import changes
 
         return changes(self.result, only_different)
 

@@ -9,7 +9,7 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.query.names import require_names
-from msgflow.query.run import bind
+from msgflow.query.runner import bind
 from msgflow.run.choice import Run, read_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point

@@ -1,4 +1,4 @@
-"""Names that a user gives: those that no run has are refused, not answered with nothing."""
+"""Names and ids that a user gives: an error says which of them no run has."""
 
 from __future__ import annotations
 
@@ -43,6 +43,11 @@ _KNOWN = {
     "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow query graph"),
 }
 _WORDS = {"place": "topic or node"}
+# Parameters that take an id, in every query that has them: what the id is of, and the command that lists them.
+_IDS = {
+    "flow": ("take", "take_id", "msgflow query flows"),
+    "callback_id": ("callback", "callback_id", "msgflow query executor-wait"),
+}
 _MISSING = """
 SELECT each
 FROM (SELECT unnest($patterns::VARCHAR[]) AS each)
@@ -104,6 +109,32 @@ def require_names(
     is_pattern = any(character in name for character in "*?[")
     problem = f"no {what} in {where} fits" if is_pattern else f"there is no such {what} in {where}"
     raise UsageError(f"{problem} — {name}", _hint(name, known, what, source))
+
+
+def require_ids(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
+) -> None:
+    """Raise unless every id among the parameters of a query is one of the chosen runs.
+
+    Args:
+        connection: to a database with the public views.
+        runs: the chosen runs; where there are none, every id will do.
+        bound: all parameters of the query.
+
+    Raises:
+        UsageError: the runs have no such thing.
+    """
+    for key, (view, column, hint) in _IDS.items():
+        number = bound.get(key)
+        if number is None or not runs:
+            continue
+        known = connection.execute(
+            f"SELECT 1 FROM main.{view} WHERE {column} = $number AND list_contains($runs, run_id)",
+            {"number": number, "runs": [run.run_id for run in runs]},
+        ).fetchall()
+        if not known:
+            where = "the run" if len(runs) == 1 else "these runs"
+            raise UsageError(f"there is no such {view} in {where} — {number}", f"see {hint}")
 
 
 def _hint(name: str, known: list[str], what: str, source: str) -> str:

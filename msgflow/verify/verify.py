@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 from msgflow.nearest import nearest
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
 from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
-from msgflow.verify.worst import FLOWS, KEYS, Worst, find_worst, worst_of
+from msgflow.verify.worst_case import FLOWS, KEYS, WorstCase, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -261,7 +261,7 @@ class _Work:
         condition = requirement.condition
         value = row[f"value_{place}"]
         verdict = Verdict.NOT_MEASURED
-        worst: Worst | None = None
+        worst: WorstCase | None = None
         if value is not None:
             verdict = Verdict.PASSED if condition.holds(value) else Verdict.FAILED
             if condition.is_exceeded_by(value) and metric.worst:
@@ -301,11 +301,11 @@ class _Work:
             "line": requirement.line,
         }
 
-    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> Worst | None:
+    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> WorstCase | None:
         if kind not in FLOWS:
-            return find_worst(self._connection, kind, key, self._window)
+            return find_worst_case(self._connection, kind, key, self._window)
         rows = self._ask("flows", FLOWS[kind], target, {"subject": subject})
-        return worst_of(list(rows[0].values())) if rows else None
+        return worst_case_of(list(rows[0].values())) if rows else None
 
 
 def _require_names(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> None:

@@ -11,7 +11,7 @@ from msgflow.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
 from msgflow.run.window import Window
 from msgflow.view.columns import encode
-from msgflow.view.critical import critical_path
+from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Pages
 from msgflow.view.single_page import Parts, single_page

@@ -14,13 +14,13 @@ import pyarrow as pa
 from msgflow.db.finding import find
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
-from msgflow.query.clocks import clock_notes
+from msgflow.query.clock_notes import clock_notes
 from msgflow.query.compare import compare
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.view.columns import encode
-from msgflow.view.critical import critical_path
+from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import page_query, run_page_query
 
 if TYPE_CHECKING:

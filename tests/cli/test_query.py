@@ -10,7 +10,7 @@ from typer.testing import Result
 
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.query.catalogue import load_queries, query_names
-from msgflow.query.run import RESERVED
+from msgflow.query.runner import RESERVED
 
 Msgflow = Callable[..., Result]
 

@@ -18,7 +18,7 @@ from staged_events import Thread
 from msgflow.database import Database
 from msgflow.db.derive import derive
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 
 TALKER, RELAY, SINK, LOGGER = (Thread(pid) for pid in (100, 200, 300, 400))
 EVERYTHING = "-9223372036854775808, 9223372036854775807"

@@ -14,7 +14,7 @@ from staged_events import Thread
 from msgflow.db.derive import derive
 from msgflow.db.sandbox import open_memory
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 
 TALKER, HEARER = Thread(100), Thread(200)
 LENGTH, MESSAGES = 1500, 4000

@@ -15,7 +15,7 @@ from thorough import examples
 from msgflow.db.tables import STORE
 from msgflow.ingest.catalogue import load
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 
 SEEDS = st.integers(0, 10_000)
 FEW = settings(

@@ -17,7 +17,7 @@ from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.ingest.calls import TAKEN_APART
-from msgflow.query.run import RESERVED
+from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.statement import program
 

@@ -48,7 +48,7 @@ from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.sql.statement import program
 from msgflow.view.page_query import run_page_query

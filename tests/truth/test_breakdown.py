@@ -12,7 +12,7 @@ from ingested import Ingested
 from thorough import few
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.sim import scenarios
 

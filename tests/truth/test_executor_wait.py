@@ -12,7 +12,7 @@ from ingested import ingest_one
 from thorough import few
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.sim import executor_thread, simulate
 from msgflow.sim.objects import TimerObject
 from msgflow.sim.transport import Middleware

@@ -13,7 +13,7 @@ import pytest
 from ingested import ingest_one
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.sim import (
     Executor,
     Group,

@@ -16,7 +16,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.sim import simulate
 from msgflow.verify import Verification
 from msgflow.verify.metrics import SUBJECTS
-from msgflow.verify.worst import KEYS
+from msgflow.verify.worst_case import KEYS
 
 Check = Callable[[str], Verification]
 # What the golden cases of the queries say of the same system.

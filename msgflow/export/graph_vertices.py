@@ -86,7 +86,7 @@ def _brief(duration_ns: int) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class GraphRows:
+class GraphVertices:
     """Nodes, topics and services of a run, and what passes between them.
 
     Attributes:

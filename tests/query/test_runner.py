@@ -7,7 +7,7 @@ import pytest
 
 from msgflow.db import objects
 from msgflow.errors import QueryError, UsageError
-from msgflow.query.run import bind, run_query
+from msgflow.query.runner import bind, run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Header, parse

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.run import run_query
+from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query

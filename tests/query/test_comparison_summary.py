@@ -6,7 +6,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from msgflow.query.changes import changes
+from msgflow.query.comparison_summary import changes
 from msgflow.query.result import QueryResult
 from msgflow.run.choice import Run
 

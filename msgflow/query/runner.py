@@ -11,9 +11,8 @@ import duckdb
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.nearest import nearest
-from msgflow.query.clocks import clock_notes
-from msgflow.query.identities import require_identities
-from msgflow.query.names import PLACE_PARAMETERS, require_names, require_places
+from msgflow.query.clock_notes import clock_notes
+from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.result import QueryResult
 from msgflow.query.selection import (
     COUNTS,
@@ -90,7 +89,7 @@ def run_query(
     reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)
     require_places(connection, runs, own)
-    require_identities(connection, runs, own)
+    require_ids(connection, runs, own)
     selection = selection or Selection()
     sql, chosen = selected(header, selection, internal)
     for kind, names in selection.names().items():

@@ -36,7 +36,7 @@ NOT_TAKEN = "not_taken"
 
 
 @dataclass(frozen=True, repr=False)
-class FlowRows:
+class FlowVertices:
     """What one message caused and was caused by. Times are integers in nanoseconds.
 
     Attributes:

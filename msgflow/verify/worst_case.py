@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Worst:
+class WorstCase:
     """The worst case.
 
     Attributes:
@@ -55,9 +55,9 @@ ORDER BY root_ns, root_id LIMIT 1
 }
 
 
-def find_worst(
+def find_worst_case(
     connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: Window
-) -> Worst | None:
+) -> WorstCase | None:
     """Return the worst case of a kind, None where there is none.
 
     Args:
@@ -68,11 +68,11 @@ def find_worst(
     """
     asked = {"key": key, **window.bindings}
     rows = program().run(connection, f"worst_{kind}", asked).fetchall()
-    return worst_of(rows[0]) if rows else None
+    return worst_case_of(rows[0]) if rows else None
 
 
-def worst_of(row: Sequence[Any]) -> Worst:
+def worst_case_of(row: Sequence[Any]) -> WorstCase:
     """Return the worst case that a row of such a statement tells."""
     duration, at_ns, identity, kind = row
     words = ["msgflow", "flow", f"--{kind.replace('_', '-')}", str(identity)]
-    return Worst(duration, at_ns, shlex.join(words))
+    return WorstCase(duration, at_ns, shlex.join(words))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db.derive import derive
 from msgflow.db.runs import change_runs
-from msgflow.links.match import match_links
+from msgflow.links.matching import match_links
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.links.file import LinksFile
-    from msgflow.links.match import MatchedLink
+    from msgflow.links.matching import MatchedLink
     from msgflow.run.choice import Run
 
 
