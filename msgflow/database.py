@@ -759,16 +759,9 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.parquet import export_parquet
-        from msgflow.export.views import select_views
 
-        connection = self.connection
         part = Slice(run, start, end, skip_first)
-
-        def export() -> tuple[ExportedView, ...]:
-            selection = select_views(connection, views, part)
-            return export_parquet(connection, Path(directory), selection, force=force)
-
-        return self._ask(export)
+        return self._export(export_parquet, directory, views, part, force)
 
     def series(
         self,
@@ -852,14 +845,25 @@ class Database:
             DatabaseError: the file cannot be opened.
         """
         from msgflow.export.csv_files import export_csv
+
+        part = Slice(run, start, end, skip_first)
+        return self._export(export_csv, directory, views, part, force)
+
+    def _export(
+        self,
+        write: Callable[..., tuple[ExportedView, ...]],
+        directory: str | Path,
+        views: Sequence[str],
+        part: Slice,
+        force: bool,
+    ) -> tuple[ExportedView, ...]:
         from msgflow.export.views import select_views
 
         connection = self.connection
-        part = Slice(run, start, end, skip_first)
 
         def export() -> tuple[ExportedView, ...]:
             selection = select_views(connection, views, part)
-            return export_csv(connection, Path(directory), selection, force=force)
+            return write(connection, Path(directory), selection, force=force)
 
         return self._ask(export)
 

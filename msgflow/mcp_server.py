@@ -345,7 +345,7 @@ def _rows(result: QueryResult, limit: int = DEFAULT_ROWS) -> str:
     most = _capped(limit)
     said: dict[str, Any] = {}
     if result.runs:
-        said["runs"] = [f"{run.name} ({run.run_id})" for run in result.runs]
+        said["runs"] = [run.title for run in result.runs]
     notes = list(result.notes)
     if len(result) > most:
         notes.append(f"only the first {most} of {len(result):,} rows; limit allows {MOST_ROWS:,}")

@@ -1,4 +1,4 @@
-"""What somebody may have meant who mistyped a name."""
+"""Suggestions for mistyped names."""
 
 from __future__ import annotations
 
@@ -12,14 +12,20 @@ if TYPE_CHECKING:
 
 
 def nearest(name: str, known: Sequence[str]) -> list[str]:
-    """Return at most three of `known` that `name` may be a slip of, the most similar first."""
+    """Return at most three known names that are like `name`, the most similar first."""
     similar = difflib.get_close_matches(name, known, n=3, cutoff=0.55)
     longer = [other for other in known if name and name in other and other not in similar]
     return (similar + longer)[:3]
 
 
+def did_you_mean(name: str, known: Sequence[str], otherwise: str) -> str:
+    """Return a hint with the known names that are like `name`, or another hint if none is."""
+    near = nearest(name, known)
+    return f"did you mean {' or '.join(near)}" if near else otherwise
+
+
 def column_named(name: str, columns: Sequence[str]) -> str:
-    """Return the column that a user means by `name`, which may lack the `_ns` at its end.
+    """Return the column with a name; the `_ns` at its end may be missing.
 
     Raises:
         UsageError: there is no such column; the message names similar ones.
@@ -27,8 +33,7 @@ def column_named(name: str, columns: Sequence[str]) -> str:
     for known in (name, f"{name}_ns"):
         if known in columns:
             return known
-    near = nearest(name, columns)
     raise UsageError(
         f"there is no such column — {name}",
-        f"did you mean {' or '.join(near)}" if near else f"the columns are {', '.join(columns)}",
+        did_you_mean(name, columns, f"the columns are {', '.join(columns)}"),
     )

@@ -1,7 +1,9 @@
-"""YAML files that users write by hand: every mistake is named with its line."""
+"""YAML files that users write by hand: errors name the line; lines and names are written back."""
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _WIDTH = 80
+_PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
+_WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,13 @@ def line_of(node: Any) -> int:
 def is_null(node: Any) -> bool:
     """Tell whether a node says nothing."""
     return str(node.tag) == "tag:yaml.org,2002:null"
+
+
+def quoted(text: str) -> str:
+    """Return a text as YAML writes it: in quotes, unless it is plainly a name."""
+    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
+        return text
+    return json.dumps(text, ensure_ascii=False)
 
 
 def list_lines(key: str, items: Sequence[str]) -> list[str]:

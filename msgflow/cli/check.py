@@ -54,7 +54,7 @@ def command(
         findings = opened.findings(run=run)
         runs = opened.query("clocks", run=run).runs if opened.runs() else ()
         verdicts = clock_verdicts(opened.connection, runs, only_several=True)
-        names = {known.run_id: f"{known.name} ({known.run_id})" for known in opened.runs()}
+        names = {known.run_id: known.title for known in opened.runs()}
     labels = names if run == "all" and len(names) > 1 else {}
     print_lines(_json(findings) if form is CheckFormat.JSON else _text(findings, labels))
     numbers = [

@@ -124,7 +124,7 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
 def print_runs(runs: Sequence[Run]) -> None:
     """Print which runs were read, if any."""
     if runs:
-        names = ", ".join(f"{run.name} ({run.run_id})" for run in runs)
+        names = ", ".join(run.title for run in runs)
         _labelled("run" if len(runs) == 1 else "runs", typer.colors.CYAN, names)
 
 

@@ -126,7 +126,7 @@ def remove(
             runs = choose_runs(opened.runs(), run)
             # While somebody thinks, others can use the database.
             opened.close()
-            if not confirm(f"remove {', '.join(f'{one.name} ({one.run_id})' for one in runs)}?"):
+            if not confirm(f"remove {', '.join(one.title for one in runs)}?"):
                 print_status("nothing was removed")
                 raise typer.Exit(ExitCode.INTERRUPTED)
         for one in opened.remove_runs(run):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
+from msgflow.nearest import did_you_mean
 from msgflow.run.window import WHOLE, Window
 
 if TYPE_CHECKING:
@@ -126,8 +126,7 @@ def select_views(
     columns = dict(connection.execute(_VIEWS).fetchall())
     for view in views:
         if view not in columns:
-            near = nearest(view, list(columns))
-            hint = f"did you mean {' or '.join(near)}" if near else "msgflow db schema"
+            hint = did_you_mean(view, list(columns), "msgflow db schema")
             raise UsageError(f"there is no such view — {view}", hint)
     runs = part.runs(connection)
     if not runs:

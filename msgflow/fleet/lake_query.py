@@ -28,7 +28,7 @@ from msgflow.fleet.lake_connection import (
     what_there_is,
 )
 from msgflow.fleet.layout import VIEWS
-from msgflow.nearest import nearest
+from msgflow.nearest import did_you_mean
 from msgflow.query.catalogue import query_names
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind, without_counts
@@ -86,10 +86,9 @@ def header_of(name: str) -> Header:
             f"it answers {', '.join(names())}; for others: msgflow fleet open RUN, then"
             f" msgflow query {name}",
         )
-    near = nearest(name, names())
     raise UsageError(
         f"there is no such query — {name}",
-        f"did you mean {' or '.join(near)}" if near else f"a lake answers {', '.join(names())}",
+        did_you_mean(name, names(), f"a lake answers {', '.join(names())}"),
     )
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import re
 import textwrap
 from typing import TYPE_CHECKING, Any
 
-from msgflow.yaml_file import list_lines
+from msgflow.yaml_file import list_lines, quoted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,8 +16,6 @@ _HEAD = (
     " command below. Not everything is found: messages that also lead elsewhere, such as those"
     " that two links of a node share, may be missing."
 )
-_PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
-_WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 # With the indent of an entry, no comment is wider than a terminal of 80 columns.
 _WIDTH = 76
 
@@ -45,20 +41,14 @@ def _entry(row: Mapping[str, Any]) -> list[str]:
         *(f"  {line}" for line in _comment(f"{row['node']}: {row['evidence']}")),
         *(f"  {line}" for line in _comment(f"Doubtful: {row['doubt']}." if row["doubt"] else "")),
         f"  - kind: {row['kind']}",
-        f"    node: {_quoted(row['node'])}",
+        f"    node: {quoted(row['node'])}",
     ]
     if row["is_name_repeated"]:
-        lines += [f"    process: {row['pid']}", f"    host: {_quoted(row['host'])}"]
+        lines += [f"    process: {row['pid']}", f"    host: {quoted(row['host'])}"]
     for side in ("inputs", "outputs"):
-        lines += list_lines(f"    {side}", [_quoted(name) for name in row[side]])
+        lines += list_lines(f"    {side}", [quoted(name) for name in row[side]])
     return lines
 
 
 def _comment(text: str) -> list[str]:
     return [f"# {line}" for line in textwrap.wrap(text, _WIDTH, break_on_hyphens=False)]
-
-
-def _quoted(text: str) -> str:
-    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
-        return text
-    return json.dumps(text, ensure_ascii=False)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
+from msgflow.nearest import did_you_mean
 from msgflow.query.names import require_names
 from msgflow.yaml_file import Text, YamlFile
 
@@ -69,12 +69,10 @@ class PathsFile:
             if path.name.value == name:
                 return path
         known = [path.name.value for path in self.paths]
-        near = nearest(name, known)
+        others = f"it has {', '.join(known[:10]) or 'none; msgflow paths suggest finds some'}"
         raise UsageError(
             f"{self.file.path} has no path of this name — {name}",
-            f"did you mean {' or '.join(near)}"
-            if near
-            else f"it has {', '.join(known[:10]) or 'none; msgflow paths suggest finds some'}",
+            did_you_mean(name, known, others),
         )
 
     def require(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any
 
 from msgflow.text.values import format_duration, printable
 from msgflow.text.wrapping import ARROW, wrap_path
-from msgflow.yaml_file import list_lines
+from msgflow.yaml_file import list_lines, quoted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,7 +17,6 @@ _HEAD = """\
 # Paths of a run by name, for --path: keep those that matter, and call them as
 # you like.
 #   msgflow query e2e-latency --path NAME"""
-_PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")
 # With what stands before it, no comment is wider than a terminal of 80 columns.
 _WIDTH = 76
 
@@ -72,19 +70,15 @@ def _entry(
     lines = [
         *(f"  # {line}" for line in wrap_path(printable(row["path"]), _WIDTH)),
         f"  # {seen}",
-        f"  - name: {_quoted(name)}",
-        f"    from: {_quoted(first)}",
-        f"    to: {_quoted(last)}",
+        f"  - name: {quoted(name)}",
+        f"    from: {quoted(first)}",
+        f"    to: {quoted(last)}",
     ]
     for word, places in (("via", via), ("without", without)):
         if places:
-            lines += list_lines(f"    {word}", [_quoted(place) for place in places])
+            lines += list_lines(f"    {word}", [quoted(place) for place in places])
     return lines
 
 
 def _slug(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"
-
-
-def _quoted(text: str) -> str:
-    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)

@@ -39,13 +39,13 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
     }
     corrections = program().run(connection, "clock_correction", chosen).fetchall()
     return [
-        f"{'the run' if len(runs) == 1 else f'run {run.name} ({run.run_id})'} has"
+        f"{'the run' if len(runs) == 1 else f'run {run.title}'} has"
         f" {clocks[run.run_id][0]} clocks that are not synchronised: times between their hosts are"
         f" not comparable; msgflow clocks apply {clocks[run.run_id][1]}"
         for run in runs
         if run.run_id in clocks
     ] + [
-        f"{'' if len(runs) == 1 else f'run {run.name} ({run.run_id}): '}times between {reference}"
+        f"{'' if len(runs) == 1 else f'run {run.title}: '}times between {reference}"
         f" and {hosts} {_wrong_by(least, greatest)}; msgflow clocks show"
         for run in runs
         for run_id, reference, hosts, least, greatest in corrections
@@ -70,7 +70,7 @@ def clock_verdicts(
         groups = [tuple(row[1:]) for row in rows if row[0] == run.run_id]
         if not groups or (only_several and len(groups) == 1 and groups[0][1] == 1):
             continue
-        label = "" if len(runs) == 1 else f"run {run.name} ({run.run_id}): "
+        label = "" if len(runs) == 1 else f"run {run.title}: "
         verdicts.append(label + _verdict(groups))
     return verdicts
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import duckdb
-
-from msgflow.errors import QueryError, UsageError
+from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import require_places
 from msgflow.query.result import QueryResult
@@ -19,12 +17,14 @@ from msgflow.query.selection import CUT_COLUMN
 from msgflow.resources import resource_directory
 from msgflow.run.choice import Run, choose_one, read_runs
 from msgflow.run.window import MAXIMUM_NS
-from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
+from msgflow.sql.failure import query_errors
 from msgflow.sql.header import Header, read
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    import duckdb
 
     from msgflow.sql.value import Value
 
@@ -230,14 +230,8 @@ def compare(
     what = str(asked["what"])
     for run in (first, second):
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
-    try:
+    with query_errors("the comparison", "the comparison failed: {}"):
         table = program().run(connection, "comparison", asked).to_arrow_table()
-    except duckdb.Error as error:
-        if is_of_the_file(error):
-            raise
-        if isinstance(error, duckdb.OutOfMemoryException):
-            raise out_of_memory("the comparison") from error
-        raise QueryError(f"the comparison failed: {first_line(error)}") from error
     result = QueryResult(table, _header(), (first, second))
     result.notes.extend(_one_sided(result, what, first, second))
     result.notes.extend(_doubts(connection, result, what, first, second))
@@ -293,7 +287,7 @@ def _doubts(
         affected = sum(row[f"{side}_loss_affected"] or 0 for row in own)
         if affected or lost.get(run.run_id):
             yield (
-                f"run {side.upper()}, {run.name} ({run.run_id}), lost {lost.get(run.run_id) or 0}"
+                f"run {side.upper()}, {run.title}, lost {lost.get(run.run_id) or 0}"
                 f" events: {affected} of its {_UNITS[what]} have a gap in their time, others may be"
                 " missing altogether"
             )
@@ -311,8 +305,8 @@ def _one_sided(result: QueryResult, what: str, first: Run, second: Run) -> Itera
         only = {row["subject"] for row in rows}
         example = f"; one of them has {min(only)}" if only else ""
         raise UsageError(
-            f"the runs have no {what} with values in common — {first.name} ({first.run_id}) and"
-            f" {second.name} ({second.run_id}){example}",
+            f"the runs have no {what} with values in common — {first.title} and"
+            f" {second.title}{example}",
             f"msgflow query e2e-latency --run {first.run_id}, and likewise"
             f" --run {second.run_id}, tell what each has",
         )
@@ -320,4 +314,4 @@ def _one_sided(result: QueryResult, what: str, first: Run, second: Run) -> Itera
         number = sum(row["verdict"] == f"only in {side}" for row in rows)
         if number:
             thing = what[:-1] if number == 1 else what
-            yield f"{number} {thing} with values only in run {side}, {run.name} ({run.run_id})"
+            yield f"{number} {thing} with values only in run {side}, {run.title}"

@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import duckdb
-
-from msgflow.errors import QueryError, UsageError
+from msgflow.errors import UsageError
 from msgflow.query.names import require_names
 from msgflow.query.runner import bind
 from msgflow.run.choice import Run, read_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
-from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
+from msgflow.sql.failure import query_errors
 from msgflow.sql.statement import program
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import duckdb
     import pyarrow as pa
 
     from msgflow.sql.value import Value
@@ -143,14 +142,8 @@ def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]
     Raises:
         QueryError: the database could not run it.
     """
-    try:
+    with query_errors("the flow", "the flow cannot be read: {}"):
         return program().run(connection, "flow_steps", asked).to_arrow_table()
-    except duckdb.Error as error:
-        if is_of_the_file(error):
-            raise
-        if isinstance(error, duckdb.OutOfMemoryException):
-            raise out_of_memory("the flow") from error
-        raise QueryError(f"the flow cannot be read: {first_line(error)}") from error
 
 
 def _place(time_ns: int, run: Run) -> str:

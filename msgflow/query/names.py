@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
+from msgflow.nearest import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
     from msgflow.sql.value import Value
 
-# Parameters with these names take topics or nodes, in every query that has them.
+# Parameters that take topics or nodes, in every query.
 PLACE_PARAMETERS = ("from", "to", "via", "without")
 _SHOWN = 3
 _TOPICS = """
@@ -34,7 +34,7 @@ WHERE list_contains($runs, run_id)
 _CALLBACKS = "SELECT label AS name FROM main.callback_label WHERE list_contains($runs, run_id)"
 _HOSTS = "SELECT hostname AS name FROM main.host WHERE list_contains($runs, run_id)"
 _SERVICES = "SELECT service_name AS name FROM main.service WHERE list_contains($runs, run_id)"
-# What a name is of: the names that there are, and what lists them.
+# By kind of name: the names of a run, and the command that lists them.
 _KNOWN = {
     "topic": (_TOPICS, "msgflow query info-topics"),
     "node": (_NODES, "msgflow query info-nodes"),
@@ -43,7 +43,8 @@ _KNOWN = {
     "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow query graph"),
 }
 _WORDS = {"place": "topic or node"}
-# Parameters that take an id, in every query that has them: what the id is of, and the command that lists them.
+# Parameters that take an id, in every query: the view and column of it, and the command that lists
+# the ids.
 _IDS = {
     "flow": ("take", "take_id", "msgflow query flows"),
     "callback_id": ("callback", "callback_id", "msgflow query executor-wait"),
@@ -60,15 +61,15 @@ WHERE NOT EXISTS (
 def require_places(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless every topic and node among the parameters of a query is one of the chosen runs.
+    """Raise unless the chosen runs have every topic and node among the parameters of a query.
 
     Args:
         connection: to a database with the public views.
-        runs: the chosen runs; where there are none, every name will do.
+        runs: the chosen runs; without any, every name passes.
         bound: all parameters of the query.
 
     Raises:
-        UsageError: it names similar ones, else the first few.
+        UsageError: a name that no run has; the message names similar ones, or the first few.
     """
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
@@ -80,16 +81,16 @@ def require_places(
 def require_names(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], kind: str, names: Sequence[str]
 ) -> None:
-    """Raise unless the chosen runs have something of every name, or that fits every pattern.
+    """Raise unless the chosen runs have every name, and something that fits every pattern.
 
     Args:
         connection: to a database with the public views.
-        runs: the chosen runs; where there are none, every name will do.
+        runs: the chosen runs; without any, every name passes.
         kind: 'topic', 'node', 'callback', 'host', or 'place' for topics, nodes and services.
         names: names or patterns (GLOB).
 
     Raises:
-        UsageError: it names similar ones, else the first few.
+        UsageError: a name that no run has; the message names similar ones, or the first few.
     """
     if not runs or not names:
         return
@@ -102,7 +103,7 @@ def require_names(
         return
     name = missing[0][0]
     rows = connection.execute(sql, values).fetchall()
-    # Processes stand in brackets where their node is not known: they are no help.
+    # A name in brackets is a process whose node is unknown: it is no help.
     known = sorted({each for (each,) in rows if each is not None and not each.startswith("[")})
     what = _WORDS.get(kind, kind)
     where = "the run" if len(runs) == 1 else "these runs"
@@ -114,11 +115,11 @@ def require_names(
 def require_ids(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
 ) -> None:
-    """Raise unless every id among the parameters of a query is one of the chosen runs.
+    """Raise unless the chosen runs have every id among the parameters of a query.
 
     Args:
         connection: to a database with the public views.
-        runs: the chosen runs; where there are none, every id will do.
+        runs: the chosen runs; without any, every id passes.
         bound: all parameters of the query.
 
     Raises:
@@ -138,11 +139,9 @@ def require_ids(
 
 
 def _hint(name: str, known: list[str], what: str, source: str) -> str:
-    if near := nearest(name, known):
-        return f"did you mean {' or '.join(near)}"
     if not known:
         return source
     more = len(known) - _SHOWN
     rest = f" and {more} more ({source})" if more > 0 else ""
     plural = "topics and nodes" if what == "topic or node" else f"{what}s"
-    return f"the {plural} are {', '.join(known[:_SHOWN])}{rest}"
+    return did_you_mean(name, known, f"the {plural} are {', '.join(known[:_SHOWN])}{rest}")

@@ -1,4 +1,4 @@
-"""Runs a named query: chooses runs and window, binds parameters, hides internal rows."""
+"""Runner of named queries: it chooses runs and times, binds parameters, and hides internal rows."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.errors import QueryError, UsageError
-from msgflow.nearest import nearest
+from msgflow.errors import UsageError
+from msgflow.nearest import did_you_mean
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.result import QueryResult
@@ -25,7 +25,7 @@ from msgflow.query.selection import (
 )
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
-from msgflow.sql.failure import first_line, is_of_the_file, out_of_memory
+from msgflow.sql.failure import first_line, query_errors
 from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.values import format_duration
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 RESERVED = ("runs", "start_ns", "end_ns")
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')
-# What a condition may be at fault for; the queries themselves are tested.
+# Errors that a user's condition may cause: the queries themselves are tested.
 _OF_CONDITIONS = (
     duckdb.BinderException,
     duckdb.CatalogException,
@@ -96,21 +96,18 @@ def run_query(
         require_names(connection, runs, kind, names)
     values = reserved | own
     bindings = {name: values[name] for name in used[-1]} | chosen
-    is_last = False
-    try:
-        with _steps(connection, header, used, values):
-            is_last = True
+    with (
+        query_errors(header.name, f"the query failed: {{}} — {header.name}"),
+        _steps(connection, header, used, values),
+    ):
+        try:
             table = connection.sql(sql, params=bindings).to_arrow_table()
-    except duckdb.Error as error:
-        if is_of_the_file(error):
-            raise
-        if is_last and selection.where is not None and isinstance(error, _OF_CONDITIONS):
+        except _OF_CONDITIONS as error:
+            if selection.where is None:
+                raise
             raise UsageError(
                 f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
             ) from error
-        if isinstance(error, duckdb.OutOfMemoryException):
-            raise out_of_memory(header.name) from error
-        raise QueryError(f"the query failed: {first_line(error)} — {header.name}") from error
     table, total, hidden, cut = without_counts(table)
     if not internal and INTERNAL_COLUMN in table.column_names:
         table = table.drop_columns([INTERNAL_COLUMN])
@@ -139,20 +136,20 @@ def _steps(
     used: Sequence[set[str]],
     values: Mapping[str, Value],
 ) -> Iterator[None]:
-    """Make the tables that a query needs on its way; drop them in the end."""
+    """Make the temporary tables that a query needs, and drop them afterwards."""
     try:
         for step, names in zip(header.steps, used, strict=False):
             connection.execute(step.sql, {name: values[name] for name in names})
         yield
     finally:
         for step in header.steps:
-            # What interrupted the query may interrupt this, too; the next one replaces the table.
+            # An interrupt of the query may interrupt this, too; the next query replaces the table.
             with contextlib.suppress(duckdb.Error):
                 connection.execute(f"DROP TABLE IF EXISTS temp.{step.table}")
 
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
-    """Return the options that leave rows out, as they are typed."""
+    """Return the options that leave rows out, as a user types them."""
     given: dict[str, object] = {name: parameters.get(name) for name in ("from", "to")}
     given |= {name: ",".join(getattr(selection, name)) for name in (*KINDS, "via", "without")}
     given["where"] = selection.where
@@ -166,8 +163,8 @@ def bind(
 
     Args:
         header: the query.
-        given: values by name; a name that is a word of Python may end with an underscore (`from_`).
-        command: that has the parameters as options; `msgflow query` and the name when None.
+        given: values by name; a name may end with an underscore if Python reserves it (`from_`).
+        command: the command with the parameters as options; `msgflow query NAME` when None.
 
     Raises:
         UsageError: unknown or missing parameter, or a value that does not fit.
@@ -208,10 +205,9 @@ def _fit(command: str, param: Param, value: Value) -> Value:
                 f"{command} --help",
             ) from None
     if param.choices and value is not None and value not in param.choices:
-        near = nearest(str(value), param.choices)
         raise UsageError(
             f"{option} has no such value — {value}",
-            f"did you mean {' or '.join(near)}" if near else f"choose {' or '.join(param.choices)}",
+            did_you_mean(str(value), param.choices, f"choose {' or '.join(param.choices)}"),
         )
     if param.minimum is not None and isinstance(value, int) and value < param.minimum:
         raise UsageError(
@@ -244,8 +240,7 @@ def _beside(
 def _columns_hint(header: Header, error: Exception) -> str:
     names = [column.name for column in header.columns]
     found = _COLUMN.search(str(error))
-    near = nearest(found[1], names) if found else []
-    return f"did you mean {' or '.join(near)}" if near else f"the columns are {', '.join(names)}"
+    return did_you_mean(found[1] if found else "", names, f"the columns are {', '.join(names)}")
 
 
 def _parameters(header: Header) -> str:
@@ -255,7 +250,7 @@ def _parameters(header: Header) -> str:
 
 
 def without_counts(table: pa.Table) -> tuple[pa.Table, int, int, int]:
-    """Return the rows themselves, and how many there were, were hidden, and are cut off."""
+    """Return the rows themselves, and the numbers of all rows, hidden rows and cut rows."""
     total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
     if table[PLACE][0].as_py() is None:
         table = table.slice(0, 0)

@@ -34,6 +34,11 @@ class Run:
     start_ns: int | None
     labels: tuple[str, ...] = ()
 
+    @property
+    def title(self) -> str:
+        """Its name and id, for messages."""
+        return f"{self.name} ({self.run_id})"
+
 
 def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
     """Return all runs of the database, oldest first."""
@@ -73,7 +78,7 @@ def choose_runs(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...
         ids = " or ".join(f"--run {run.run_id}" for run in found)
         raise UsageError(f"several runs have this name — {text}", f"choose by id: {ids}")
     if not found:
-        known = ", ".join(f"{run.name} ({run.run_id})" for run in ordered[-10:])
+        known = ", ".join(run.title for run in ordered[-10:])
         raise UsageError(f"there is no such run — {text}", f"the runs are {known}")
     return tuple(found)
 

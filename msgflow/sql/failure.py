@@ -75,6 +75,26 @@ def out_of_memory(
 
 
 @contextmanager
+def query_errors(what: str, message: str) -> Iterator[None]:
+    """Turn errors of a statement into a QueryError; errors of the database file pass.
+
+    Args:
+        what: what takes too much memory, if it does.
+        message: of the error; `{}` stands for the reason.
+    """
+    try:
+        yield
+    except duckdb.OutOfMemoryException as error:
+        if is_of_the_file(error):
+            raise
+        raise out_of_memory(what) from error
+    except duckdb.Error as error:
+        if is_of_the_file(error):
+            raise
+        raise QueryError(message.format(first_line(error))) from error
+
+
+@contextmanager
 def database_errors(path: Path) -> Iterator[None]:
     """Turn errors that the file at `path` or its disk causes into a DatabaseError."""
     try:

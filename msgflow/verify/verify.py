@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.nearest import nearest
+from msgflow.nearest import did_you_mean
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
@@ -325,8 +325,7 @@ def _require_names(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run
             return
         if not is_exact and any(fnmatchcase(name, text.value) for name in there):
             return
-        near = nearest(text.value, there)
-        hint = f"did you mean {' or '.join(near)}" if near else _some(what, there)
+        hint = did_you_mean(text.value, there, _some(what, there))
         file.file.fail(text.line, f"the run has no such {what} — {text.value}", hint)
 
     for target in file.targets:

@@ -22,7 +22,7 @@ def result_text(result: QueryResult) -> str:
     """Return the text of a terminal: runs, the first rows as a table that fits, notes."""
     width = screen_width()
     shown = lay_out(result, width, remedy="to_arrow() has all")
-    runs = ", ".join(f"{run.name} ({run.run_id})" for run in result.runs)
+    runs = ", ".join(run.title for run in result.runs)
     head = [("run: " if len(result.runs) == 1 else "runs: ", runs)] if runs else []
     notes = [*shown.notes, *([] if len(result) else [result.when_empty]), *result.notes]
     lines = [
