@@ -1,4 +1,4 @@
-"""A msgflow database as a Python object."""
+"""Database of msgflow as a Python object."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that are meant where none is named; imports nothing that a command does not need."""
+"""Default files of commands; this module imports nothing."""
 
 from pathlib import Path
 

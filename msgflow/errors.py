@@ -1,4 +1,4 @@
-"""Every error that a user can cause, with what to do about it and the exit code of the command."""
+"""Errors that a user can cause, each with a hint and an exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between numpy and Arrow without a detour.
+"""Conversion between numpy and Arrow.
 
 pyarrow's own ways import pandas wherever that is installed, to see whether they were given
 something of it: that takes longer than reading a small trace. Nor are `pyarrow.compute` and

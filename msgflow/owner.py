@@ -1,4 +1,4 @@
-"""Temporary files that say whose they are, so that those of a killed process can be removed."""
+"""Owners of temporary files: the name says which process, so that others can remove its remains."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finds `schema/`, `migrations/` and `queries/`, installed or in a checkout."""
+"""Folders `schema/`, `migrations/` and `queries/`, installed or in a checkout."""
 
 from __future__ import annotations
 

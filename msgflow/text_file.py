@@ -1,4 +1,4 @@
-"""Small files that users write: regular, of bounded size, UTF-8."""
+"""Text files that users write: small, regular, UTF-8."""
 
 from __future__ import annotations
 

@@ -1,3 +1,3 @@
-"""The version of msgflow, the only place that states it."""
+"""Version of msgflow, stated only here."""
 
 __version__ = "0.1.0"

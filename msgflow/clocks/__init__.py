@@ -1,4 +1,4 @@
-"""Clocks of several hosts: brought together from messages, from a file, or left as they are."""
+"""Clocks of several hosts: corrected by messages, by a file, or not at all."""
 
 from __future__ import annotations
 

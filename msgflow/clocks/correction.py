@@ -1,4 +1,4 @@
-"""Stores how the clocks of a run are corrected, in place of what was stored before."""
+"""Corrections of the clocks of a run, stored in place of earlier ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from msgflow.clocks.file import ClockSync, GivenClock
     from msgflow.run.choice import Run
 
-# What a correction consists of.
+# Columns of a correction.
 _CORRECTION = (
     "offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns", "drift_uncertainty_ppb",
     "reference_clock_id", "method",
@@ -43,11 +43,11 @@ WHERE clock_id = ?
 def apply_clocks(
     path: Path, sync: ClockSync, *, run: str | int | None, memory_limit: str | None = None
 ) -> tuple[Run, ...]:
-    """Bring the clocks of runs of a database together, in one transaction; reads no trace.
+    """Correct the clocks of runs of a database, in one transaction; this reads no trace.
 
     Args:
         path: the database.
-        sync: how.
+        sync: how to correct them.
         run: 'all', a name or an id; the latest run when None.
         memory_limit: most memory that the database takes, such as '2GB'.
 
@@ -66,10 +66,10 @@ def apply_clocks(
 
 
 def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:
-    """Store how the clocks of a run are corrected, inside the open transaction.
+    """Store the corrections of the clocks of a run, inside the open transaction.
 
-    Messages can tell only once they are linked. What the clocks tell of missing messages has to be
-    derived after that.
+    The messages must be linked before. The caller derives afterwards what depends on clocks, such
+    as the reasons of missing messages.
 
     Raises:
         UsageError: a file that does not fit the run.
@@ -94,7 +94,7 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
 def _correct(
     con: duckdb.DuckDBPyConnection, source: str, values: Mapping[str, int] | None = None
 ) -> None:
-    """Store the corrections that the rows of `source` hold of their clocks."""
+    """Store the corrections in the rows of `source`."""
     assigned = ", ".join(f"{column} = new.{column}" for column in _CORRECTION)
     con.execute(
         f"UPDATE store.clock SET {assigned} FROM {source} AS new "
@@ -133,7 +133,7 @@ def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
                 "leave out one of the two",
             )
         chosen[clock_id] = given
-    # Offsets lead to the times of the only clock that the file does not name, if there is one.
+    # If the file leaves out one clock, offsets lead to the times of that clock.
     others = [clock_id for clock_id, _, _ in clocks if clock_id not in chosen]
     reference_id = others[0] if len(others) == 1 else min(chosen)
     for clock_id, given in chosen.items():

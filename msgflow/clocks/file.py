@@ -1,4 +1,4 @@
-"""What brings clocks together: nothing, messages, or a file that says how far each is off.
+"""File of clock offsets, and the other ways to correct clocks: by messages, or not at all.
 
 robot-b: {offset_ns: -350000000, drift_ppb: 20, reference_ns: 1795149267363524269}
 robot-c: -12500
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 METHODS = ("none", "messages")
 _FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
 _EXAMPLE = "robot-b: {offset_ns: -350000000, drift_ppb: 20}"
-# Digits in groups, as YAML and TOML have them, and no more of them than a time has.
+# Digits may stand in groups, as in YAML and TOML. No time has more of them.
 _INTEGER = re.compile(r"[-+]?[0-9]+(_[0-9]+)*")
 _MOST_DIGITS = 40
 _MOST_SHOWN = 60
@@ -30,22 +30,22 @@ _TOML_KEY = re.compile(
     r"""\s*(\[\s*["']?(?P<table>[^"'\]]*?)["']?\s*\]|["']?(?P<key>[^"'.=\s]+)["']?\s*[.=])"""
 )
 _LARGEST_NS = 2**62
-# A thousandth: no clock that counts seconds is worse.
+# One thousandth: every clock is better.
 _LARGEST_DRIFT_PPB = 1_000_000
 
 
 @dataclass(frozen=True)
 class GivenClock:
-    """What a file says of one clock.
+    """The correction of one clock in a file.
 
     Attributes:
         name: hostname, or uuid of the clock.
-        line: where it stands, from 1.
-        offset_ns: to be added to its times [ns].
-        drift_ppb: to be added per time since the reference [1e-9].
-        reference_ns: moment at which offset_ns alone is right [epoch ns, as recorded]; None: the
+        line: its line, from 1.
+        offset_ns: to add to its times [ns].
+        drift_ppb: to add per time since the reference [1e-9].
+        reference_ns: the moment when offset_ns alone is right [epoch ns, as recorded]; None: the
             begin of its traces.
-        uncertainty_ns: bound of the error; None: not known.
+        uncertainty_ns: bound of the error [ns]; None: not known.
     """
 
     name: str
@@ -58,12 +58,12 @@ class GivenClock:
 
 @dataclass(frozen=True)
 class ClockSync:
-    """How clocks are to be brought together.
+    """A way to correct clocks.
 
     Attributes:
         method: 'none', 'messages' or 'file'.
         path: the file.
-        clocks: what it says, in order.
+        clocks: its entries, in order.
     """
 
     method: str
@@ -76,9 +76,10 @@ class ClockSync:
 
 
 def read_clock_sync(given: str | Path) -> ClockSync:
-    """Return what 'none', 'messages' or the path of a file means.
+    """Return the way that 'none', 'messages' or the path of a file means.
 
-    The file is TOML where its name ends so, else YAML. Whether its hosts exist is for a run to say.
+    The file is TOML if its name ends with .toml, else YAML. A run decides later whether its hosts
+    exist.
 
     Raises:
         UsageError: the file cannot be read, or is not of the form above.
@@ -127,7 +128,7 @@ def _toml(text: str, sync: ClockSync) -> Iterator[_Entry]:
 
 
 def _toml_lines(text: str) -> dict[str, list[int]]:
-    """Return the lines that may define each key, in order; the parser does not tell."""
+    """Return the lines that may define each key, in order: the parser does not return them."""
     found: dict[str, list[int]] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         if match := _TOML_KEY.match(line):

@@ -1,1 +1,1 @@
-"""Lists the events of traces in time order, without a database: as text, JSON, CSV or Parquet."""
+"""Events of traces in order of time, without a database: as text, JSON, CSV or Parquet."""

@@ -1,4 +1,4 @@
-"""The formats in which events are written."""
+"""Formats in which events are written."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class EventFormat(StrEnum):
-    """How events are written; all but text are exact."""
+    """A format of events; all but text are exact."""
 
     TEXT = "text"
     JSON = "json"
@@ -41,7 +41,7 @@ def is_directory(path: Path) -> bool:
 
 
 def format_of(path: Path | None) -> EventFormat:
-    """Return the format that an output path asks for: by its suffix, Parquet for a directory.
+    """Return the format of an output path: by its suffix, Parquet for a directory.
 
     Raises:
         UsageError: no format has this suffix.

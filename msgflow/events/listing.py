@@ -1,4 +1,4 @@
-"""Writes events as one sequence to a binary stream."""
+"""Listing of events, as one sequence in a binary stream."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def write_events(
     stream: IO[bytes],
     progress: Callable[[Progress], None] | None = None,
 ) -> int:
-    """Write the selected events in order of time, text as UTF-8, and return how many they are.
+    """Write the selected events in order of time, text as UTF-8, and return their number.
 
     CSV and Parquet have the columns event_id, ts_ns (epoch ns), trace_index, hostname, name,
     cpu_id, vpid, vtid, procname, pid_ns and fields, a JSON object. JSON objects have the same.
@@ -69,7 +69,7 @@ def write_events(
 
 
 def _joined(lines: pa.ChunkedArray, between: str) -> Iterator[memoryview]:
-    """Yield the bytes of all lines, with `between` between any two, as Arrow joins them."""
+    """Yield the bytes of all lines with `between` between them; Arrow joins them."""
     for position, chunk in enumerate(lines.chunks):
         if position:
             yield memoryview(between.encode())

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
     from msgflow.trace import Progress, TraceSet
 
-# Few, so that the first lines come soon.
+# Few rows: the first lines come soon.
 _BATCH_ROWS = 20_000
 _NOTHING = pa.schema([])
-# By place: a payload may have a field of the same name.
+# By position: a payload may have a field of the same name.
 _TIME = COMMON_SCHEMA.get_field_index("ts_ns")
 
 
 class Selection:
-    """The events of a set of traces whose name and time are wanted.
+    """The events of a set of traces with certain names and times.
 
     Attributes:
         traces: the set.

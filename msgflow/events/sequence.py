@@ -1,4 +1,4 @@
-"""Merges events of different names into one sequence, each rendered as asked."""
+"""Sequence of events of different names, each rendered as text, JSON or columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes events as one table per name, with a column for each of its fields."""
+"""Tables of events: one per name, with a column for each of its fields."""
 
 from __future__ import annotations
 

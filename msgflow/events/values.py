@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import pyarrow as pa
 
-# Controls, characters without a shape, and line separators: no terminal shall obey a trace.
+# Controls, characters without a shape, and line separators: no terminal may obey a trace.
 _UNPRINTABLE = r"[\p{C}\p{Zl}\p{Zp}]"
-# The time that DuckDB takes to bind lambdas in lambdas grows tenfold with each.
+# DuckDB needs ten times as long to bind each further lambda inside a lambda.
 _MOST_LAMBDAS = 2
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
@@ -25,12 +25,12 @@ def identifier(name: str) -> str:
 
 
 def printable(expression: str) -> str:
-    """Return the SQL of a text without what is not for display."""
+    """Return the SQL of a text without unprintable characters."""
     return f"regexp_replace({expression}, '{_UNPRINTABLE}', '{_REPLACEMENT}', 'g')"
 
 
 def exact(expression: str, data_type: pa.DataType, lambdas: int = 0) -> str:
-    """Return the SQL of a value that JSON can hold: NaN and infinities, which it cannot, are NULL.
+    """Return the SQL of a value that JSON can hold: NaN and infinities become NULL.
 
     Arrays of arrays of arrays of floating point numbers become text.
 
@@ -61,8 +61,8 @@ def readable(
 ) -> str:
     """Return the SQL of a value as people read it, never NULL.
 
-    Text is quoted as in JSON, lists are `[1, 2]`, structures `{name=value, …}` of the members that
-    are there. What is inside more than two lists is as in JSON.
+    Text is quoted as in JSON, lists are `[1, 2]`, structures `{name=value, …}` without missing
+    members. Values inside more than two lists are as in JSON.
 
     Args:
         expression: SQL of the value.

@@ -1,4 +1,4 @@
-"""Public views as CSV files, one per view."""
+"""CSV files of public views, one per view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A directory of exported views: all of it is written aside, then takes its place."""
+"""Directory of exported views: we write all of it aside, then it takes its place."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _SUFFIX = ".part"
 def replacing_entries(
     directory: Path, names: Sequence[str], *, force: bool = False
 ) -> Iterator[Path]:
-    """Yield a directory to write `names` to; they take their places when all went well.
+    """Yield a directory to write `names` to; they take their places at the end.
 
-    What fails or is interrupted before leaves `directory` as it was. Other entries stay.
+    An error or an interrupt before that leaves `directory` as it was. Other entries stay.
 
     Args:
         directory: created if missing.
         names: files or directories directly in it.
-        force: replace those that exist; of directories only those that an export has written.
+        force: replace existing ones; a directory only if an export has written it.
 
     Raises:
         UsageError: one exists already, or the directory cannot be written.
@@ -73,7 +73,7 @@ def _publish(directory: Path, aside: Path, names: Sequence[str]) -> None:
 
 
 def _clean_up(directory: Path) -> None:
-    """Remove what killed exports left aside; what one had moved there to replace goes back."""
+    """Remove remains of killed exports; entries that they were replacing go back."""
     for aside in directory.glob(f"{_ASIDE}*{_SUFFIX}"):
         if is_abandoned(aside.name.removeprefix(_ASIDE).removesuffix(_SUFFIX)):
             for old in (aside / "old").glob("*"):

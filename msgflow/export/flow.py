@@ -1,4 +1,4 @@
-"""The flow of one message as an object: text tree, dictionary for JSON, Arrow table."""
+"""Flow of one message: as a text tree, as JSON, or as an Arrow table."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Flow(FlowVertices):
-    """What one message caused and was caused by. Times are integers in nanoseconds.
+    """The causes and effects of one message. Times are integers in nanoseconds.
 
     `str` of it is the tree that `msgflow flow` prints.
 
@@ -36,7 +36,7 @@ class Flow(FlowVertices):
         return self.table
 
     def to_dict(self) -> Row:
-        """Return run, start, nodes and edges, made of what JSON can hold."""
+        """Return run, start, nodes and edges as JSON values."""
         return {
             "run_id": self.run.run_id,
             "run": self.run.name,
@@ -63,7 +63,6 @@ class Flow(FlowVertices):
         return f"<Flow of {self.start.kind} {self.start.id}: {len(self.nodes)} nodes>"
 
     def __str__(self) -> str:
-
         return tree_text(self)
 
     def _repr_html_(self) -> str:
@@ -71,7 +70,7 @@ class Flow(FlowVertices):
 
 
 def read_flow(connection: duckdb.DuckDBPyConnection, start: Start, **given: Value) -> Flow:
-    """Return the flow that `start` is part of.
+    """Return the flow that goes through `start`.
 
     Args:
         connection: to a database with the public views.
@@ -79,7 +78,7 @@ def read_flow(connection: duckdb.DuckDBPyConnection, start: Start, **given: Valu
         given: direction, depth, limit and internal; see `program.flow_steps`.
 
     Raises:
-        UsageError: what to start from does not exist, or an argument cannot be.
+        UsageError: the start does not exist, or an argument is out of range.
         QueryError: the database could not run it.
     """
     run = require_start(connection, start)

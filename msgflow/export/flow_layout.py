@@ -1,4 +1,4 @@
-"""Where the lines of a flow go: chains straight down, branches aside, nothing drawn twice."""
+"""Layout of the tree of a flow: chains go straight down, branches aside, nothing is drawn twice."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class Item:
     """One vertex, or a take with the callback instance it was for, or a message that was not taken.
 
     Attributes:
-        node: the vertex; of the callback instance where a take is drawn with it.
+        node: the vertex; the callback instance if it is drawn together with its take.
         take: that take.
         handover: the link from the take to the callback instance.
-        number: given where another line refers to this one.
+        number: set if another line refers to this one.
         causes: items that lead here, with the links.
         effects: items that this leads to, with the links.
     """
@@ -42,7 +42,7 @@ class Line:
     Attributes:
         item: what to draw.
         link: the link from the line before, None for the first.
-        is_reference: it is drawn elsewhere already.
+        is_reference: another line draws the item.
     """
 
     item: Item
@@ -52,7 +52,7 @@ class Line:
 
 @dataclass(eq=False)
 class Branch:
-    """Lines that follow each other straight, and what branches off after the last."""
+    """Lines that follow each other straight, and the branches after the last one."""
 
     depth: int = 0
     lines: list[Line] = field(default_factory=list)
@@ -60,7 +60,7 @@ class Branch:
 
 
 def lay_out_flow(flow: FlowVertices) -> list[Branch]:
-    """Return one branch for each item to begin with: all that have no cause, or the start."""
+    """Return a branch for each first item: all items without a cause, or the start."""
     items = _items(flow)
     if flow.direction == "both":
         tops = _tops(items, items[flow.start_key])
@@ -118,7 +118,7 @@ def _tops(items: dict[Key, Item], start: Item) -> list[Item]:
             if effect not in reached:
                 reached.add(effect)
                 stack.append(effect)
-    # In a ring everything has a cause: then what was asked for is as good a begin as any.
+    # In a ring every item has a cause: the tree begins with the start.
     return tops if start in reached else [*tops, start]
 
 

@@ -1,4 +1,4 @@
-"""The flow of one message as a text tree."""
+"""Text tree of the flow of one message."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _UNBOUNDED = 100_000
 _LEAST_WIDTH = 44
 _INDENT = 4
 _GAP = 2
-# Stands for a space at which no line is broken: no name has it, since it is not printable.
+# In place of a space where no line may break. It is not printable: no name has it.
 _BOUND = "\ue000"
-# Links that say something of the effect, whichever way the flow is drawn, or nothing at all.
+# Links that describe the effect in either direction, or need no words.
 _OF_EFFECT = ("transport", "service", "callback", "direct")
-# Reasons with which a message may have been taken all the same: of the status 'unknown'.
+# Reasons of the status 'unknown': the message may have been taken after all.
 _FATE_UNKNOWN = ("receiver_gap", "unknown", "reason unknown")
 _REQUEST = {
     "callback": "no callback was seen",
@@ -53,13 +53,12 @@ def tree_text(
 ) -> str:
     """Return the tree of a flow; a line begins with its time since the first line.
 
-    What is drawn already is not drawn again: the line refers to the first place by a number in
-    brackets.
+    Nothing is drawn twice: a later line refers to the first one by its number in brackets.
 
     Args:
         flow: what to draw.
         is_absolute: points in time as UTC, in place of the time since the first line.
-        width: of the terminal, at which lines are wrapped; they are as long as they are when None.
+        width: of the terminal, where lines are wrapped; lines are not wrapped when None.
         color: with escape sequences for colours.
     """
     branches = lay_out_flow(flow)
@@ -71,7 +70,7 @@ def tree_text(
         file=stream,
         width=cells,
         force_terminal=color,
-        # In a notebook it would draw there, and not into the text.
+        # In a notebook Rich would draw there, not into the text.
         force_jupyter=False,
         color_system="standard" if color else None,
         highlight=False,
@@ -119,7 +118,7 @@ class _Painter:
         return Text(text, style="bold")
 
     def label(self, branch: Branch) -> Table:
-        # Two columns, so that what is wrapped stays right of the times.
+        # Two columns: wrapped lines stay to the right of the times.
         grid = Table.grid(padding=(0, _GAP))
         grid.add_column(justify="right", min_width=self.time_width, no_wrap=True, style="cyan")
         grid.add_column(overflow="fold")
@@ -159,7 +158,7 @@ class _Painter:
         node = item.node
         label, place = _printable(node["label"]), _printable(node["node"])
         if node["kind"] == "publication":
-            # Else who published it stands on the line of the callback instance.
+            # Otherwise the line of the callback instance names the publisher.
             is_alone = link is None or not item.causes
             return f"{place}  publishes {label}" if is_alone else f"publishes {label}"
         if node["kind"] == "request":
@@ -213,7 +212,7 @@ class _Painter:
 
 
 def _bound(detail: str, room: int) -> str:
-    """Return a detail that stays in one line, or else each number in it with its unit."""
+    """Return a detail that stays in one line; if too long, each number stays with its unit."""
     if cell_len(detail) <= room:
         return detail.replace(" ", _BOUND)
     return " ".join(word.replace(" ", _BOUND) for word in words(detail))

@@ -1,4 +1,4 @@
-"""The rows of the flow of one message, as nodes and the edges between them."""
+"""Vertices and edges of the flow of one message."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ NOT_TAKEN = "not_taken"
 
 @dataclass(frozen=True, repr=False)
 class FlowVertices:
-    """What one message caused and was caused by. Times are integers in nanoseconds.
+    """The causes and effects of one message. Times are integers in nanoseconds.
 
     Attributes:
-        start: what it was followed from.
+        start: where it begins.
         direction: 'forward', 'backward' or 'both'.
         depth: most messages in a row, each way.
         limit: most vertices.
-        run: the run it belongs to.
+        run: its run.
         table: the rows of `main.flow_step`, nearest to the start first, with the bounds of
             `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns).
-        notes: what the rows do not say themselves, a sentence each.
+        notes: what the rows do not say, a sentence each.
     """
 
     start: Start
@@ -60,7 +60,7 @@ class FlowVertices:
 
     @property
     def start_key(self) -> Key:
-        """The vertex that it was followed from, as (kind, id)."""
+        """The vertex where it begins, as (kind, id)."""
         return (self.start.kind, self.start.id)
 
     @property
@@ -73,7 +73,7 @@ class FlowVertices:
         """Vertices by (kind, id), nearest to the start first."""
         found: dict[Key, Row] = {}
         for row in self.table.to_pylist():
-            # That a message was not taken is said of the edge: the subscription may miss several.
+            # The edge says that a message was not taken: the subscription may miss several.
             state = dict.fromkeys(_STATE) if row["link_kind"] == NOT_TAKEN else row
             node = {name: row[name] for name in _NODE} | {name: state[name] for name in _STATE}
             found.setdefault((row["kind"], row["id"]), node)

@@ -1,4 +1,4 @@
-"""Writes a result as bytes in one of the formats of the command line."""
+"""Formats of results: a table, CSV, JSON, JSON lines, Parquet, Markdown."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Form = TypeVar("Form")
 
 
 class Format(StrEnum):
-    """How a result is written; all but table and markdown are exact."""
+    """A format of results; all but table and markdown are exact."""
 
     TABLE = "table"
     CSV = "csv"
@@ -43,7 +43,7 @@ _SUFFIXES = {
 
 
 def format_of(path: Path | None) -> Format:
-    """Return the format that the suffix of a file asks for; a table without file or suffix.
+    """Return the format for the suffix of a file; a table without a file.
 
     Raises:
         UsageError: no format has this suffix.
@@ -114,9 +114,9 @@ def _json_array(result: QueryResult) -> Iterator[str]:
 
 
 def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
-    """Return a batch as CSV has it: integers, floats and truth values as they are, else text.
+    """Return a batch for CSV: integers, floats and truth values stay, all else becomes text.
 
-    Text gets quotes, NULL does not: so an empty text and a missing one stay apart.
+    Text gets quotes, NULL does not: an empty text and a missing one stay different.
     """
     import pyarrow
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class GraphFormat(StrEnum):
-    """How a graph is written."""
+    """A format of graphs."""
 
     DOT = "dot"
     MERMAID = "mermaid"
@@ -41,7 +41,7 @@ _SUFFIXES = {
 
 
 def graph_format(path: Path | None) -> GraphFormat:
-    """Return the format that the suffix of a file asks for; DOT without a file.
+    """Return the format for the suffix of a file; DOT without a file.
 
     Raises:
         UsageError: no format has this suffix.
@@ -51,7 +51,7 @@ def graph_format(path: Path | None) -> GraphFormat:
 
 @dataclass(frozen=True, repr=False)
 class Graph(GraphVertices):
-    """Nodes, topics and services of a run, and what passes between them.
+    """Nodes, topics and services of a run, and the messages between them.
 
     Its attributes are those of `GraphVertices`.
     """

@@ -1,4 +1,4 @@
-"""A graph as a picture: a lane per executor, what leads to something to the left of it."""
+"""SVG picture of a graph: a lane for each executor, causes to the left of their effects."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 _LETTER = 6.6
 _LINE = 14
 _MOST_LETTERS = 40
-# Between columns with arrows that say something, and without; between boxes of a column.
+# Space between columns whose arrows have labels, and other columns; between boxes of a column.
 _WIDE, _NARROW, _ABOVE = 104, 44, 16
 _MARGIN = 14
 _TITLE = 20
 _SWEEPS = 8
-# Of this picture alone, also where it stands inside a page.
+# For this picture only, also inside a page.
 _STYLE = """
 .msgflow-graph text { font: 11px sans-serif; fill: #1b2430; }
 .msgflow-graph .small { font-size: 9.5px; fill: #5a6573; }
@@ -106,7 +106,7 @@ def _cut(text: str, most: int) -> str:
 
 
 def _choose_columns(boxes: dict[str, _Box], edges: list[Edge]) -> None:
-    """Put everything to the right of what leads to it; edges that close a loop do not count."""
+    """Put each box to the right of its causes; edges that close a loop do not count."""
     following: dict[str, list[str]] = {key: [] for key in boxes}
     entered = dict.fromkeys(boxes, 0)
     for edge in edges:
@@ -114,7 +114,7 @@ def _choose_columns(boxes: dict[str, _Box], edges: list[Edge]) -> None:
         entered[edge.target] += 1
     order: list[str] = []
     state = dict.fromkeys(boxes, 0)
-    # Depth first: what is left last stands before all that it leads to.
+    # Depth first: a box that is left later comes before all its effects.
     for root in sorted(boxes, key=lambda key: entered[key]):
         if state[root]:
             continue
@@ -139,7 +139,7 @@ def _choose_columns(boxes: dict[str, _Box], edges: list[Edge]) -> None:
 
 
 def _choose_lanes(boxes: dict[str, _Box], graph: GraphVertices) -> list[str | None]:
-    """Give each executor a lane; a topic or service lies in that of who sends to it."""
+    """Give each executor a lane; a topic or service lies in the lane of its first sender."""
     executors = sorted(
         graph.executors,
         key=lambda key: (
@@ -158,7 +158,7 @@ def _choose_lanes(boxes: dict[str, _Box], graph: GraphVertices) -> list[str | No
 
 
 def _order(boxes: dict[str, _Box], edges: list[Edge]) -> None:
-    """Bring what belongs together to the same height, in every lane and column."""
+    """Bring connected boxes to the same height, in every lane and column."""
     beside: dict[str, list[str]] = {key: [] for key in boxes}
     for edge in edges:
         beside[edge.source].append(edge.target)

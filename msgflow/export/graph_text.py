@@ -1,4 +1,4 @@
-"""Graphs in the languages of Graphviz and Mermaid. Names from a trace are never more than text."""
+"""Graphviz and Mermaid text of a graph; names from a trace are always text in it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _STYLES = {
     "partial_sync": 'style=dotted, color="#aa4499"',
 }
 _BOXES = {"node": ("[", "]"), "topic": ("([", "])"), "service": ("{{", "}}")}
-# What a Mermaid label may have as it is; all else is written as the number of the character.
+# Characters that a Mermaid label may hold; all others are written as their number.
 _PLAIN = set(" /_.,:-·%()→+*")
 
 
@@ -78,14 +78,14 @@ def _arrow(edge: Edge) -> str:
 
 
 def _groups(graph: GraphVertices) -> Iterator[tuple[str | None, list[Vertex]]]:
-    """Yield each executor with its nodes, and at last what belongs to none."""
+    """Yield each executor with its nodes, and last the vertices without an executor."""
     for executor, title in graph.executors.items():
         yield title, [one for one in graph.vertices.values() if one.executor == executor]
     yield None, [one for one in graph.vertices.values() if one.executor is None]
 
 
 def _escaped(text: str) -> str:
-    # Doubled, a backslash is none of Graphviz' escapes (\N, \G, \l, …).
+    # A doubled backslash begins no escape of Graphviz (\N, \G, \l, …).
     return printable(text).replace("\\", "\\\\").replace('"', '\\"')
 
 

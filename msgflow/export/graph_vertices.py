@@ -1,4 +1,4 @@
-"""The rows of the query `graph` as vertices and the edges between them."""
+"""Vertices and edges of the graph, from the rows of the query `graph`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Vertex:
     """A node, topic or service.
 
     Attributes:
-        id: what edges call it, of letters and digits alone.
+        id: its name in edges, of letters and digits only.
         kind: 'node', 'topic' or 'service'.
-        name: as the trace has it.
+        name: in the trace.
         rate_hz: messages of a topic per second; None: not known.
         executor: number of the executor that runs the node, in `Graph.executors`.
     """
@@ -35,22 +35,22 @@ class Vertex:
 
     @property
     def lines(self) -> list[str]:
-        """What stands in it, each without control characters."""
+        """Its lines of text, without control characters."""
         rate = [] if self.rate_hz is None else [f"{self.rate_hz:.4g} Hz"]
         return [printable(self.name), *rate]
 
 
 @dataclass(frozen=True)
 class Edge:
-    """What a node does with a topic or service.
+    """An arrow between a node and a topic or service.
 
     Attributes:
-        source: id of the vertex that it begins at.
-        target: id of the vertex that it ends at.
+        source: id of its first vertex.
+        target: id of its last vertex.
         kind: 'publish', 'receive', 'call' or 'serve'.
-        indirect: how messages wait in the node for what is published; None: they do not.
+        indirect: kind of the indirect links through which messages wait in the node; None: none.
         count: messages or requests.
-        rate_hz: how often; None: not known.
+        rate_hz: messages per second; None: not known.
         median_ns: median latency; None: not known.
         p95_ns: 95 % are at most this.
     """
@@ -66,7 +66,7 @@ class Edge:
 
     @property
     def label(self) -> str:
-        """Median and p95, where there are any."""
+        """Median and p95, if they are known."""
         if self.median_ns is None or self.p95_ns is None:
             return ""
         return f"{_brief(self.median_ns)} · {_brief(self.p95_ns)}"
@@ -78,7 +78,7 @@ class Edge:
 
 
 def _brief(duration_ns: int) -> str:
-    """Return a duration with three digits: more do not fit beside an arrow."""
+    """Return a duration with three digits: there is no room for more beside an arrow."""
     for size, unit in ((1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "µs")):
         if abs(duration_ns) >= size:
             return f"{float(f'{duration_ns / size:.3g}'):g} {unit}"
@@ -87,12 +87,12 @@ def _brief(duration_ns: int) -> str:
 
 @dataclass(frozen=True, repr=False)
 class GraphVertices:
-    """Nodes, topics and services of a run, and what passes between them.
+    """Nodes, topics and services of a run, and the messages between them.
 
     Attributes:
         run: the run.
         result: the rows of the query `graph`.
-        notes: what they do not say themselves, a sentence each.
+        notes: what the rows do not say, a sentence each.
     """
 
     run: Run
@@ -107,7 +107,7 @@ class GraphVertices:
 
     @cached_property
     def executors(self) -> dict[int, str]:
-        """Executors with nodes in the graph: their number and what they are called."""
+        """Names of the executors with nodes in the graph, by their number."""
         found = {
             row["executor_id"]: row["executor"]
             for row in self.rows
@@ -138,7 +138,7 @@ class GraphVertices:
 
     @cached_property
     def edges(self) -> list[Edge]:
-        """Edges, from who sends to who gets."""
+        """Edges, from sender to receiver."""
         found = []
         for row in self.rows:
             far = "service" if row["kind"] in ("call", "serve") else "topic"

@@ -1,4 +1,4 @@
-"""Public views as Parquet files, partitioned by run, each of which says what it is."""
+"""Parquet files of public views, partitioned by run, with metadata that describe them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 FILE_NAME = "data.parquet"
-# The partition names it: readers take it from there, and would not like to find it twice.
+# Readers take this column from the name of the partition: the file must not have it.
 _PARTITION = "run_id"
 
 
@@ -88,7 +88,7 @@ def _write(
 
 
 def _pandas_types(schema: pa.Schema) -> str:
-    """Return what pandas reads from the metadata: nullable types for integers and truth values."""
+    """Return metadata for pandas: nullable types for integers and truth values."""
     import pyarrow
 
     columns: list[dict[str, Any]] = []

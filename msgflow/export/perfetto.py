@@ -115,7 +115,7 @@ class _Writer:
         """Write clocks, tracks, and the names that slices refer to."""
         start_ns = self.run.start_ns or 0
         packet = self.builder.create_packet()
-        # Timestamps are by the former; that it is the latter lets the UI show points in time.
+        # Timestamps count by the first clock; the second one lets the UI show points in time.
         for clock in ("BUILTIN_CLOCK_BOOTTIME", "BUILTIN_CLOCK_REALTIME"):
             number = self.packets.BuiltinClock.Value(clock)
             packet.clock_snapshot.clocks.add(clock_id=number, timestamp=start_ns)

@@ -1,4 +1,4 @@
-"""Indirect links declared in a file: read, matched to the nodes of a run, stored, suggested."""
+"""Indirect links that a file declares: read, matched to the nodes of a run, stored, suggested."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stores declared links as annotations of a run, in place of those of an earlier file."""
+"""Annotations of a run from declared links, stored in place of those of an earlier file."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class AppliedLinks:
-    """What a file declared for a run.
+    """The links that a file declared for a run.
 
     Attributes:
         run: the run.
-        annotation_count: links declared, one per node that an entry matches.
-        known_count: those among them that the trace declares itself, which are not stored again.
-        link_count: indirect links of the run now that the file declares, and the trace does not.
-        traced_link_count: those that the trace declares.
+        annotation_count: declared links, one per node that an entry matches.
+        known_count: those that the trace declares, too; they are not stored again.
+        link_count: indirect links of messages that come from the file only.
+        traced_link_count: indirect links of messages that come from the trace.
     """
 
     run: Run
@@ -44,7 +44,7 @@ def apply_links(
 ) -> tuple[AppliedLinks, ...]:
     """Declare the links of a file for runs of a database and derive their links anew.
 
-    Links that an earlier file declared for these runs are forgotten. Everything happens in one
+    Links that an earlier file declared for these runs are removed. Everything happens in one
     transaction.
 
     Args:
@@ -72,16 +72,16 @@ def apply_links(
 def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) -> tuple[int, int]:
     """Store the links of a file as the annotations of a run, inside the open transaction.
 
-    The links between messages have to be derived after that.
+    The caller derives the links between messages afterwards.
 
     Returns:
-        How many annotations there are, and how many of them the trace declares itself.
+        The number of annotations, and the number of those that the trace declares, too.
 
     Raises:
         UsageError: a link that does not fit the run.
     """
     matched = match_links(con, run_id, file)
-    # Before any is deleted: a key cannot be used twice in one transaction.
+    # Before we delete any: one transaction cannot use a key twice.
     first = int(
         con.execute("SELECT coalesce(max(annotation_id), 0) + 1 FROM store.annotation").fetchall()[
             0
@@ -136,6 +136,6 @@ def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]
 
 
 def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]:
-    """Return how many indirect links files declare, and how many the trace does."""
+    """Return the number of indirect links from files, and from the trace."""
     ((of_file, of_trace),) = program().run(con, "link_source", {"run_id": run_id}).fetchall()
     return of_file, of_trace

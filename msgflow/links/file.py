@@ -1,4 +1,4 @@
-"""The file in which a user declares indirect links: YAML, every mistake named with its line.
+"""File in which a user declares indirect links: YAML; errors name the line.
 
 links:
   - kind: periodic_async
@@ -27,15 +27,15 @@ _QUOTING = "quote patterns that begin with *, as in '*_raw'"
 
 @dataclass(frozen=True)
 class DeclaredLink:
-    """One entry of the file, as it was written.
+    """One entry of the file.
 
     Attributes:
         kind: 'periodic_async' or 'partial_sync'.
         node: full name of a node, or a pattern.
         inputs: topics that the node receives, or patterns.
-        inputs_of: name or pattern of another node of its process that receives them for it.
+        inputs_of: name or pattern of another node of its process that receives the inputs for it.
         outputs: topics that it publishes, or patterns.
-        process: name or pid of its process, where the name of the node occurs twice.
+        process: name or pid of its process, if several nodes have the name.
         host: its host, likewise.
         line: where the entry begins.
     """

@@ -1,4 +1,4 @@
-"""Finds what the names and patterns of declared links mean in a run."""
+"""Matching of declared links: the nodes and topics of a run that their names and patterns mean."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Endpoint:
 
 @dataclass(frozen=True)
 class Node:
-    """A node of a run, with what it receives and publishes."""
+    """A node of a run, with its subscriptions and publishers."""
 
     name: str
     process_id: int
@@ -58,14 +58,14 @@ class Node:
 
 @dataclass(frozen=True)
 class MatchedLink:
-    """A declared link of one node, with the objects that it means.
+    """A declared link of one node, with its subscriptions and publishers.
 
     Attributes:
         kind: 'periodic_async' or 'partial_sync'.
         process_id: process of the node.
-        inputs: subscriptions, in order of their identity.
+        inputs: subscriptions, in order of their ids.
         outputs: publishers, likewise.
-        line: where it was declared.
+        line: its line in the file.
     """
 
     kind: str
@@ -78,7 +78,7 @@ class MatchedLink:
 def match_links(
     con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
 ) -> tuple[MatchedLink, ...]:
-    """Return what the links of a file mean in a run.
+    """Return the links of a file with the nodes and topics of a run.
 
     Raises:
         UsageError: a node or topic that the run does not have, a name that means several nodes, an
@@ -122,7 +122,7 @@ def _read_endpoints(
 def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterator[MatchedLink]:
     chosen = _choose(file, link, nodes)
     received = {node: _received(file, link, node, nodes) for node in chosen}
-    # A name or pattern may mean several nodes: those without these topics are not meant.
+    # A name or pattern may fit several nodes: it means only those that have these topics.
     fitting = [
         (node, inputs, outputs)
         for node in chosen
@@ -186,7 +186,7 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
 def _received(
     file: LinksFile, link: DeclaredLink, node: Node, nodes: Sequence[Node]
 ) -> tuple[Endpoint, ...]:
-    """Return what a node receives, or others of its process that do so for it."""
+    """Return the subscriptions of a node, or of the nodes that receive for it in its process."""
     if link.inputs_of is None:
         return node.subscriptions
     wanted = link.inputs_of
@@ -202,7 +202,7 @@ def _received(
 
 
 def _refuse_repeated(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> None:
-    """Raise where a name means several nodes, and it was not said which."""
+    """Raise if a name means several nodes, and the entry does not say which."""
     for node in nodes:
         same = [other for other in nodes if other.name == node.name]
         in_one_process = len({other.process_id for other in same}) == 1
@@ -215,7 +215,7 @@ def _refuse_repeated(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node])
 
 
 def _endpoints(wanted: Sequence[Text], there: Sequence[Endpoint]) -> tuple[Endpoint, ...]:
-    """Return the endpoints meant; none where a text means none."""
+    """Return the endpoints that all texts mean; nothing if a text means none."""
     meant: dict[int, Endpoint] = {}
     for text in wanted:
         found = [endpoint for endpoint in there if _means(text, endpoint)]
@@ -237,7 +237,7 @@ def _fail_on_topic(
     nodes: Sequence[Node],
     received: Mapping[Node, tuple[Endpoint, ...]],
 ) -> NoReturn:
-    """Raise for the first topic that none of the nodes has, or as none has all of them."""
+    """Raise for the first topic that no node has, or because no node has all topics."""
     lacking: dict[str, str] = {}
     for texts, is_input in ((link.inputs, True), (link.outputs, False)):
         for text in texts:
@@ -272,7 +272,7 @@ def _fail_on_unknown_topic(
 
 
 def _refuse_cycles(file: LinksFile, links: Sequence[MatchedLink]) -> None:
-    """Raise where messages would lead to themselves through declared links alone."""
+    """Raise if messages would lead back to themselves through declared links."""
     before: dict[str, set[str]] = {}
     for link in links:
         for output in link.outputs:

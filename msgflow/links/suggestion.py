@@ -1,4 +1,4 @@
-"""Writes what the query `link-suggestions` finds as a file to review."""
+"""Suggestion of indirect links: a file to review, from the query `link-suggestions`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Paths with names: the file in which a user keeps them, and suggestions for it."""
+"""Named paths: the file in which a user keeps them, and suggestions for it."""
 
 from msgflow.paths.file import NamedPath, PathsFile, read_paths
 from msgflow.paths.suggestion import suggest_paths

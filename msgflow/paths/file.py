@@ -1,4 +1,4 @@
-"""The file in which a user gives paths names: YAML, every mistake named with its line.
+"""File in which a user gives paths names: YAML; errors name the line.
 
 paths:
   - name: camera-to-motors
@@ -35,7 +35,7 @@ class NamedPath:
     """One entry of the file.
 
     Attributes:
-        name: what `--path` calls it.
+        name: its name, for `--path`.
         places: topics and nodes, or globs, by 'from', 'to', 'via' and 'without'.
     """
 
@@ -43,7 +43,7 @@ class NamedPath:
     places: dict[str, tuple[Text, ...]]
 
     def words(self) -> dict[str, str]:
-        """Return the arguments of `Database.query` that it stands for."""
+        """Return the arguments of `Database.query` for this path."""
         return {word: ",".join(text.value for text in texts) for word, texts in self.places.items()}
 
 
@@ -63,7 +63,7 @@ class PathsFile:
         """Return the path with a name.
 
         Raises:
-            UsageError: there is none; the message names similar ones.
+            UsageError: no such path; the message names similar ones.
         """
         for path in self.paths:
             if path.name.value == name:
@@ -81,7 +81,7 @@ class PathsFile:
         """Raise unless the runs have every topic and node of a path.
 
         Raises:
-            UsageError: it names the line, and similar names.
+            UsageError: the message names the line, and similar names.
         """
         for texts in path.places.values():
             for text in texts:
@@ -92,7 +92,7 @@ class PathsFile:
 
 
 def read_paths(path: Path) -> PathsFile:
-    """Read a file with named paths; whether its topics and nodes exist is for a run to say.
+    """Read a file with named paths; a run decides later whether its topics and nodes exist.
 
     Raises:
         UsageError: the file cannot be read, is not YAML, or not of the form above.

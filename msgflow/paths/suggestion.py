@@ -1,4 +1,4 @@
-"""Writes the paths of a run as a file of named paths to choose from."""
+"""Suggestion of named paths: a file with the paths of a run, to choose from."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _HEAD = """\
 # Paths of a run by name, for --path: keep those that matter, and call them as
 # you like.
 #   msgflow query e2e-latency --path NAME"""
-# With what stands before it, no comment is wider than a terminal of 80 columns.
+# With its indent, no comment is wider than a terminal of 80 columns.
 _WIDTH = 76
 
 
 def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a file with a named path for each path of a run.
 
-    Paths that begin and end alike are told apart by what only some of them visit.
+    Paths with the same begin and end differ by topics and nodes that only some of them visit.
 
     Args:
         rows: of the query `e2e-latency`.
@@ -36,7 +36,7 @@ def suggest_paths(rows: Sequence[Mapping[str, Any]]) -> str:
     steps = {text: text.split(ARROW) for text in texts}
     alike: dict[tuple[str, str], list[str]] = defaultdict(list)
     for text in texts:
-        # From the first topic: a node may publish several.
+        # A path begins with its first topic: a node may publish several.
         alike[steps[text][1], steps[text][-1]].append(text)
     taken: Counter[str] = Counter()
     lines = [_HEAD, "paths:"]

@@ -1,4 +1,4 @@
-"""The named queries: one file each below `queries/`, found without opening a database."""
+"""Catalogue of named queries: one file each below `queries/`, found without a database."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
 
-# What people call what a query answers; without the s of a plural.
+# Words that people use, without the s of a plural, and the queries that answer them.
 _WORDS = {
     "jitter": ("timers", "publication-rate"),
     "rate": ("publication-rate",),
@@ -76,7 +76,7 @@ def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Heade
 
     Args:
         name: of the query.
-        views: what gives the names of the public views, one of which somebody may have meant.
+        views: returns the names of the public views, for hints.
 
     Raises:
         UsageError: there is no such query; the message names similar ones.
@@ -87,7 +87,7 @@ def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Heade
 
 
 def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
-    """Return the commands that somebody may have meant by a name that no query has."""
+    """Return a hint for a name that no query has: the commands that the user may mean."""
     words = _WORDS.get(name.lower().removesuffix("s").replace("_", "-"))
     if words is None:
         if name in views():

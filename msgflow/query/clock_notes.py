@@ -1,4 +1,4 @@
-"""Says how far times of several clocks can be compared, and when they cannot."""
+"""Notes on clocks: how far times of several clocks can be compared."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return what limits times between hosts, a sentence each.
+    """Return notes on the limits of times between hosts, a sentence each.
 
-    For each run with several clocks that are as recorded: how many, where clocks that are corrected
-    to the same one count as one. For each clock that is corrected: how far it can be wrong.
+    A run with several clocks that are not synchronised: their number; clocks that are corrected to
+    the same one count as one. A corrected clock: its largest error.
     """
     chosen = {"runs": [run.run_id for run in runs]}
-    # Most runs have one clock, of which there is nothing to say: to find that out takes no time.
+    # Most runs have one clock and need no note: this first statement takes no time.
     several = connection.execute(
         "SELECT 1 FROM main.clock WHERE list_contains($runs, run_id) "
         "GROUP BY run_id HAVING count(*) > 1 LIMIT 1",
@@ -56,12 +56,12 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
 def clock_verdicts(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], *, only_several: bool = False
 ) -> list[str]:
-    """Return for each run whether the times of its hosts can be compared, a sentence each.
+    """Return a sentence per run: whether the times of its hosts can be compared.
 
     Args:
         connection: to a database with the public views.
         runs: the runs.
-        only_several: leave out runs with one clock, of which nothing can be wrong.
+        only_several: leave out runs with one clock, where nothing can be wrong.
     """
     chosen = {"runs": [run.run_id for run in runs]}
     rows = program().run(connection, "clock_group", chosen).fetchall()

@@ -1,4 +1,4 @@
-"""Compares two runs, and tells whether one is worse than it may be."""
+"""Comparison of two runs, and conditions that say how much worse one may be."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ GROUP BY run_id
 
 @dataclass(frozen=True)
 class Condition:
-    """By how much a statistic of run B may exceed that of run A, or its share stay behind.
+    """A condition under which run B is worse than it may be.
 
     Attributes:
-        text: as it was given, such as 'p95>5%' or 'share<-1%'.
+        text: as the user wrote it, such as 'p95>5%' or 'share<-1%'.
         statistic: one of STATISTICS, or SHARE.
-        limit: in percent of run A, or in nanoseconds; of a share in percentage points.
+        limit: in percent of run A, or in nanoseconds; for a share in percentage points.
         is_relative: the limit is in percent.
     """
 
@@ -64,12 +64,12 @@ class Condition:
 
 @dataclass(frozen=True)
 class Failure:
-    """What does not meet a condition.
+    """A path, callback or topic that is worse than it may be.
 
     Attributes:
-        condition: as it was given.
-        subject: path, callback or topic.
-        reason: what was measured instead.
+        condition: as the user wrote it.
+        subject: the path, callback or topic.
+        reason: the measured difference.
     """
 
     condition: str
@@ -83,8 +83,8 @@ class Comparison:
 
     Attributes:
         result: one row per path (callback, topic) and statistic, see `main.comparison`.
-        run_a: what run B is compared with.
-        run_b: the other run.
+        run_a: the baseline.
+        run_b: the run that is compared with it.
     """
 
     result: QueryResult
@@ -101,7 +101,7 @@ class Comparison:
         """Return a row for each path, callback or topic, the greatest change first.
 
         Args:
-            only_different: leave out those of which no difference is shown.
+            only_different: leave out those without a proven difference.
         """
         from msgflow.query.comparison_summary import changes
 
@@ -122,18 +122,18 @@ def failures(
 ) -> list[Failure]:
     """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
-    'share<-1%' is for what arrived: its share may be less than in A by that many points. What has
-    values in A and none in B fails, too. The limits are compared with what was measured, whether or
-    not it may be chance.
+    'share<-1%' limits how much less may arrive: the share in B may be that many points below the
+    share in A. A subject with values in A and none in B fails, too. The measured values decide,
+    even if the difference may be chance.
 
     Args:
         result: of a comparison.
-        conditions: several may stand in one text, separated by commas.
-        hint: what to do where paths were left out.
+        conditions: one text may hold several, separated by commas.
+        hint: what to do if paths were left out.
 
     Raises:
-        UsageError: a condition that cannot be read, that is in percent of a negative latency, or
-            that cannot be answered for all paths because some were left out.
+        UsageError: a condition that cannot be read, a percentage of a negative latency, or paths
+            that were left out, so that nothing holds for all paths.
     """
     wanted = parse_conditions(conditions)
     rows = result.to_arrow().to_pylist()
@@ -246,7 +246,7 @@ def _header() -> Header:
 
 
 def _require_sense(asked: dict[str, Any]) -> None:
-    """Refuse what no type refuses; set how many resamples there are where nobody has."""
+    """Refuse values that are out of range; set the number of resamples if the user has not."""
     confidence, resamples = asked["confidence"], asked["resamples"]
     if not 0 < confidence < 1:
         raise UsageError(f"the confidence lies between 0 and 1 — {confidence}", "0.95 is usual")
@@ -267,14 +267,14 @@ def _require_sense(asked: dict[str, Any]) -> None:
 
 
 def least_resamples(confidence: float) -> int:
-    """Return how many resamples an interval takes: ten beyond either end."""
+    """Return the resamples that an interval needs: ten beyond either end."""
     return math.ceil(20 / (1 - confidence) - 1e-6)
 
 
 def _doubts(
     connection: duckdb.DuckDBPyConnection, result: QueryResult, what: str, first: Run, second: Run
 ) -> Iterable[str]:
-    """Say what the numbers do not tell."""
+    """Yield notes on limits, losses and verdicts: the numbers do not show these."""
     rows = result.to_arrow().to_pylist()
     if any(row[CUT_COLUMN] for row in rows):
         yield (
@@ -299,7 +299,7 @@ def _doubts(
 
 
 def _one_sided(result: QueryResult, what: str, first: Run, second: Run) -> Iterable[str]:
-    """Say what only one run has; nothing in common is an error."""
+    """Yield notes on subjects of one run only; raise if the runs have no subject in common."""
     rows = [row for row in result.to_arrow().to_pylist() if row["statistic"] == STATISTICS[0]]
     if not any(row["a_count"] and row["b_count"] for row in rows):
         only = {row["subject"] for row in rows}

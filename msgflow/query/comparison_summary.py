@@ -1,4 +1,4 @@
-"""What changed between two runs: a row for each subject, the greatest change first."""
+"""Summary of a comparison: a row for each subject, the greatest change first."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def changes(result: QueryResult, only_different: bool) -> QueryResult:
 
     Args:
         result: rows of `main.comparison`.
-        only_different: leave out those of which no difference is shown.
+        only_different: leave out those without a proven difference.
     """
     every = _summed(result.table, only_different=False)
     table = _summed(result.table, only_different) if only_different else every

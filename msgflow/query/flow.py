@@ -1,4 +1,4 @@
-"""The flow of one message: where it starts, and its steps as `main.flow_step` has them."""
+"""Flow of one message: its start, and its steps from `main.flow_step`."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ WHERE b.run_id = $run_id AND p.topic_name = $topic
 
 @dataclass(frozen=True)
 class Start:
-    """What a flow is followed from.
+    """The start of a flow.
 
     Attributes:
         kind: one of `KINDS`.
-        id: its identity.
-        notes: what to say about the choice, a sentence each.
+        id: its id.
+        notes: notes on the choice, a sentence each.
     """
 
     kind: str
@@ -119,11 +119,11 @@ def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[
 
     Args:
         start: where to begin.
-        run: the run that it belongs to.
-        given: direction, depth, limit and internal, as far as they are not the usual ones.
+        run: its run.
+        given: direction, depth, limit and internal; those left out get their defaults.
 
     Raises:
-        UsageError: a direction, depth or limit that cannot be.
+        UsageError: a direction, depth or limit that is out of range.
     """
     place: dict[str, Value] = {"kind": start.kind, "id": start.id, "run_id": run.run_id}
     asked: dict[str, Any] = bind(program().header("flow_steps"), {**given, **place}, "msgflow flow")
@@ -133,11 +133,11 @@ def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[
 
 
 def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]) -> pa.Table:
-    """Return the steps of a flow, nearest to the start first, with how long executors were busy.
+    """Return the steps of a flow, the nearest first, and how long executors were busy.
 
     Args:
         connection: to a database with the public views.
-        asked: as `flow_parameters` returns them.
+        asked: the result of `flow_parameters`.
 
     Raises:
         QueryError: the database could not run it.

@@ -1,4 +1,4 @@
-"""Which rows of a query somebody wants, in which order and how many: a SELECT around its SQL."""
+"""Selection of rows of a query, their order and number: a SELECT around its SQL."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
 
-# What columns name, as the headers of queries have it in the place of a unit.
+# Kinds of names in columns: headers of queries have them in place of a unit.
 KINDS = ("node", "topic", "callback", "host")
 PATH = "path"
 INTERNAL_COLUMN = "is_internal"
@@ -54,17 +54,17 @@ class Selection:
     slowest: int | None = None
 
     def names(self) -> dict[str, tuple[str, ...]]:
-        """Return the wanted names by what they are of; 'place' is a node, topic or service."""
+        """Return the wanted names by kind; a 'place' is a node, topic or service."""
         given = {kind: getattr(self, kind) for kind in KINDS} | {"place": self.via + self.without}
         return {kind: names for kind, names in given.items() if names}
 
 
 def selected(header: Header, selection: Selection, internal: bool) -> tuple[str, dict[str, Value]]:
-    """Return the SQL of a query with the selection around it, and what to bind besides.
+    """Return the SQL of a query inside the selection, and its additional bindings.
 
-    The columns COUNTS and PLACE come after those of the query: how many rows there were before
-    the limit, how many internal ones were left out, how many are cut off. There is one row at
-    least; where PLACE is NULL in it, no row was selected.
+    The columns COUNTS and PLACE come after those of the query: the number of rows before the limit,
+    of internal rows that are hidden, and of rows that are cut off. There is always a row; if its
+    PLACE is NULL, no row was selected.
 
     Raises:
         UsageError: the query has no such rows or columns.
@@ -72,7 +72,7 @@ def selected(header: Header, selection: Selection, internal: bool) -> tuple[str,
     names = [column.name for column in header.columns]
     conditions, bindings = conditions_of(header, selection)
     if selection.where is not None:
-        # A comment at its end ends with the line.
+        # The line break ends a comment at its end.
         conditions.append(f"(\n{selection.where}\n)")
     is_hidden = f"coalesce({INTERNAL_COLUMN}, false)" if INTERNAL_COLUMN in names else "false"
     if internal:
@@ -110,7 +110,7 @@ ORDER BY {", ".join(f"s.{part}" for part in order)}
 
 
 def conditions_of(header: Header, selection: Selection) -> tuple[list[str], dict[str, Value]]:
-    """Return what rows have to be by names and paths, for rows called `result`, and what to bind.
+    """Return the conditions on names and paths, for rows called `result`, and their bindings.
 
     Raises:
         UsageError: the query has no such columns.
@@ -209,7 +209,7 @@ def _what_it_has(header: Header) -> str:
 
 
 def values_of(given: str | Sequence[str] | None) -> tuple[str, ...]:
-    """Return names that a user gave: one, several, or several in one text, between commas."""
+    """Return the names that a user gave: one, several, or one text with commas."""
     if given is None:
         return ()
     texts = [given] if isinstance(given, str) else list(given)

@@ -1,4 +1,4 @@
-"""Requirements on a run: a file that says what has to be, and whether it is."""
+"""Requirements on a run: the file that lists them, and the verdicts."""
 
 from msgflow.verify.file import TargetsFile, read_targets
 from msgflow.verify.verify import Verdict, Verification, verify

@@ -1,4 +1,4 @@
-"""Conditions as people write them: `p99 < 80 ms`, `100 Hz ± 5 %`, `< 1 %`."""
+"""Conditions of requirements as people write them: `p99 < 80 ms`, `100 Hz ± 5 %`, `< 1 %`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _AROUND = re.compile(
 
 
 class Dimension(StrEnum):
-    """What a measured value is: its unit in the verdicts."""
+    """The dimension of a measured value, which is its unit in the verdicts."""
 
     TIME = "ns"
     RATE = "Hz"
@@ -50,13 +50,13 @@ _EXAMPLES = {
 
 @dataclass(frozen=True)
 class Condition:
-    """What a measured value has to be.
+    """The range of a measured value.
 
     Attributes:
-        text: as it was written, with single blanks.
-        statistic: which statistic is measured, '' where there is only one.
-        lower: the value is above this, or equal to it; None: any.
-        upper: it is below this, or equal to it; None: any.
+        text: as the user wrote it, with single blanks.
+        statistic: the statistic that is measured; '' if there is one value only.
+        lower: the least value; None: no limit.
+        upper: the largest value; None: no limit.
         is_strict: equal to a bound is not enough.
     """
 
@@ -67,7 +67,7 @@ class Condition:
     is_strict: bool
 
     def holds(self, value: float) -> bool:
-        """Tell whether a measured value, in the unit of its dimension, is as it has to be."""
+        """Tell whether a measured value, in the unit of its dimension, is in the range."""
         if self.is_strict and value in (self.lower, self.upper):
             return False
         return (self.lower is None or value >= self.lower) and (
@@ -90,12 +90,12 @@ class ConditionError(ValueError):
 def parse_condition(
     text: str, dimension: Dimension, statistics: tuple[str, ...], metric: str
 ) -> Condition:
-    """Return what a text means.
+    """Return the condition that a text means.
 
     Args:
-        text: as it was written.
-        dimension: of what is measured.
-        statistics: that are measured; none where there is one value only.
+        text: as the user wrote it.
+        dimension: of the measured value.
+        statistics: those that are measured; empty if there is one value only.
         metric: its name, for errors.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The file of requirements: which subject has to meet which conditions.
+"""File of requirements: the conditions that each subject has to meet.
 
 targets:
   - path: [/scan, /cmd_vel]
@@ -35,8 +35,8 @@ class Requirement:
 
     Attributes:
         metric: its name.
-        condition: what it has to be.
-        line: where it stands, from 1.
+        condition: the condition.
+        line: its line, from 1.
     """
 
     metric: str
@@ -46,13 +46,13 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Target:
-    """A subject and what it has to be like.
+    """A subject with its requirements.
 
     Attributes:
         kind: a key of SUBJECTS.
-        name: what the file calls it, else how it chooses its subject.
-        topics: of a path, in order; none of a path that only has a name.
-        path_name: of a path in the file with named paths.
+        name: its name in the file, else the words that choose its subject.
+        topics: topics of a path, in order; empty for a path that only has a name.
+        path_name: name of a path in the file with named paths.
         chosen: fields that choose rows, by name: names or patterns.
         requirements: at least one.
     """
@@ -79,7 +79,7 @@ class TargetsFile:
 
 
 def read_targets(path: Path) -> TargetsFile:
-    """Read a file of requirements; whether its names exist is for a run to say.
+    """Read a file of requirements; a run decides later whether its names exist.
 
     Raises:
         UsageError: the file cannot be read, is not YAML, or not of the form above.
@@ -134,7 +134,7 @@ def _kind(file: YamlFile, node: Any) -> str:
     if node.id != "mapping":
         file.fail(line_of(node), "a target is not a mapping", _EXAMPLE)
     names = [key.value for key, _ in node.value if key.id == "scalar"]
-    # A timer is chosen by its callback, and so on: what comes first in SUBJECTS says what it is.
+    # A timer may be chosen by its callback, and so on: the first key of SUBJECTS is the kind.
     found = [kind for kind in SUBJECTS if kind in names]
     if not found:
         near = next((near[0] for name in names if (near := nearest(str(name), (*SUBJECTS,)))), None)
@@ -202,7 +202,7 @@ def _requirements(file: YamlFile, kind: str, name: str, node: Any) -> list[Requi
 
 
 def _refuse_repeated(file: YamlFile, targets: tuple[Target, ...]) -> None:
-    """Raise where the same bound of the same metric of the same subject is given twice."""
+    """Raise if a bound of a metric of a subject is given twice."""
     seen: dict[tuple[Any, ...], int] = {}
     for target in targets:
         subject = (

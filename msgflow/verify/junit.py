@@ -1,4 +1,4 @@
-"""Verdicts as JUnit XML, which every CI server shows."""
+"""JUnit XML of verdicts, for CI servers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str:
-    """Return a document with one test case per requirement and thing that it is of.
+    """Return a document with one test case per verdict.
 
     Args:
         result: the verdicts.
-        run: that they are on.
-        allow_not_measured: what was not measured is skipped, else an error.
+        run: their run.
+        allow_not_measured: requirements that were not measured are skipped tests, else errors.
     """
     rows: list[dict[str, Any]] = result.to_arrow().to_pylist()
     missing = "skipped" if allow_not_measured else "errors"
@@ -33,7 +33,7 @@ def junit_xml(result: QueryResult, run: Run, *, allow_not_measured: bool) -> str
     name = printable(run.name)
     suite = ElementTree.SubElement(root, "testsuite", {"name": name, **numbers})
     for row in rows:
-        # Names come from traces and files: characters that XML cannot hold stand there escaped.
+        # Names come from traces and files: `printable` escapes characters that XML cannot hold.
         case = ElementTree.SubElement(
             suite,
             "testcase",

@@ -1,4 +1,4 @@
-"""What can be required of what: each metric is an expression over the columns of a named query."""
+"""Metrics of requirements: each is an expression over the columns of a named query."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ _HIGH = ("median", "p95", "p99", "max")
 
 @dataclass(frozen=True)
 class Metric:
-    """One thing that is measured.
+    """A metric.
 
     Attributes:
         query: the named query that measures it.
         value: SQL over its columns; `{}` stands for the statistic.
         dimension: of the value.
-        statistics: that there are; none where it is one value.
-        samples: SQL over its columns: how many values it is from.
-        worst: which worst case explains that it is exceeded, a key of `worst.WORST`.
+        statistics: those of the query; empty if there is one value only.
+        samples: SQL over its columns: the number of values behind it.
+        worst: the worst case that explains a value that is too large, a key of `worst_case.KEYS`.
         missing: why there may be no value.
     """
 
@@ -35,12 +35,12 @@ class Metric:
 
 @dataclass(frozen=True)
 class Filter:
-    """How a field of a target chooses rows: the columns of each query that it is compared with.
+    """A field of a target that chooses rows.
 
     Attributes:
-        columns: by query; one of them has to match.
-        names: SQL that gives the names that a run ($run_id) has.
-        what: such a name, in errors.
+        columns: the columns that it is compared with, by query; one of them has to match.
+        names: SQL that returns the names of a run ($run_id).
+        what: the word for such a name in errors.
     """
 
     columns: dict[str, tuple[str, ...]]
@@ -50,11 +50,11 @@ class Filter:
 
 @dataclass(frozen=True)
 class Subject:
-    """A kind of thing that has requirements.
+    """A kind of thing with requirements.
 
     Attributes:
         metrics: by name.
-        label: by query, SQL that names a row.
+        label: SQL that names a row, by query.
         filters: by field of the file; the first is the subject itself, others are optional.
     """
 

@@ -1,4 +1,4 @@
-"""A file of requirements that a good run meets, for its author to review."""
+"""Suggestion of requirements: a file that a good run meets, for its author to review."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 Row = dict[str, Any]
-# With fewer values a percentile is only the largest of them.
+# With fewer values, a percentile is only their largest.
 LEAST_VALUES = 20
-# What starts with a pause or comes in bursts has no rate.
+# A topic that pauses or comes in bursts has no rate: the deviation of its period is larger.
 _STEADY = 0.25
 _RATE_PERCENT = 5
-# What the operating system alone may take to wake a thread.
+# The time that an operating system may need to wake a thread.
 _LEAST_LATENESS_NS = 1_000_000
 
 
@@ -27,10 +27,10 @@ def suggest_targets(run: Run, results: Mapping[str, Sequence[Row]], margin: floa
     """Return the text of a file that `read_targets` reads, and that the run meets.
 
     Args:
-        run: that was measured.
+        run: the measured run.
         results: rows of the named queries `e2e-latency`, `timers`, `publication-rate` and
             `service-latency`, by name.
-        margin: by how much more than measured is allowed, as a share.
+        margin: how much more than measured is allowed, as a share.
     """
     entries = [
         *_paths(results["e2e-latency"], margin),

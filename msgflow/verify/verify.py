@@ -74,7 +74,7 @@ class Verification:
     """The verdicts on a run.
 
     Attributes:
-        result: one row per requirement and thing that it is of; columns as of its header.
+        result: one row per requirement and measured thing; its header describes the columns.
         run: the run.
     """
 
@@ -93,7 +93,7 @@ class Verification:
         return verdicts.count(Verdict(verdict))
 
     def unmet(self) -> list[str]:
-        """Return what failed or was not measured, a line each: what, and what was found instead."""
+        """Return a line for each requirement that failed or was not measured, with the reason."""
         return [
             f"{row['verdict']}: {row['subject'] or row['target']}: {row['metric']}"
             f" {row['condition']}: {row['measured'] or row['reason']}"
@@ -102,7 +102,7 @@ class Verification:
         ]
 
     def to_junit(self, *, allow_not_measured: bool = False) -> str:
-        """Return the verdicts as JUnit XML: what was not measured is an error, or skipped."""
+        """Return the verdicts as JUnit XML: 'not measured' is an error, or skipped."""
         from msgflow.verify.junit import junit_xml
 
         return junit_xml(self.result, self.run, allow_not_measured=allow_not_measured)
@@ -115,14 +115,14 @@ def verify(
     *,
     paths: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
 ) -> Verification:
-    """Return whether a run meets the requirements of a file.
+    """Return the verdicts on the requirements of a file.
 
     Args:
         connection: to a database with the public views.
         targets: the requirements.
         part: one run, and the times to read.
-        paths: topics and nodes, or globs, by 'from', 'to', 'via' and 'without', of each path that
-            the requirements call by a name.
+        paths: for each named path of the requirements, its topics and nodes, or globs, by 'from',
+            'to', 'via' and 'without'.
 
     Raises:
         UsageError: no such run, time, topic, node, callback, service or process.
@@ -133,7 +133,7 @@ def verify(
     _require_names(connection, targets, one)
     work = _Work(connection, one, window, paths or {})
     rows = [row for target in targets.targets for row in work.rows(target)]
-    # What is to be looked at comes first, else the order of the file.
+    # Failures come first; otherwise the order of the file stays.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
     import pyarrow as pa
 
@@ -185,7 +185,7 @@ class _Work:
     def _measure(
         self, target: Target, name: str, requirements: Sequence[Requirement]
     ) -> list[dict[str, Any]]:
-        """Return the values of all requirements that one query measures, a row per thing."""
+        """Return the values of the requirements that one query measures, a row per thing."""
         subject = SUBJECTS[target.kind]
         columns = [f"{subject.label[name]} AS subject"]
         for place, requirement in enumerate(requirements):
@@ -220,7 +220,7 @@ class _Work:
         is_named = " OR ".join(f"{column} = $wanted_{field}" for column in columns)
         is_meant = " OR ".join(f"{column} GLOB $wanted_{field}" for column in columns)
         if any(column.name == "is_internal" for column in header.columns):
-            # What ROS does for itself is meant by its name only.
+            # A pattern does not mean what ROS does for itself: only its name does.
             is_meant = f"({is_meant}) AND NOT is_internal"
         return f"({is_named} OR ({is_meant}))"
 
@@ -237,7 +237,7 @@ class _Work:
             header,
             body=sql.format(header.body.rstrip()),
             params=header.params + params,
-            # Those of the named query are not in the answer.
+            # The result does not have the columns of the named query.
             columns=(),
         )
         own: dict[str, Value] = dict(given)
@@ -309,7 +309,7 @@ class _Work:
 
 
 def _require_names(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> None:
-    """Raise for the first name or pattern of the file that means nothing in the run."""
+    """Raise for the first name or pattern of the file that nothing in the run has."""
     topics = SUBJECTS["topic"].filters["topic"]
     known: dict[str, list[str]] = {}
 

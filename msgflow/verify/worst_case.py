@@ -1,4 +1,4 @@
-"""The worst case of what failed: which flow, call or message it was, and how to look at it."""
+"""Worst case of a failed requirement: the flow, call or message, and the command that shows it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class WorstCase:
     """The worst case.
 
     Attributes:
-        duration_ns: how long it took; None where it did not end.
+        duration_ns: how long it took; None if it did not end.
         at_ns: when it began, epoch ns.
-        command: shows it.
+        command: the command that shows it.
     """
 
     duration_ns: int | None
@@ -31,8 +31,8 @@ class WorstCase:
     command: str
 
 
-# By what a row of the query that measures is known. Duration, begin and identity of its worst case,
-# and what that is, come from the statement `worst_…`, of flows from the query's own.
+# The key of a row of the measuring query, by kind of worst case. The statement `worst_…` returns
+# duration, begin, id and kind of the worst case; for flows, the statements below do.
 KEYS = {
     "flow": "path",
     "lost_flow": "path",
@@ -58,11 +58,11 @@ ORDER BY root_ns, root_id LIMIT 1
 def find_worst_case(
     connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: Window
 ) -> WorstCase | None:
-    """Return the worst case of a kind, None where there is none.
+    """Return the worst case of a kind, None if there is none.
 
     Args:
         connection: to a database with the public views.
-        kind: a key of KEYS that is not of flows.
+        kind: a key of KEYS, but not of FLOWS.
         key: of the row that failed.
         window: the time window.
     """
@@ -72,7 +72,7 @@ def find_worst_case(
 
 
 def worst_case_of(row: Sequence[Any]) -> WorstCase:
-    """Return the worst case that a row of such a statement tells."""
+    """Return the worst case in a row of such a statement."""
     duration, at_ns, identity, kind = row
     words = ["msgflow", "flow", f"--{kind.replace('_', '-')}", str(identity)]
     return WorstCase(duration, at_ns, shlex.join(words))

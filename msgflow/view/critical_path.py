@@ -1,4 +1,4 @@
-"""The critical path of a picked flow: what the query critical-path says of it."""
+"""Critical path of a picked flow, from the query critical-path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the pages ask for, answered from a database: by the server, and by a report in advance."""
+"""Answers to the pages from a database: for the server, and for a report in advance."""
 
 from __future__ import annotations
 
