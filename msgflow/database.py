@@ -46,7 +46,7 @@ _T = TypeVar("_T")
 DEFAULT_LIMIT = 10_000
 _WRITING_WITH = re.compile(r"WITH clause containing a .* statement must be at the top level")
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
-# Of reports, bytes: what mail servers take.
+# Bytes of a report: mail servers take that much.
 DEFAULT_REPORT_SIZE = 20_000_000
 
 _SCHEMA = """
@@ -66,8 +66,9 @@ ORDER BY columns.table_name, columns.column_index
 class Database:
     """A database file: ingest into it, ask it, export it.
 
-    Reading happens on one read-only connection without access to other files or the network,
-    opened at the first question. Use it as a context manager, or call `close`.
+    All reading uses one read-only connection without access to other files or the network; the
+    first question opens it. Use the object as a context manager, or call `close`. Many methods take
+    `run`, `start`, `end` and `skip_first`: `msgflow.Slice` explains them.
 
     Attributes:
         path: the file; `ingest` creates it.
@@ -90,7 +91,7 @@ class Database:
         self.close()
 
     def close(self) -> None:
-        """Close the file; a later call opens it again."""
+        """Close the file; a later question opens it again."""
         if self._connection is not None:
             self._connection.close()
             self._connection = None
@@ -133,14 +134,14 @@ class Database:
 
         Args:
             paths: CTF directories, or directories above some.
-            name: of the run; derived from the paths when None.
+            name: of the run; made from the paths when None.
             replace: take the place of a run with the same name or packets.
-            hosts: name of a host -> path or paths; the traces below belong to that host. Where
-                several paths lead to a trace, the deepest counts.
+            hosts: path or paths by name of a host; the traces below belong to that host. If several
+                paths lead to a trace, the deepest one counts.
             keep_staging: directory for the staging tables as Parquet.
             links: file with indirect links to declare.
-            clock_sync: how clocks of several hosts are brought together: 'none', 'messages', or a
-                file with the offset of each, see docs/clocks.md.
+            clock_sync: how to correct the clocks of several hosts: 'none', 'messages', or a file
+                with the offset of each, see docs/clocks.md.
             reader: 'auto', 'msgflow' or 'bt2'.
             strict: refuse a trace at its first damage, instead of keeping what is good.
             ignore: names of events to leave out.
@@ -150,7 +151,7 @@ class Database:
             TraceError: no trace, or none that can be read.
             DatabaseError: the file is locked, foreign, or of another schema revision.
             UsageError: `links` is not such a file, or does not fit the traces; a path in `hosts`
-                that has two names, or has no trace of its own.
+                with two names, or without a trace of its own.
         """
         from msgflow.ingest import ingest
 
@@ -176,7 +177,7 @@ class Database:
     ) -> tuple[AppliedLinks, ...]:
         """Declare the indirect links of a file and derive all links anew, in one transaction.
 
-        Links that an earlier file declared for these runs are forgotten.
+        Links that an earlier file declared for these runs are removed.
 
         Args:
             file: YAML; docs/causes.md has its form.
@@ -195,14 +196,14 @@ class Database:
     def apply_clocks(
         self, clock_sync: str | Path, *, run: str | int | None = None
     ) -> tuple[Run, ...]:
-        """Bring the clocks of several hosts together, or leave them as they were recorded.
+        """Correct the clocks of several hosts, or leave them as recorded.
 
         Args:
             clock_sync: 'none', 'messages', or a file with the offset of each clock.
             run: 'all', a name or an id; the latest run when None.
 
         Returns:
-            The runs whose clocks were set.
+            The runs with corrected clocks.
 
         Raises:
             UsageError: no such file or run, or a file that does not fit the run.
@@ -222,7 +223,7 @@ class Database:
             name: the new name, which no other run has.
 
         Raises:
-            UsageError: no such run, or a name that is taken, or means something else to `run`.
+            UsageError: no such run, or a name that another run has or that `run` reads otherwise.
             DatabaseError: the file cannot be opened.
         """
         from msgflow.db.runs import rename_run
@@ -235,10 +236,10 @@ class Database:
 
         Args:
             run: 'all', a name, an id, or a label that runs have (KEY=VALUE).
-            **labels: values by key; None takes the label of that key away.
+            **labels: values by key; None removes the label.
 
         Raises:
-            UsageError: no such run, a key or value that cannot be one, or no such label.
+            UsageError: no such run, an invalid key or value, or no such label to remove.
             DatabaseError: the file cannot be opened.
         """
         from msgflow.db.runs import label_runs
@@ -247,7 +248,7 @@ class Database:
         return label_runs(self.path, run, labels, memory_limit=self._memory_limit)
 
     def remove_runs(self, run: str | int) -> tuple[Run, ...]:
-        """Delete runs with all that is known of them, and return which.
+        """Delete runs with all their data, and return them.
 
         Args:
             run: 'all', a name or an id.
@@ -287,11 +288,11 @@ class Database:
     ) -> QueryResult:
         """Run a named query.
 
-        Rows can be chosen where the query has such columns. Names may be globs, several in a list
-        or between commas.
+        Rows can be chosen by the kinds of names in the columns of the query. Names may be globs, and
+        several in a list or between commas.
 
         Args:
-            name: as `list_queries` has it.
+            name: of the query, see `list_queries`.
             run, start, end, skip_first: what to read, see `msgflow.Slice`.
             internal: show the rows of ROS's own topics and services too.
             node: rows that name one of these nodes.
@@ -303,14 +304,14 @@ class Database:
             where: a condition in SQL on the columns of the query, such as 'p99_ns > 80e6'.
             sort: column to sort by, 'p99_ns' or 'p99_ns:desc', or several.
             limit: most rows.
-            slowest: so many of the slowest rows, of queries whose rows take time.
+            slowest: number of the slowest rows, for queries whose rows have a duration.
             path: name of a path in a file; in place of `from_`, `to`, `via` and `without`.
             paths: that file.
             parameters: the query's own; `from_` means `from`.
 
         Raises:
             UsageError: a query, parameter, name, column, run or time that does not exist or cannot
-                be read, a condition that does not only read, or rows that the query does not have.
+                be read, a condition that does more than read, or rows that the query does not have.
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
@@ -330,7 +331,7 @@ class Database:
             "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
             "without": without, "where": where, "sort": sort, "limit": limit, "slowest": slowest,
         }  # fmt: skip
-        # What a query has a parameter for, it does itself.
+        # A query applies its own parameters itself.
         own = {param.name for param in header.params} & {
             word for word, value in selection.items() if value is not None
         }
@@ -352,7 +353,7 @@ class Database:
         return self._ask(ask)
 
     def _named_path(self, header: Header, name: str, file: Path, part: Slice) -> dict[str, str]:
-        """Return the words of `query` that a named path stands for."""
+        """Return the arguments of `query` that a named path stands for."""
         from msgflow.paths import read_paths
 
         if not any(param.name == "from" for param in header.params):
@@ -378,25 +379,25 @@ class Database:
         limit: int = 1_000,
         internal: bool = False,
     ) -> Flow:
-        """Return what one message caused and was caused by; `print` draws it as a tree.
+        """Return the causes and effects of one message; `print` draws them as a tree.
 
         Args:
-            topic: the first message published on it at or after `at`; else give an identity.
+            topic: start at the first message published on it at or after `at`; else give an id.
             at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; the begin of
                 the run when None.
-            publication_id: identity of a publication.
-            take_id: identity of a take.
-            callback_instance_id: identity of a callback instance.
-            request_id: identity of a request to a service.
-            response_id: identity of a response of a service.
+            publication_id: id of a publication.
+            take_id: id of a take.
+            callback_instance_id: id of a callback instance.
+            request_id: id of a request to a service.
+            response_id: id of a response of a service.
             run: a name or an id, for `topic` only; the latest run when None.
-            direction: 'forward' (what it caused), 'backward' (what it was caused by) or 'both'.
+            direction: 'forward' (effects), 'backward' (causes) or 'both'.
             depth: most messages in a row, each way.
             limit: most publications, takes, callback instances, requests and responses.
-            internal: follow what goes to ROS's own topics and services too.
+            internal: follow messages on ROS's own topics and services, too.
 
         Raises:
-            UsageError: not exactly one thing to start from, or one that does not exist.
+            UsageError: not exactly one start, or one that does not exist.
             QueryError: the database could not run it.
             DatabaseError: the file cannot be opened.
         """
@@ -439,11 +440,10 @@ class Database:
     def flow_page(self, flow: Flow, path: str | Path) -> int:
         """Write the timeline of a flow into one file that any browser opens; return its bytes.
 
-        It is drawn in the direction of the flow, up to its depth and its limit of vertices; ROS's
-        own topics included.
+        The page draws the flow in its direction, up to its depth and limit, with ROS's own topics.
 
         Args:
-            flow: as `flow` returned it.
+            flow: the result of `flow`.
             path: the file; one that exists is replaced.
 
         Raises:
@@ -476,11 +476,11 @@ class Database:
         skip_first: float | None = None,
         internal: bool = False,
     ) -> Graph:
-        """Return who sends what to whom, to be written as DOT, Mermaid, SVG or JSON.
+        """Return the graph of nodes, topics and services, for DOT, Mermaid, SVG or JSON.
 
         Args:
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
-            internal: show ROS's own topics and services too.
+            internal: show ROS's own topics and services, too.
 
         Raises:
             UsageError: not exactly one run, or a time that cannot be read.
@@ -513,19 +513,19 @@ class Database:
         """Compare run B with run A: by path, callback or topic, with intervals and effect sizes.
 
         Args:
-            run_a: name or id of the run that is compared with.
-            run_b: name or id of the other one.
+            run_a: name or id of the baseline.
+            run_b: name or id of the run to compare with it.
             what: 'paths' (end-to-end latency), 'callbacks' (duration) or 'topics' (transport
                 latency).
             from_: topic where paths start; every source when None.
             to: topic where paths end; wherever they end when None.
-            case: arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
+            case: the arrivals of paths that count: 'first', 'last', 'newest' or 'every_pair'.
             skip_first: seconds to leave out at the begin of each run.
             confidence: of the intervals, between 0 and 1.
-            resamples: that the intervals are from: 20 / (1 - confidence) at least; 1000, or as many
-                as that, when None; 0 leaves out intervals and verdicts, which take longest.
+            resamples: number behind the intervals, at least 20 / (1 - confidence); when None, 1000
+                or that minimum; 0 leaves out intervals and verdicts, which take longest.
             seed: of the resampling; the same seed gives the same intervals.
-            internal: compare what ROS does for itself too.
+            internal: compare what ROS does for itself, too.
             max_depth: longest path, in topics.
             max_paths: most paths, shortest first, and most chains per length.
 
@@ -566,19 +566,18 @@ class Database:
         end: str | int | None = None,
         skip_first: float | None = None,
     ) -> Verification:
-        """Tell whether a run meets the requirements of a file.
+        """Verify a run against the requirements of a file.
 
         Args:
-            targets: YAML; docs/verify.md has its form.
-            paths: the file with the paths that `targets` calls by their names.
+            targets: YAML, see docs/verify.md.
+            paths: the file with the named paths of `targets`.
             run, start, end, skip_first: what to read, see `msgflow.Slice`; one run.
 
         Returns:
-            The verdicts: one row per requirement and thing of the run that it is of.
+            The verdicts: one row per requirement and measured thing of the run.
 
         Raises:
-            UsageError: not such a file, no such run or time, or a name that means nothing in the
-                run.
+            UsageError: not such a file, no such run or time, or a name that nothing in the run has.
             QueryError: the database could not run a query.
             DatabaseError: the file cannot be opened.
         """
@@ -593,7 +592,7 @@ class Database:
     def _places(
         self, targets: TargetsFile, file: Path, part: Slice
     ) -> dict[str, dict[str, list[str]]]:
-        """Return topics and nodes of the paths that requirements call by their names."""
+        """Return topics and nodes of the named paths of requirements."""
         from msgflow.paths import read_paths
 
         called = [target.path_name for target in targets.targets if target.path_name is not None]
@@ -616,11 +615,11 @@ class Database:
     def suggest_targets(
         self, *, run: str | int | None = None, skip_first: float | None = None, margin: float = 0.2
     ) -> str:
-        """Return a file of requirements that a run meets, to review and to change.
+        """Return the text of a file of requirements that a run meets, to review and change.
 
         Args:
             run, skip_first: what to read, see `msgflow.Slice`; one run.
-            margin: by how much more than measured is allowed, as a share.
+            margin: how much more than measured is allowed, as a share.
 
         Raises:
             UsageError: no such run, or a margin below 0.
@@ -657,7 +656,7 @@ class Database:
             run, start, end: what to read, see `msgflow.Slice`; one run.
             compare: another run to compare it with.
             path_text: only paths with this text in them: a topic, or a node.
-            max_size: most bytes of the file; what does not fit is left out, which it says.
+            max_size: most bytes of the file; the page says what it leaves out to fit.
 
         Raises:
             UsageError: no such run or path, nothing in the window, or a size that is too small.
@@ -685,12 +684,12 @@ class Database:
 
         Args:
             text: one query, or EXPLAIN of one.
-            limit: most rows returned, all when None; a note says when there were more.
+            limit: most rows returned, all when None; a note says if there are more.
 
         Raises:
             UsageError: there is no SQL.
-            QueryError: the statement might do more than read, there are several, or the database
-                could not run it.
+            QueryError: a statement that may do more than read, several statements, or one that the
+                database could not run.
             DatabaseError: the file cannot be opened.
         """
         connection = self.connection
@@ -701,7 +700,7 @@ class Database:
             raise in_words(error, self.path) or sql_error(error) from error
 
     def schema(self) -> QueryResult:
-        """Return the public views: one row per column, with its type and meaning."""
+        """Return the columns of the public views, a row each, with type and meaning."""
         connection = self.connection
         return self._ask(lambda: QueryResult(connection.sql(_SCHEMA).to_arrow_table()))
 
@@ -722,7 +721,7 @@ class Database:
         return self._ask(lambda: run_checks(connection))
 
     def findings(self, *, run: str | int | None = None) -> list[Finding]:
-        """Tell what is wrong with a recording: errors first, each with cause and cure.
+        """Return the findings of a recording: errors first, each with cause and cure.
 
         Args:
             run: 'all', a name or an id; the latest run when None.
@@ -869,7 +868,7 @@ class Database:
 
 
 def capped(relation: duckdb.DuckDBPyRelation, limit: int | None) -> QueryResult:
-    """Return the rows of a query that a user gave, `limit` at most."""
+    """Return the rows of a user's query, `limit` at most."""
     if limit is None:
         return QueryResult(relation.to_arrow_table())
     table = relation.limit(limit + 1).to_arrow_table()
@@ -880,7 +879,7 @@ def capped(relation: duckdb.DuckDBPyRelation, limit: int | None) -> QueryResult:
 
 
 def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
-    """Return what DuckDB says about SQL that a user gave."""
+    """Return the error of a user's SQL in the words of DuckDB."""
     if isinstance(error, duckdb.OutOfMemoryException):
         return out_of_memory("the SQL", *more_memory)
     if isinstance(error, duckdb.PermissionException):
@@ -888,7 +887,7 @@ def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
     if _WRITING_WITH.search(str(error)):
         # DuckDB sees the query as a subquery, and would advise to put the WITH where it is.
         return QueryError("not a statement that only reads — WITH", "SELECT in each part of WITH")
-    # DuckDB says what is wrong, sometimes what it could have been, and points at the place.
+    # DuckDB says what is wrong, sometimes suggests a correction, and points at the place.
     what, *more = first_line(error), *str(error).strip().splitlines()[1:]
     place = next((at for at, line in enumerate(more) if line.startswith("LINE ")), len(more))
     hint = " ".join(line.strip() for line in more[:place] if line.strip())
@@ -899,10 +898,10 @@ def sql_error(error: duckdb.Error, *more_memory: str) -> QueryError:
 
 
 def open_db(path: str | Path, *, memory_limit: str | None = None) -> Database:
-    """Return the database at `path`, which is opened at the first question.
+    """Return the database at `path`; the first question opens it.
 
     Args:
-        path: file; need not exist before the first ingest.
+        path: the file; the first ingest creates it.
         memory_limit: for DuckDB, such as '2GB'; chosen by msgflow when None.
     """
     return Database(path, memory_limit=memory_limit)

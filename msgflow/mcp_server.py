@@ -1,7 +1,7 @@
 """A server of the Model Context Protocol: agents ask a database, and can change nothing.
 
-It talks over stdin and stdout. Every call opens the database for reading and closes it again, so
-that a waiting agent keeps nobody from ingesting. Answers are short, and say what they leave out.
+It talks over stdin and stdout. Every call opens the database for reading and closes it again: a
+waiting agent blocks no ingest. Answers are short, and say what they leave out.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
     """Return the server, which `run()` starts on stdin and stdout.
 
     Args:
-        path: the database; whether there is one, every call asks anew.
+        path: the database; every call looks for it anew.
         seconds: how long a call may take.
 
     Raises:

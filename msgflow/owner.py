@@ -21,9 +21,9 @@ def mark() -> str:
 
 
 def is_abandoned(text: str) -> bool:
-    """Tell whether the process with this mark certainly has ended.
+    """Tell whether the process with this mark has certainly ended.
 
-    Of one on another machine, in another container, or before a restart nobody can tell.
+    Nothing is certain for a process on another machine, in another container, or before a restart.
     """
     found = _MARK.fullmatch(text)
     if found is None or found[1] != _place() or _place() == _UNKNOWN:
@@ -42,7 +42,7 @@ def _place() -> str:
 
 
 def _start(pid: int) -> int:
-    """Return when a process started, in ticks since the machine did; 0 if there is none."""
+    """Return the start of a process, in ticks since the machine started; 0 for no process."""
     with contextlib.suppress(OSError, ValueError, IndexError):
         status = Path(f"/proc/{pid}/stat").read_bytes()
         return int(status.rpartition(b")")[2].split()[19])

@@ -11,7 +11,7 @@ from msgflow.errors import UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Nobody writes more by hand, and parsers of YAML take a hundred times as much memory.
+# No user writes more by hand. Parsers of YAML need a hundred times as much memory.
 MOST_BYTES = 1_000_000
 
 
@@ -19,12 +19,12 @@ def read_text(path: Path, what: str, hint: str) -> str:
     """Return the text of a file.
 
     Args:
-        path: the file; a pipe, a device and the like are refused, not waited for.
-        what: how an error begins that says that it cannot be read.
-        hint: what errors recommend.
+        path: the file; a pipe or a device is an error at once.
+        what: begin of the message if it cannot be read.
+        hint: of the errors.
 
     Raises:
-        UsageError: no such file, or none of this kind.
+        UsageError: no such file, or not a small text file.
     """
     try:
         with open(path, "rb", opener=_without_waiting) as file:

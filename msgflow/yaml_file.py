@@ -33,8 +33,8 @@ class YamlFile:
 
     Attributes:
         path: the file.
-        example: of what it may say, for hints.
-        quoting: what is easily forgotten to be quoted, for the hint of what is not YAML.
+        example: of its content, for hints.
+        quoting: what users forget to quote, for the hint of a file that is not YAML.
     """
 
     path: Path
@@ -46,7 +46,7 @@ class YamlFile:
         raise UsageError(f"{self.path}, line {line}: {what}", hint)
 
     def entries(self, name: str) -> list[Any]:
-        """Return the nodes of the list called `name`, the only thing in the file.
+        """Return the nodes of the list `name`, the only key of the file.
 
         Raises:
             UsageError: the file cannot be read, is not YAML, or of another form.
@@ -69,7 +69,7 @@ class YamlFile:
         optional: tuple[str, ...],
         may_be_null: tuple[str, ...] = (),
     ) -> dict[str, Any]:
-        """Return the values of a mapping by name: all that are required, and no others."""
+        """Return the values of a mapping by name: all required ones, and no unknown ones."""
         names = ", ".join(required + optional)
         if node.id != "mapping":
             self.fail(line_of(node), f"{what} is not a mapping with {names}", self.example)
@@ -89,7 +89,7 @@ class YamlFile:
         return fields
 
     def texts(self, node: Any, what: str, kind: str = "a name or a pattern") -> tuple[Text, ...]:
-        """Return the texts of a list, or a text alone."""
+        """Return the texts of a list, or a single text."""
         if node.id != "sequence":
             return (self.text(node, what, kind),)
         if not node.value:
@@ -107,7 +107,7 @@ class YamlFile:
         return Text(str(node.value), line_of(node))
 
     def _compose(self) -> Any:
-        """Return the tree of nodes of the only document, which know their lines."""
+        """Return the tree of nodes of the only document; nodes know their lines."""
         from ruamel.yaml import YAML
         from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
@@ -129,7 +129,7 @@ def line_of(node: Any) -> int:
 
 
 def is_null(node: Any) -> bool:
-    """Tell whether a node says nothing."""
+    """Tell whether a node is null."""
     return str(node.tag) == "tag:yaml.org,2002:null"
 
 
@@ -145,7 +145,7 @@ def list_lines(key: str, items: Sequence[str]) -> list[str]:
 
     Args:
         key: with the spaces before it.
-        items: as YAML writes them.
+        items: in the form of YAML, see `quoted`.
     """
     lines = [f"{key}: ["]
     indent = " " * (len(key) - len(key.lstrip()) + 2)
