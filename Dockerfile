@@ -1,6 +1,5 @@
 # msgflow in a container: `docker build -t msgflow .`; the README says how to give it a folder.
 FROM python:3.12-slim AS build
-RUN apt-get update && apt-get install -y --no-install-recommends gcc libc6-dev
 WORKDIR /source
 COPY pyproject.toml README.md LICENSE ./
 COPY packaging packaging

@@ -1,7 +1,6 @@
 # `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
 # is installed into .venv, except what only the distribution has: python3-venv, and for the tests
-# Babeltrace 2 to compare with, Chromium to look with and a C compiler. apt installs these where that
-# is allowed.
+# Babeltrace 2 to compare with and Chromium to look with. apt installs these where that is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -19,7 +18,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo quick test test-all bench truth fuzz sanitize mutants wheels babeltrace chromium compiler clean
+.PHONY: help demo quick test test-all bench truth fuzz mutants babeltrace chromium clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
@@ -29,9 +28,7 @@ help:
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth   precision and recall on systems of which everything is known, minutes'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
-	@echo 'make sanitize damaged traces through the compiled kernel, with sanitizers'
 	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
-	@echo 'make wheels  wheels for Linux on x86-64 and ARM64, in dist/'
 	@echo 'make clean   remove what these made'
 
 demo: $(VENV)/.installed
@@ -74,26 +71,8 @@ truth: $(VENV)/.installed
 fuzz: $(VENV)/.installed
 	$(BIN)/python benchmarks/fuzz.py
 
-sanitize: $(VENV)/.developed
-	$(BIN)/python benchmarks/sanitize.py
-
 mutants: $(VENV)/.developed
 	$(BIN)/python benchmarks/mutants.py
-
-# Zig compiles C for any glibc, of any architecture: one machine makes all wheels. As the kernel is
-# called by ctypes, one of each fits every Python. auditwheel names them after the oldest glibc that
-# has what they need. A wheel without a kernel has another name, and is not found.
-wheels: $(VENV)/.developed
-	$(BIN)/python -m pip install --quiet --group wheels
-	@set -e; PATH="$(CURDIR)/$(BIN):$$PATH"; made=$$(mktemp -d); trap 'rm -rf "$$made"' EXIT; \
-	zig=$$(python -c 'import ziglang; print(ziglang.__path__[0])')/zig; \
-	for machine in x86_64 aarch64; do \
-		CC="'$$zig' cc -s -target $$machine-linux-gnu.2.17" _PYTHON_HOST_PLATFORM=linux-$$machine \
-			python -m hatchling build -t wheel -d "$$made" >/dev/null; \
-		auditwheel repair --wheel-dir "$$made/repaired" "$$made"/*_$$machine.whl; \
-		ls "$$made"/repaired/*manylinux_2_17_$$machine.whl >/dev/null; \
-	done; \
-	mkdir -p dist; mv "$$made"/repaired/*.whl dist; ls dist/*.whl
 
 $(VENV)/.made:
 	@! command -v $(PYTHON) >/dev/null 2>&1 \
@@ -106,11 +85,11 @@ $(VENV)/.made:
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
 	@touch $@
 
-$(VENV)/.installed: pyproject.toml msgflow/kernel/kernel.c $(VENV)/.made
+$(VENV)/.installed: pyproject.toml $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable .
 	@touch $@
 
-$(VENV)/.developed: pyproject.toml msgflow/kernel/kernel.c $(VENV)/.made | compiler
+$(VENV)/.developed: pyproject.toml $(VENV)/.made
 	$(BIN)/python -m pip install --quiet --editable . --group dev
 	@touch $@ $(VENV)/.installed
 
@@ -125,10 +104,5 @@ chromium:
 	@$(HAS_CHROMIUM) \
 		|| echo "note: no chromium: the tests that look at pages are skipped" >&2
 
-compiler:
-	@$(APT); command -v $(word 1,$(CC)) >/dev/null || apt_install gcc libc6-dev || true
-	@command -v $(word 1,$(CC)) >/dev/null \
-		|| echo "note: no C compiler: the tests of the compiled kernel are skipped" >&2
-
 clean:
-	rm -rf $(VENV) $(DEMO) dist
+	rm -rf $(VENV) $(DEMO)

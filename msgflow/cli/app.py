@@ -22,10 +22,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from msgflow import kernel
-
-        without = "" if kernel.library() else " (without the compiled kernel, see README)"
-        typer.echo(f"msgflow {__version__}{without}")
+        typer.echo(f"msgflow {__version__}")
         raise typer.Exit()
 
 

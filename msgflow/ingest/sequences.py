@@ -13,14 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow import kernel
 from msgflow.ingest.catalogue import Origin
-from msgflow.ingest.compiled_sequences import Latest, Numbers, OfTracepoint
 from msgflow.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
 from msgflow.trace import COMMON_SCHEMA
 
 if TYPE_CHECKING:
-    import ctypes
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
@@ -98,7 +95,6 @@ class Sequences:
             name: _Latest([origin for origin in Origin if (name, origin) in asked])
             for name in catalogue.sequences
         }
-        self._compiled_latest = Latest(len(catalogue.sequences))
 
     def place(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> Placed:
         """Give the events of one round their threads and predecessors.
@@ -107,9 +103,6 @@ class Sequences:
             batches: (event name, batch) of all wanted events of the round, as the reader
                 delivers them.
         """
-        library = kernel.library()
-        if library is not None:
-            return self._place_compiled(library, batches)
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])
         known = self._threads.count
@@ -147,42 +140,6 @@ class Sequences:
             placed, _new_threads(batches, threads, known), _names(batches, groups, events)
         )
 
-    def _place_compiled(
-        self, library: ctypes.CDLL, batches: Sequence[tuple[str, pa.RecordBatch]]
-    ) -> Placed:
-        known = self._threads.count
-        threads = self._threads.of(batches)
-        ends = np.cumsum([0, *(batch.num_rows for _, batch in batches)])
-        names, codes = _coded_names(batches)
-        places = {name: place for place, name in enumerate(self._bits)}
-        given = [
-            OfTracepoint(
-                ids=to_numpy(batch["event_id"]),
-                times=to_numpy(batch["ts_ns"]),
-                threads=threads[begin:end],
-                names=of_batch,
-                sequences=int(self._memberships(name)),
-                label=self._label_of[name],
-                wanted=[
-                    (places[each.sequence], each.origin)
-                    for each in self._tracepoints[name].predecessors
-                ],
-            )
-            for (name, batch), begin, end, of_batch in zip(
-                batches, ends[:-1], ends[1:], codes, strict=True
-            )
-        ]
-        predecessors, stretches = self._compiled_latest.place(library, given, self._threads.count)
-        placed = tuple(
-            (name, self._extended(name, batch, of_batch.threads, values))
-            for (name, batch), of_batch, values in zip(batches, given, predecessors, strict=True)
-        )
-        return Placed(
-            placed,
-            _new_threads(batches, threads, known),
-            _name_rows(names, stretches.threads, stretches.names, stretches.extents),
-        )
-
     def _memberships(self, name: str) -> np.uint8:
         return np.uint8(sum(self._bits[sequence] for sequence in self._tracepoints[name].sequences))
 
@@ -212,11 +169,8 @@ class _Threads:
     """Numbers threads, which are (host, PID namespace, pid, tid), from 0 as they are first seen."""
 
     def __init__(self, hosts: Sequence[int]) -> None:
-        library = kernel.library()
         self._hosts = np.asarray(hosts, np.int64)
-        self._names, self._spaces, self._namespaces, self._threads = (
-            _Numbers() if library is None else Numbers(library) for _ in range(4)
-        )
+        self._names, self._spaces, self._namespaces, self._threads = (_Numbers() for _ in range(4))
 
     @property
     def count(self) -> int:
@@ -365,42 +319,32 @@ def _names(
     groups: _Groups,
     events: Mapping[Origin, NDArray[Any]],
 ) -> pa.RecordBatch:
-    dictionary, of_batches = _coded_names(batches)
-    codes = np.concatenate(of_batches)[groups.rows]
+    encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
+    codes = np.concatenate(
+        [
+            np.where(is_valid(chunk.indices), to_numpy(chunk.indices), np.int32(_NONE))
+            for chunk in encoded.chunks
+        ]
+    )[groups.rows]
     is_start = np.append(True, codes[1:] != codes[:-1])
     is_start[groups.starts] = True
     starts = np.flatnonzero(is_start)
     ends = np.append(starts[1:], codes.size) - 1
-    extents = [
-        events[origin][at] for origin in (Origin.EVENT_ID, Origin.TS_NS) for at in (starts, ends)
-    ]
-    return _name_rows(dictionary, groups.threads[starts], codes[starts], extents)
-
-
-def _name_rows(
-    dictionary: pa.Array,
-    threads: NDArray[np.int32],
-    codes: NDArray[np.int32],
-    extents: Sequence[NDArray[np.int64]],
-) -> pa.RecordBatch:
-    names = pa.DictionaryArray.from_arrays(to_arrow(codes, codes == _NONE), dictionary)
+    names = codes[starts]
     return pa.RecordBatch.from_arrays(
-        [to_arrow(threads), names, *map(to_arrow, extents)], schema=THREAD_NAME_SCHEMA
+        [
+            to_arrow(groups.threads[starts]),
+            pa.DictionaryArray.from_arrays(
+                to_arrow(names, names == _NONE), encoded.chunks[0].dictionary
+            ),
+            *(
+                to_arrow(events[origin][at])
+                for origin in (Origin.EVENT_ID, Origin.TS_NS)
+                for at in (starts, ends)
+            ),
+        ],
+        schema=THREAD_NAME_SCHEMA,
     )
-
-
-def _coded_names(
-    batches: Sequence[tuple[str, pa.RecordBatch]],
-) -> tuple[pa.Array, list[NDArray[np.int32]]]:
-    """Return all names of threads, and the place among them of each event's, -1 for none."""
-    encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
-    codes = []
-    for chunk in encoded.chunks:
-        numbers = to_numpy(chunk.indices)
-        if chunk.indices.null_count:
-            numbers = np.where(is_valid(chunk.indices), numbers, np.int32(_NONE))
-        codes.append(numbers)
-    return encoded.chunks[0].dictionary, codes
 
 
 def _gathered(batches: Sequence[tuple[str, pa.RecordBatch]], name: str) -> NDArray[Any]:

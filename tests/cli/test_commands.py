@@ -8,7 +8,6 @@ from pathlib import Path
 import duckdb
 import pyarrow.parquet as pq
 import pytest
-from kernels import needs_kernel, without_kernel
 from typer.testing import Result
 
 from msgflow.version import __version__
@@ -83,13 +82,6 @@ def test_without_a_command_the_help_is_printed(msgflow: Msgflow) -> None:
 
 
 def test_version(msgflow: Msgflow) -> None:
-    without = " (without the compiled kernel, see README)"
-    with without_kernel():
-        assert msgflow("--version").stdout == f"msgflow {__version__}{without}\n"
-
-
-@needs_kernel
-def test_version_with_the_kernel(msgflow: Msgflow) -> None:
     assert msgflow("--version").stdout == f"msgflow {__version__}\n"
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import pyarrow as pa
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from kernels import without_kernel
 
 from msgflow.ingest.catalogue import Origin, load
 from msgflow.ingest.sequences import Placed, Sequences
@@ -68,19 +67,6 @@ def place(sequences: Sequences, of_round: list[Event]) -> tuple[list[Event], Pla
 @settings(deadline=None)
 @given(st.lists(st.lists(events, max_size=12), max_size=4))
 def test_predecessors_are_the_latest_of_their_sequence(rounds: list[list[Event]]) -> None:
-    """By the compiled kernel, where there is one."""
-    check(rounds)
-
-
-@settings(deadline=None)
-@given(st.lists(st.lists(events, max_size=12), max_size=4))
-def test_predecessors_without_the_kernel(rounds: list[list[Event]]) -> None:
-    with without_kernel():
-        check(rounds)
-
-
-def check(rounds: list[list[Event]]) -> None:
-    """Compare with a look at one event after the other."""
     sequences = Sequences(load(), HOSTS)
     tracepoints = load().tracepoints
     latest: dict[tuple[Any, str], Event] = {}

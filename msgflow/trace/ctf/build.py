@@ -118,15 +118,6 @@ class _FastFields:
         wanted = {source.number for source in sources if source.number is not None}
         self._fields = body.fields or ()
         self._names = names
-        self._gathered: dict[tuple[int, Any], NDArray[Any]] = {}
-        self._text_numbers: NDArray[np.int32] | None = None
-        self._gatherer = gatherer = plan.gatherer
-        texts = None if gatherer.text is None else names.texts(gatherer.text_length)
-        gathered = gatherer.gather(memory, rows.bodies, texts)
-        if gathered is not None:
-            numbers, self._text_numbers = gathered
-            self._gathered = dict(zip(gatherer.numbers, numbers, strict=True))
-            wanted -= {gatherer.text, *(number for number, _ in gatherer.numbers)}
         with_tail = bool(plan.inner)
         self._rows = FieldRows(body, memory, rows.bodies, sorted(wanted), with_tail=with_tail)
         self._count = rows.bodies.size
@@ -138,10 +129,6 @@ class _FastFields:
         if pa.types.is_dictionary(data_type):
             return self._thread_names(number)
         if field.kind is Kind.NUMBER:
-            if not pa.types.is_boolean(data_type):
-                gathered = self._gathered.get((number, np.dtype(data_type.to_pandas_dtype())))
-                if gathered is not None:
-                    return to_arrow(gathered)
             return number_array(self._rows.numbers(number), data_type)
         if pa.types.is_string(data_type):
             return text_array(*self._rows.text(number))
@@ -156,9 +143,6 @@ class _FastFields:
     def _thread_names(self, number: int) -> pa.Array:
         field = self._fields[number]
         if field.kind is Kind.TEXT and field.count:
-            if self._text_numbers is not None and number == self._gatherer.text:
-                indexes = self._names.indexes_of_texts(field.count, self._text_numbers)
-                return self._names.array(indexes)
             words = [
                 self._rows.words(number, "<u8", offset) for offset in word_offsets(field.count)
             ]

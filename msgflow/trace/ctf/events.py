@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msgflow.numpy_arrow import distinct
-from msgflow.trace.ctf.compiled import compiled
 from msgflow.trace.ctf.headers import read_headers
 from msgflow.trace.ctf.lockstep import scan_lockstep
 from msgflow.trace.ctf.types import BYTE
@@ -68,12 +67,7 @@ def find_events(
         layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
         for entry in entries
     ]
-    fast = compiled(layout)
-    if fast is not None:
-        scanned = [fast.scan(layout, memory, span) for span in spans]
-    else:
-        scanned = scan_lockstep(layout, memory, spans)
-    for entry, found in zip(entries, scanned, strict=True):
+    for entry, found in zip(entries, scan_lockstep(layout, memory, spans), strict=True):
         entry.events = found.positions - entry.base
         if found.problem is not None:
             position, message = found.problem
@@ -89,11 +83,7 @@ def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) 
     positions = np.concatenate([_begins(entry) for entry in entries], dtype=np.int64)
     positions += np.repeat(bases, counts)
     befores = np.array([entry.clock_before for entry in entries], np.uint64)
-    fast = compiled(layout)
-    if fast is not None:
-        headers = fast.headers(memory, positions, counts, befores)
-    else:
-        headers = read_headers(layout, memory, positions, counts, befores)
+    headers = read_headers(layout, memory, positions, counts, befores)
     return Events(counts, headers.classes, headers.clock, headers.bodies, positions)
 
 

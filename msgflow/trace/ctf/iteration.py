@@ -11,7 +11,6 @@ import pyarrow as pa
 from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema
 from msgflow.trace.ctf.arrow_types import declared_schema, hexadecimal_names
 from msgflow.trace.ctf.build import EventRows, build_batch
-from msgflow.trace.ctf.compiled_columns import split
 from msgflow.trace.ctf.events import walk_of
 from msgflow.trace.ctf.order import ordered_batches
 from msgflow.trace.ctf.packet_rows import PacketRows
@@ -149,9 +148,6 @@ class Iteration:
 
 def _split(batch: Batch, class_count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the events of a batch class after class, and where each class ends among them."""
-    fast = split(batch.classes, class_count)
-    if fast is not None:
-        return fast
     classes = batch.classes.astype(np.uint16 if class_count < 1 << 16 else np.uint32)
     ends = np.cumsum(np.bincount(classes, minlength=class_count))
     return np.argsort(classes, kind="stable"), ends

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.columns import inner_matching, matching
 from msgflow.trace.ctf.arrow_types import declared_schema
-from msgflow.trace.ctf.compiled_columns import Gatherer
 from msgflow.trace.ctf.types import Scope, Structure, Type
 from msgflow.trace.schemas import COMMON_SCHEMA
 
@@ -52,21 +49,6 @@ class ClassPlan:
     contexts: Mapping[str, Source]
     payload: Mapping[str, Source]
     inner: Mapping[str, tuple[tuple[str, ...], ...]]
-
-    @cached_property
-    def gatherer(self) -> Gatherer:
-        """What of it the compiled kernel gathers."""
-        wanted, text = [], None
-        for position, column in enumerate(self.schema):
-            is_common = position < len(COMMON_SCHEMA)
-            source = (self.contexts if is_common else self.payload).get(column.name)
-            if source is None or source.number is None:
-                continue
-            if pa.types.is_dictionary(column.type):
-                text = source.number
-            elif pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
-                wanted.append((source.number, np.dtype(column.type.to_pandas_dtype())))
-        return Gatherer(self.layout.body, wanted, text)
 
     @property
     def is_slow(self) -> bool:

@@ -8,7 +8,6 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow
-from msgflow.trace.ctf.compiled_columns import Texts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,8 +25,6 @@ class ThreadNames:
         self._index_of_name: dict[str, int] = {}
         self._dictionary: pa.Array | None = None
         self._tables: dict[int, _Table] = {}
-        self._texts: dict[int, Texts] = {}
-        self._indexes_of_texts: dict[int, NDArray[np.int32]] = {}
 
     def array(self, indexes: NDArray[np.int32]) -> pa.Array:
         """Return names given by their indexes."""
@@ -50,22 +47,6 @@ class ThreadNames:
         return pa.DictionaryArray.from_arrays(
             integers_to_arrow(indexes, pa.int32()), self._dictionary
         )
-
-    def texts(self, length: int) -> Texts:
-        """Return what the kernel has seen of names of so many bytes."""
-        if length not in self._texts:
-            self._texts[length] = Texts(length)
-            self._indexes_of_texts[length] = np.empty(0, np.int32)
-        return self._texts[length]
-
-    def indexes_of_texts(self, length: int, numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the indexes of names given by the numbers of their texts."""
-        indexes = self._indexes_of_texts[length]
-        new = [self.index_of_bytes(text) for text in self._texts[length].after(indexes.size)]
-        if new:
-            indexes = np.append(indexes, np.array(new, np.int32))
-            self._indexes_of_texts[length] = indexes
-        return indexes[numbers]
 
     def indexes(self, words: list[NDArray[np.uint64]], length: int) -> NDArray[np.int32]:
         """Return the indexes of names given by their bytes.

@@ -1,8 +1,8 @@
-"""Without a compiled kernel, the two ways to find events agree, whatever the layout and damage."""
+"""The two ways to find events agree, whatever the layout and damage."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -14,7 +14,6 @@ from ctf_layouts import Style, TraceMaker
 from ctf_writer import Event, Packet, TraceContent, write_trace
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from kernels import without_kernel
 from mutations import flip_header, flip_stream, overwrite
 from same_batches import differences, read
 from thorough import examples
@@ -23,12 +22,6 @@ from msgflow.errors import TraceError
 from msgflow.trace.ctf import events, lanes, lockstep, scan, steps
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
-
-
-@pytest.fixture(autouse=True)
-def numpy_alone() -> Iterator[None]:
-    with without_kernel():
-        yield
 
 
 ONE_BY_ONE = partial(lockstep.scan_lockstep, narrowest=1 << 30)
