@@ -1,8 +1,7 @@
 """Conversion between numpy and Arrow.
 
 pyarrow's own ways import pandas wherever that is installed, to see whether they were given
-something of it: that takes longer than reading a small trace. Nor are `pyarrow.compute` and
-`numpy.ma` imported, which take 0.03 s.
+something of it: that takes longer than reading a small trace. Nor is `numpy.ma` imported.
 """
 
 from __future__ import annotations

@@ -13,7 +13,6 @@ from msgflow.trace.columns import first_inner_value, to_array
 from msgflow.trace.ctf.arrays import list_array, number_array, scattered_array, text_array
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.gather import FieldRows
-from msgflow.trace.ctf.thread_names import ThreadNames, word_offsets
 from msgflow.trace.ctf.types import Scope
 from msgflow.trace.schemas import COMMON_SCHEMA
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.memory import Memory
     from msgflow.trace.ctf.plans import ClassPlan, Source
     from msgflow.trace.ctf.slow import PacketWalk
+    from msgflow.trace.ctf.thread_names import ThreadNames
 
 _WITHOUT_CONTEXT = {"vpid": -1, "vtid": -1}
 
@@ -143,12 +143,8 @@ class _FastFields:
     def _thread_names(self, number: int) -> pa.Array:
         field = self._fields[number]
         if field.kind is Kind.TEXT and field.count:
-            words = [
-                self._rows.words(number, "<u8", offset) for offset in word_offsets(field.count)
-            ]
-            return self._names.array(self._names.indexes(words, field.count))
-        texts = text_array(*self._rows.text(number))
-        return self._names.array_of(texts.to_pylist())
+            return self._names.array_of_bytes(self._rows.words(number, f"V{field.count}"))
+        return self._names.array_of(text_array(*self._rows.text(number)).to_pylist())
 
 
 class _SlowFields:

@@ -66,10 +66,10 @@ class FieldRows:
                 table = np.array(body.offsets[number], np.int64)
                 self._positions[number] = bodies + table[residue]
 
-    def words(self, number: int, dtype: str, offset: int = 0) -> NDArray[Any]:
-        """Return what lies at a field, or so many bytes behind its begin, as this type."""
+    def words(self, number: int, dtype: str) -> NDArray[Any]:
+        """Return what lies at a field as this type."""
         if self._rows is not None and self._offsets is not None:
-            at = self._offsets[number] + offset - self._first
+            at = self._offsets[number] - self._first
             if at + np.dtype(dtype).itemsize <= self._rows.dtype.itemsize:
                 column = np.dtype(
                     {
@@ -80,7 +80,7 @@ class FieldRows:
                     }
                 )
                 return self._rows.view(column)["word"]
-        return self._memory.view(dtype)[self._position(number) + offset]
+        return self._memory.view(dtype)[self._position(number)]
 
     def numbers(self, number: int) -> NDArray[Any]:
         """Return the values of a number."""
