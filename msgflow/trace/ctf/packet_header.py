@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from uuid import UUID
@@ -46,8 +45,6 @@ _KNOWN_ROLES = {
     SEQUENCE_ROLE,
     DISCARDED_ROLE,
 }
-_CODES = {1: "B", 2: "H", 4: "I", 8: "Q"}
-_CUT_OFF = "the file ends within the header of a packet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +197,7 @@ class _Place:
     def read(self, data: bytes) -> Any:
         content = data[self.first : self.last]
         if len(content) < self.last - self.first:
-            raise FieldError(_CUT_OFF)
+            raise FieldError("the file ends within the header of a packet")
         if not self.is_number:
             return content
         return int.from_bytes(content, self.order) >> self.shift & self.mask
@@ -219,33 +216,9 @@ class _Plan:
         self.places = places
         self.end = end
         self.discarded_bits = discarded_bits
-        self._names = sorted(places, key=lambda name: places[name].first)
-        self._unpack = _unpacker([places[name] for name in self._names])
 
     def read(self, data: bytes) -> dict[str, Any]:
-        if self._unpack is None:
-            return {name: place.read(data) for name, place in self.places.items()}
-        if len(data) < self._unpack.size:
-            raise FieldError(_CUT_OFF)
-        return dict(zip(self._names, self._unpack.unpack_from(data), strict=True))
-
-
-def _unpacker(places: list[_Place]) -> struct.Struct | None:
-    """Return what reads all places at once, None if they are not all plain."""
-    orders = {place.order for place in places if place.is_number}
-    if len(orders) > 1:
-        return None
-    code = ">" if orders == {"big"} else "<"
-    at = 0
-    for place in places:
-        width = place.last - place.first
-        if place.first < at or (place.is_number and place.mask.bit_length() != width * BYTE):
-            return None
-        if place.is_number and width not in _CODES:
-            return None
-        code += f"{place.first - at}x" + (_CODES[width] if place.is_number else f"{width}s")
-        at = place.last
-    return struct.Struct(code)
+        return {name: place.read(data) for name, place in self.places.items()}
 
 
 def _plan(structure: Structure, position: int) -> _Plan | None:
