@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
+from msgflow.trace.ctf.memory import GAP
 from msgflow.trace.ctf.types import (
     BYTE,
     EVENT_CLASS_ROLE,
@@ -129,6 +130,9 @@ def compile_header(structure: Structure, residues: int) -> EventHeader | None:
         return None
     widths = {form.time.bits for form in forms if form.time is not None} - {64}
     if selector is None or len(widths) > 1:
+        return None
+    if max(size for form in forms for size in form.sizes) > GAP:
+        # A header may begin right in front of the end of what is in memory.
         return None
     return EventHeader(
         structure.align // BYTE, selector, tuple(forms), widths.pop() if widths else None

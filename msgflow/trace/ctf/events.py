@@ -9,7 +9,7 @@ import numpy as np
 
 from msgflow.numpy_arrow import distinct
 from msgflow.trace.ctf.headers import read_headers
-from msgflow.trace.ctf.lockstep import scan_lockstep
+from msgflow.trace.ctf.scan import scan
 from msgflow.trace.ctf.types import BYTE
 from msgflow.trace.ctf.walk import FieldError
 
@@ -63,11 +63,10 @@ def find_events(
         for entry in entries:
             entry.events = _walk_through(layout, memory, entry, report)
         return
-    spans = [
-        layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
-        for entry in entries
-    ]
-    for entry, found in zip(entries, scan_lockstep(layout, memory, spans), strict=True):
+    for entry in entries:
+        packet = entry.packet
+        span = layout.span(entry.base, packet.header.events_at, packet.content_bits)
+        found = scan(layout, memory, span)
         entry.events = found.positions - entry.base
         if found.problem is not None:
             position, message = found.problem

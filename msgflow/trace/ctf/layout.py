@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
 from msgflow.trace.ctf.slow import PacketWalk
@@ -24,16 +22,9 @@ from msgflow.trace.ctf.types import (
 from msgflow.trace.ctf.walk import FieldError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
-GAP = 64
-"""Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
-
 _MOST_RESIDUES = 8
-_WIDEST_TABLE = 1 << 16
-_LARGEST_STEP = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -123,25 +114,26 @@ class StreamLayout:
         return next(iter(self.classes)) if len(self.classes) == 1 else 0
 
     @cached_property
-    def steps(self) -> dict[int, int]:
-        """From selector * `residues` + residue to the size of such an event in bytes.
+    def sizes_by_selector(self) -> list[dict[int, int]]:
+        """Sizes of events in bytes, padding in front of the next header included.
 
-        Only of those events whose size is always the same.
+        A dictionary for each residue of the event's position, from the selector, with the bits
+        below it that were read along, to the size. Events whose size varies are not in it.
         """
         header = self.header
         assert header is not None
-        steps = {}
+        sizes: list[dict[int, int]] = [{} for _ in range(self.residues)]
         for event_id, layout in self.classes.items():
             form = self._short_form(event_id)
             if form is None or layout.body.sizes is None:
                 continue
-            for residue in range(self.residues):
+            for residue, of_residue in enumerate(sizes):
                 body_at = residue + form.sizes[residue]
                 end = body_at + layout.body.sizes[body_at % self.residues]
-                step = aligned(end, header.align) - residue
-                if step < _LARGEST_STEP:
-                    steps[event_id * self.residues + residue] = step
-        return steps
+                size = aligned(end, header.align) - residue
+                if size:
+                    of_residue[event_id << header.selector.shift] = size
+        return sizes
 
     def _short_form(self, event_id: int) -> Form | None:
         """Return the form in which the selector is this id, None if there is none."""
@@ -151,32 +143,6 @@ class StreamLayout:
                 is_short = form.id == self.header.selector
                 return form if is_short and 0 <= event_id <= self.header.selector.mask else None
         return None
-
-    @cached_property
-    def selector_limit(self) -> int | None:
-        """The largest selector that tables have room for; larger ones count as this one.
-
-        None if tables would be too large.
-        """
-        assert self.header is not None
-        mask = self.header.selector.mask
-        limit = mask if mask < _WIDEST_TABLE else max(self.classes, default=0) + 1
-        return limit if limit < _WIDEST_TABLE else None
-
-    @cached_property
-    def step_table(self) -> NDArray[np.int64] | None:
-        """`steps` as an array, 0 where they have none; None if there is no room for one.
-
-        The selector whose bits are all one has none: it is what follows the last event.
-        """
-        limit = self.selector_limit
-        assert self.header is not None
-        if limit is None or self.header.selector.mask * self.residues in self.steps:
-            return None
-        table = np.zeros((limit + 1) * self.residues, np.int64)
-        for key, step in self.steps.items():
-            table[key] = step
-        return table
 
     def form_of(self, selector: int) -> Form:
         """Return the form of a header with this selector.

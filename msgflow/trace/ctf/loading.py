@@ -6,8 +6,7 @@ import os
 import weakref
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.layout import GAP
-from msgflow.trace.ctf.memory import PADDING, Memory, room_for
+from msgflow.trace.ctf.memory import GAP, PADDING, Memory, room_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msgflow.trace.ctf.layout import GAP
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+GAP = 64
+"""Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
 
 PADDING = 2 * GAP
 """Bytes behind all packets."""

@@ -1,4 +1,4 @@
-"""Finds where events begin, packet after packet: best for little data."""
+"""Positions of events in a packet: the only step that goes from event to event."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 from msgflow.trace.ctf.walk import FieldError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.layout import Span, StreamLayout
@@ -35,71 +33,50 @@ class Scanned:
     problem: tuple[int, str] | None = None
 
 
-def scan(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> list[Scanned]:
-    """Find the events of these packets; `layout.header` must be known."""
-    scanned = []
-    for span in spans:
-        found, position = scan_until(layout, memory, span, span.begin, span.end)
-        scanned.append(whole(layout, memory, span, found, position))
-    return scanned
-
-
-def scan_until(
-    layout: StreamLayout, memory: Memory, span: Span, position: int, until: int
-) -> tuple[Scanned, int]:
-    """Find the events of a packet that begin in front of the byte `until`, from this one on.
-
-    Returns:
-        the events, and where the one after them begins: not before `until`, unless there is a
-        problem.
-    """
+def scan(layout: StreamLayout, memory: Memory, span: Span) -> Scanned:
+    """Find the events of a packet; `layout.header` must be known."""
     header = layout.header
     assert header is not None
     place = header.selector
     read = struct.Struct((">" if place.big_endian else "<") + _CODES[place.width]).unpack_from
-    data = memory.data
-    step_of = layout.steps.get
-    residues, last_residue = layout.residues, layout.residues - 1
-    offsets, shift, mask = place.offsets, place.shift, place.mask
+    offset, mask = place.offsets[0], place.mask << place.shift
+    sizes, last_residue = layout.sizes_by_selector, layout.residues - 1
+    data, end = memory.data, span.end
     positions: list[int] = []
     append = positions.append
     problem = None
-    while position < until:
-        residue = position & last_residue
-        selector = read(data, position + offsets[residue])[0] >> shift & mask
-        step = step_of(selector * residues + residue)
-        if step is None:
+    position = span.begin
+    while position < end:
+        try:
+            while position < end:
+                append(position)
+                position += sizes[position & last_residue][read(data, position + offset)[0] & mask]
+        except KeyError:  # the size of this event varies, or no event begins here
             try:
-                following = layout.next_event(data, position, span)
+                position = layout.next_event(data, position, span)
             except FieldError as error:
-                problem = (position, str(error))
+                problem = (positions.pop(), str(error))
                 break
-            append(position)
-            position = following
-        else:
-            append(position)
-            position += step
-    return Scanned(np.array(positions, np.int64), problem), position
+    if problem is None and positions:
+        problem = _problem_of_last(layout, memory, span, positions[-1], position)
+        if problem is not None:
+            positions.pop()
+    return Scanned(np.array(positions, np.int64), problem)
 
 
-def whole(
-    layout: StreamLayout, memory: Memory, span: Span, found: Scanned, following: int
-) -> Scanned:
-    """Return the events of a packet without a last one that reaches beyond its content.
+def _problem_of_last(
+    layout: StreamLayout, memory: Memory, span: Span, last: int, following: int
+) -> tuple[int, str] | None:
+    """Return where and why the last event is damaged, None if it fits into the packet.
 
-    `following` is where the event after the last one begins. Sizes that are known beforehand go
-    from header to header, with the padding in between: where padding is cut off, the end of the
-    last event may be, too.
+    `following` is where the next event would begin. A size goes from header to header, with the
+    padding in between: where a packet ends within padding, the last event must be looked at.
     """
-    if found.problem is not None or not found.positions.size:
-        return found
-    last = int(found.positions[-1])
     if following > span.end:
-        return Scanned(found.positions[:-1], (last, BEYOND_END))
-    if span.limit == span.end:
-        return found
-    try:
-        layout.next_event(memory.data, last, span)
-    except FieldError as error:
-        return Scanned(found.positions[:-1], (last, str(error)))
-    return found
+        return last, BEYOND_END
+    if span.limit < span.end:
+        try:
+            layout.next_event(memory.data, last, span)
+        except FieldError as error:
+            return last, str(error)
+    return None

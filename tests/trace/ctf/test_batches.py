@@ -19,8 +19,8 @@ from thorough import examples
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import iteration, order, pieces
-from msgflow.trace.ctf.layout import GAP
 from msgflow.trace.ctf.loading import Loader
+from msgflow.trace.ctf.memory import GAP
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 
