@@ -9,7 +9,7 @@ from uuid import UUID
 
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.declarations import TraceClass
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.field_types import (
     Array,
     Integer,
     Real,

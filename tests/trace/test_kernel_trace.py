@@ -25,7 +25,7 @@ from kernel_traces import (
 from same_batches import differences, read
 
 from msgflow.ingest import catalogue
-from msgflow.trace.ctf.plans import ClassPlan
+from msgflow.trace.ctf.record_batch import ClassPlan
 
 Read = Callable[..., dict[str, list[dict[str, Any]]]]
 
@@ -102,17 +102,17 @@ def test_readers_agree(trace: Path, bt2_bindings: object) -> None:
 
 def test_fast_and_slow_agree(trace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans = []
-    is_slow = ClassPlan.is_slow.fget
-    assert is_slow is not None
+    is_field_by_field = ClassPlan.is_field_by_field.fget
+    assert is_field_by_field is not None
 
     def noted(plan: ClassPlan) -> bool:
-        plans.append((plan.layout.event.name, is_slow(plan)))
-        return is_slow(plan)
+        plans.append((plan.layout.event.name, is_field_by_field(plan)))
+        return is_field_by_field(plan)
 
-    monkeypatch.setattr(ClassPlan, "is_slow", property(noted))
+    monkeypatch.setattr(ClassPlan, "is_field_by_field", property(noted))
     fast = read(trace, wanted=WANTED, batch_rows=100)
     assert set(plans) == {(SENT, False), (RECEIVED, False)}
-    monkeypatch.setattr(ClassPlan, "is_slow", property(lambda plan: True))
+    monkeypatch.setattr(ClassPlan, "is_field_by_field", property(lambda plan: True))
     assert read(trace, wanted=WANTED, batch_rows=100).rows == fast.rows
 
 

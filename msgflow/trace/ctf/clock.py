@@ -1,4 +1,4 @@
-"""Clock values to nanoseconds since the epoch, in exact integers."""
+"""Clocks: their values as nanoseconds since the epoch, in exact integers."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.metadata_error import MetadataError
+from msgflow.trace.ctf.errors import MetadataError
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+
 GIGA = 1_000_000_000
 LATEST_NS = 1 << 62
-"""Times are nearer than this to the epoch, 146 years: so differences of any two of them fit."""
+"""Limit of times on both sides of the epoch, 146 years: all differences fit into 64 bits."""
 
 _HIGHEST_FREQUENCY = 1 << 63
-# Up to here what `Clock.to_ns_array` adds and multiplies fits into 64 bits.
+# Up to this frequency, sums and products in `Clock.to_ns_array` fit into 64 bits.
 _HIGHEST_FAST_FREQUENCY = 9 * GIGA
 
 
@@ -44,7 +45,7 @@ class Clock:
             raise MetadataError(f"a clock of {self.frequency} Hz makes no sense")
 
     def plausible(self, notes: list[str]) -> Clock:
-        """Return the clock without its offset if that makes no sense, which is then noted."""
+        """Return the clock; without its offset, and with a note, if the offset makes no sense."""
         if abs(self.to_ns(0)) < LATEST_NS:
             return self
         name = "" if self.name is None else f" {self.name!r}"
@@ -76,8 +77,8 @@ class Clock:
             return wrapped.astype(np.uint64).view(np.int64)
         seconds, cycles = divmod(self.offset_cycles, self.frequency)
         whole, part = np.divmod(values, np.uint64(self.frequency))
-        # Both parts are below one second: their sum fits, as does a billion times it for any
-        # clock of up to nine gigahertz.
+        # Both parts are below one second. Their sum times a billion fits for any clock of up to
+        # nine gigahertz.
         part_ns = (part + np.uint64(cycles)) * np.uint64(GIGA) // np.uint64(self.frequency)
         origin_ns = np.uint64((origin + seconds * GIGA) % 2**64)
         return (whole * np.uint64(GIGA) + part_ns + origin_ns).view(np.int64)

@@ -1,17 +1,26 @@
-"""What the metadata of one trace declares."""
+"""Declarations of a trace's metadata: the trace class, its stream classes and event classes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
 
-from msgflow.trace.ctf.metadata_error import MetadataError
-from msgflow.trace.ctf.types import Structure
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.clock import Clock
+from msgflow.trace.ctf.clock import Clock
+from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import (
+    END_ROLE,
+    TIME_ROLE,
+    Array,
+    Choice,
+    Integer,
+    Member,
+    Structure,
+    Type,
+    VariableInteger,
+    Variant,
+)
 
 _SMALLEST_ID, _LARGEST_ID = -(1 << 63), (1 << 64) - 1
+_TIMES = {TIME_ROLE, END_ROLE}
 
 
 @dataclass(eq=False)
@@ -29,7 +38,7 @@ class StreamClass:
     """One kind of stream (LTTng: channel) and its events.
 
     Attributes:
-        has_time: its events have times; else `clock` only counts packets.
+        has_time: its events have times; if not, `clock` only counts packets.
     """
 
     id: int
@@ -46,7 +55,7 @@ class TraceClass:
     """All of a trace's metadata.
 
     Attributes:
-        notes: what was left out because it makes no sense.
+        notes: messages about declarations left out because they make no sense.
     """
 
     uuid: str | None = None
@@ -59,7 +68,7 @@ class TraceClass:
         """Add an event class to a stream class.
 
         Raises:
-            MetadataError: there is one of its id.
+            MetadataError: there is one with the same id.
         """
         if not _SMALLEST_ID <= event.id <= _LARGEST_ID:
             self.notes.append(f"no event can have the id {event.id} of {event.name!r}: left out")
@@ -67,3 +76,34 @@ class TraceClass:
         if event.id in stream.events:
             raise MetadataError(f"there are two events {event.id} in stream {stream.id}")
         stream.events[event.id] = event
+
+
+def is_timeless(trace: TraceClass) -> bool:
+    """Tell whether no stream class of a trace has a clock."""
+    return bool(trace.streams) and all(stream.clock is None for stream in trace.streams.values())
+
+
+def give_order(stream: StreamClass) -> None:
+    """Prepare a stream class for packets that are ordered by numbers in place of times."""
+    stream.clock, stream.has_time = Clock(), False
+    stream.packet_context = _structure(stream.packet_context)
+    stream.event_header = _structure(stream.event_header)
+
+
+def _structure(declared: Structure) -> Structure:
+    members = tuple(Member(member.name, _type(member.type)) for member in declared.members)
+    return Structure(members, declared.minimum_align)
+
+
+def _type(declared: Type) -> Type:
+    """Return the type without roles that make fields times."""
+    match declared:
+        case Structure():
+            return _structure(declared)
+        case Variant():
+            choices = (Choice(c.name, _type(c.type), c.ranges) for c in declared.choices)
+            return replace(declared, choices=tuple(choices))
+        case Integer() | VariableInteger() | Array():
+            return replace(declared, roles=declared.roles - _TIMES)
+        case _:
+            return declared

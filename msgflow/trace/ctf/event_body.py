@@ -8,9 +8,8 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
-from msgflow.trace.ctf.extent import DynamicError, is_dense, lay_out
-from msgflow.trace.ctf.tail import Tail, compile_tail, dtype_of, is_selector
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.errors import FieldError
+from msgflow.trace.ctf.field_types import (
     BYTE,
     Array,
     Integer,
@@ -22,7 +21,8 @@ from msgflow.trace.ctf.types import (
     Type,
     Variant,
 )
-from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.ctf.fixed_layout import DynamicError, is_dense, lay_out
+from msgflow.trace.ctf.variant_layout import VariantLayout, dtype_of, is_selector, lay_out_variant
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import EventClass, StreamClass
@@ -55,7 +55,7 @@ class PlainField:
         width: bytes of the number or element.
         count: of the elements of an array, otherwise 1.
         length_at: for a sequence, the place in the list of the field with its length.
-        is_length: it is the length of a sequence, or chooses the option of the tail.
+        is_length: it is the length of a sequence, or chooses the option of the variant.
         type: as declared.
         size: in bytes, None if it varies.
     """
@@ -87,16 +87,16 @@ class EventBody:
         fields: its fields in order; None if they must be read one by one.
         sizes: of the whole in bytes, by residue of its position; None if that varies.
         offsets: of each field, by residue; None if the sizes are.
-        tail: the variant behind the fields, None if there is none.
-        tail_name: its name in the payload.
+        variant: the variant behind the fields, None if there is none.
+        variant_name: its name in the payload.
         selector: place in the list of the field that chooses its option.
     """
 
     fields: tuple[PlainField, ...] | None
     sizes: tuple[int, ...] | None
     offsets: tuple[tuple[int, ...], ...] | None
-    tail: Tail | None = None
-    tail_name: str = ""
+    variant: VariantLayout | None = None
+    variant_name: str = ""
     selector: int = -1
 
     @cached_property
@@ -150,8 +150,8 @@ class EventBody:
                 position += lengths[number] * size
             if position > limit:
                 raise FieldError("a field goes beyond the end of the packet")
-        if self.tail is not None:
-            return self.tail.end(data, position, lengths[self.selector], limit)
+        if self.variant is not None:
+            return self.variant.end(data, position, lengths[self.selector], limit)
         return position
 
 
@@ -179,18 +179,18 @@ def compile_body(stream: StreamClass, event: EventClass, residues: int) -> Event
         if fields is not None:
             fields = _add_fields(fields, scope, structure)
     if fields is not None and variant is not None and last is not None:
-        return _with_tail(fields, variant, last.name)
+        return _with_variant(fields, variant, last.name)
     offsets = None
     if fields is not None and sizes is not None:
         offsets = tuple(zip(*(_offsets(fields, r) for r in range(residues)), strict=True))
     return EventBody(None if fields is None else tuple(fields), sizes, offsets)
 
 
-def _with_tail(fields: list[PlainField], variant: Variant, name: str) -> EventBody:
-    reference, tail = variant.selector, compile_tail(variant)
+def _with_variant(fields: list[PlainField], variant: Variant, name: str) -> EventBody:
+    reference, layout = variant.selector, lay_out_variant(variant)
     for number, field in enumerate(fields):
         if (
-            tail is not None
+            layout is not None
             and reference.path == (field.name,)
             and field.scope is Scope.PAYLOAD
             and reference.scope in {None, Scope.PAYLOAD}
@@ -198,7 +198,7 @@ def _with_tail(fields: list[PlainField], variant: Variant, name: str) -> EventBo
             and is_selector(field.type)
         ):
             fields[number] = replace(field, is_length=True)
-            return EventBody(tuple(fields), None, None, tail, name, number)
+            return EventBody(tuple(fields), None, None, layout, name, number)
     return EventBody(None, None, None)
 
 

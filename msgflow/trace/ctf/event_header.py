@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
-from msgflow.trace.ctf.memory import GAP
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.field_types import (
     BYTE,
     EVENT_CLASS_ROLE,
     TIME_ROLE,
@@ -22,6 +20,7 @@ from msgflow.trace.ctf.types import (
     Type,
     Variant,
 )
+from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -100,6 +99,11 @@ class EventHeader:
     forms: tuple[Form, ...]
     narrow_bits: int | None
 
+    @property
+    def largest_size(self) -> int:
+        """Bytes of the longest form."""
+        return max(size for form in self.forms for size in form.sizes)
+
 
 def compile_header(structure: Structure, residues: int) -> EventHeader | None:
     """Return how to read such headers at once; None if they must be read one by one.
@@ -130,9 +134,6 @@ def compile_header(structure: Structure, residues: int) -> EventHeader | None:
         return None
     widths = {form.time.bits for form in forms if form.time is not None} - {64}
     if selector is None or len(widths) > 1:
-        return None
-    if max(size for form in forms for size in form.sizes) > GAP:
-        # A header may begin right in front of the end of what is in memory.
         return None
     return EventHeader(
         structure.align // BYTE, selector, tuple(forms), widths.pop() if widths else None

@@ -1,17 +1,17 @@
-"""The events of packets in memory: where they begin, of which class, and when."""
+"""Events of packets in memory: where they begin, their classes and times."""
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msgflow.numpy_arrow import distinct
-from msgflow.trace.ctf.headers import read_headers
-from msgflow.trace.ctf.scan import scan
-from msgflow.trace.ctf.types import BYTE
-from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.ctf.errors import FieldError
+from msgflow.trace.ctf.field_types import BYTE
+from msgflow.trace.ctf.header_columns import read_headers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,14 +19,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.entries import Entry
-    from msgflow.trace.ctf.layout import StreamLayout
-    from msgflow.trace.ctf.memory import Memory
-    from msgflow.trace.ctf.slow import PacketWalk
+    from msgflow.trace.ctf.field_reader import EventReader
+    from msgflow.trace.ctf.packet_memory import Memory
+    from msgflow.trace.ctf.packet_order import Entry
+    from msgflow.trace.ctf.stream_layout import Span, StreamLayout
 
+BEYOND_END = "an event goes beyond the end of the packet"
 
 # Some tracers end packets too early, but not by a day.
 _SLACK_SECONDS = 86_400
+_CODES = {1: "B", 2: "H", 4: "I", 8: "Q"}
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Events:
         classes: numbers of their classes.
         clock: values of the clock.
         bodies: where contexts and payload begin: bytes of memory.
-        positions: where headers begin: bytes of memory, or for slow streams bits of the packet.
+        positions: where headers begin: bytes of memory, or bits of the packet in streams whose
+            headers are read field by field.
     """
 
     counts: NDArray[np.int64]
@@ -56,28 +59,28 @@ def find_events(
 ) -> None:
     """Fill in `Entry.events` of packets of one stream class, which lie in memory in this order.
 
-    What follows damage in a packet is left out; `report` is called with the packet, the byte of
-    the packet, and a message.
+    What follows damage in a packet is left out.
+
+    Args:
+        layout: of the stream class.
+        memory: where the packets lie.
+        entries: the packets.
+        report: called for damage with the packet, the byte of the packet and a message.
     """
-    if layout.header is None:
-        for entry in entries:
-            entry.events = _walk_through(layout, memory, entry, report)
-        return
     for entry in entries:
-        packet = entry.packet
-        span = layout.span(entry.base, packet.header.events_at, packet.content_bits)
-        found = scan(layout, memory, span)
-        entry.events = found.positions - entry.base
-        if found.problem is not None:
-            position, message = found.problem
-            report(entry, position - entry.base, message)
+        if layout.header is None:
+            entry.events, problem = _find_field_by_field(layout, memory, entry)
+        else:
+            entry.events, problem = _find(layout, memory, entry)
+        if problem is not None:
+            report(entry, *problem)
 
 
 def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) -> Events:
     """Read the headers of all events that were found in these packets of one stream class."""
     counts = np.array([_begins(entry).size for entry in entries], np.int64)
     if layout.header is None:
-        return _walk_headers(layout, memory, entries, counts)
+        return _read_field_by_field(layout, memory, entries, counts)
     bases = np.array([entry.base for entry in entries], np.int64)
     positions = np.concatenate([_begins(entry) for entry in entries], dtype=np.int64)
     positions += np.repeat(bases, counts)
@@ -125,62 +128,101 @@ def without_absurd(
     )
 
 
-def _limits(entry: Entry, clock: Clock) -> tuple[int, int]:
-    """Return the first and last value of the clock that an event of a packet may have."""
-    header = entry.packet.header
-    first, last = clock.limits
-    slack = _SLACK_SECONDS * clock.frequency
-    if header.begin is not None:
-        first = max(first, header.begin - slack)
-    if header.end:
-        last = min(last, max(header.end, entry.begin) + slack)
-    return first, last
-
-
-def walk_of(layout: StreamLayout, memory: Memory, entry: Entry, base: int) -> PacketWalk:
-    """Return the slow path through a packet that lies at `base`."""
+def event_reader_of(layout: StreamLayout, memory: Memory, entry: Entry, base: int) -> EventReader:
+    """Return what reads events of a packet at the byte `base` field by field."""
     content = memoryview(memory.data)[base : base + entry.size]
-    return layout.walk(content, entry.packet.content_bits)
+    return layout.event_reader(content, entry.packet.content_bits)
 
 
-def _begins(entry: Entry) -> NDArray[np.int64]:
-    assert entry.events is not None
-    return entry.events
+def _find(
+    layout: StreamLayout, memory: Memory, entry: Entry
+) -> tuple[NDArray[np.int64], tuple[int, str] | None]:
+    """Find the events of a packet; this is the only step that goes from event to event.
 
-
-def _walk_through(
-    layout: StreamLayout,
-    memory: Memory,
-    entry: Entry,
-    report: Callable[[Entry, int, str], None],
-) -> NDArray[np.int64]:
-    walk = walk_of(layout, memory, entry, entry.base)
-    end = entry.packet.content_bits
-    begins = []
-    position = walk.begin(entry.packet.header.events_at)
+    Returns:
+        bytes of the packet at which event headers begin, up to the damage if there is any; and
+        the byte that cannot be read and why, None if all is well.
+    """
+    header = layout.header
+    assert header is not None
+    place = header.selector
+    read = struct.Struct((">" if place.big_endian else "<") + _CODES[place.width]).unpack_from
+    offset, mask = place.offsets[0], place.mask << place.shift
+    sizes, last_residue = layout.sizes_by_selector, layout.residues - 1
+    span = layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
+    data, end = memory.data, span.end
+    positions: list[int] = []
+    append = positions.append
+    problem = None
+    position = span.begin
     while position < end:
         try:
-            following = walk.event_end(position)
+            while position < end:
+                append(position)
+                position += sizes[position & last_residue][read(data, position + offset)[0] & mask]
+        except KeyError:  # the size of this event varies, or no event begins here
+            try:
+                position = layout.next_event(data, position, span)
+            except FieldError as error:
+                problem = str(error)
+                break
+    if problem is None and positions:
+        problem = _problem_of_last(layout, memory, span, positions[-1], position)
+    damaged_at = positions.pop() - entry.base if problem is not None else 0
+    begins = np.array(positions, np.int64) - entry.base
+    return begins, None if problem is None else (damaged_at, problem)
+
+
+def _problem_of_last(
+    layout: StreamLayout, memory: Memory, span: Span, last: int, following: int
+) -> str | None:
+    """Return why the last event is damaged, None if it fits into the packet.
+
+    `following` is where the next event would begin. The size of an event includes the padding
+    behind it. Where a packet ends within that padding, the event itself may still fit.
+    """
+    if following > span.end:
+        return BEYOND_END
+    if span.limit < span.end:
+        try:
+            layout.next_event(memory.data, last, span)
+        except FieldError as error:
+            return str(error)
+    return None
+
+
+def _find_field_by_field(
+    layout: StreamLayout, memory: Memory, entry: Entry
+) -> tuple[NDArray[np.int64], tuple[int, str] | None]:
+    """Find the events of a packet as `_find` does; begins are bits of the packet."""
+    reader = event_reader_of(layout, memory, entry, entry.base)
+    end = entry.packet.content_bits
+    begins = []
+    problem = None
+    position = reader.begin(entry.packet.header.events_at)
+    while position < end:
+        try:
+            following = reader.event_end(position)
             if following == position:
                 raise FieldError("an event has no size")
         except FieldError as error:
-            report(entry, position // BYTE, str(error))
+            problem = (position // BYTE, str(error))
             break
         begins.append(position)
-        position = walk.begin(following)
-    return np.array(begins, np.int64)
+        position = reader.begin(following)
+    return np.array(begins, np.int64), problem
 
 
-def _walk_headers(
+def _read_field_by_field(
     layout: StreamLayout, memory: Memory, entries: Sequence[Entry], counts: NDArray[np.int64]
 ) -> Events:
     classes = []
     values = []
     for entry in entries:
-        walk = walk_of(layout, memory, entry, entry.base)
+        reader = event_reader_of(layout, memory, entry, entry.base)
         clock = entry.clock_before
         for position in _begins(entry).tolist():
-            header = walk.header(position)
+            header = reader.header(position)
             if header.time is not None:
                 size = 1 << header.time_bits
                 if header.time_bits < 64:
@@ -197,3 +239,20 @@ def _walk_headers(
         np.zeros(positions.size, np.int64),
         positions,
     )
+
+
+def _limits(entry: Entry, clock: Clock) -> tuple[int, int]:
+    """Return the first and last value of the clock that an event of a packet may have."""
+    header = entry.packet.header
+    first, last = clock.limits
+    slack = _SLACK_SECONDS * clock.frequency
+    if header.begin is not None:
+        first = max(first, header.begin - slack)
+    if header.end:
+        last = min(last, max(header.end, entry.begin) + slack)
+    return first, last
+
+
+def _begins(entry: Entry) -> NDArray[np.int64]:
+    assert entry.events is not None
+    return entry.events

@@ -9,8 +9,8 @@ from uuid import UUID
 
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.json_types import TypeReader, integer_of
-from msgflow.trace.ctf.metadata_error import MetadataError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

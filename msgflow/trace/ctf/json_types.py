@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from msgflow.trace.ctf.metadata_error import MetadataError
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import (
     BYTE,
     Array,
     Choice,

@@ -1,4 +1,4 @@
-"""Reads the metadata file of a trace, whichever form and language it is in."""
+"""Metadata file of a trace: in text or packets, in TSDL or JSON; bounds of what it may declare."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, tsdl
-from msgflow.trace.ctf.metadata_error import MetadataError
-from msgflow.trace.ctf.shape import check_shapes
+from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import parts
 from msgflow.trace.metadata import (
     BYTE_ORDER_OF_MAGIC,
     HEADER_SIZE,
@@ -19,9 +19,11 @@ from msgflow.trace.metadata import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from msgflow.trace.ctf.declarations import TraceClass
+    from msgflow.trace.ctf.field_types import Structure, Type
 
 
 def read(directory: Path) -> TraceClass:
@@ -34,7 +36,7 @@ def read(directory: Path) -> TraceClass:
     try:
         text = _text(content_of(directory))
         trace = json_metadata.parse(text) if kind is MetadataKind.JSON else tsdl.parse(text)
-        check_shapes(trace)
+        _check_sizes(trace)
     except (MetadataError, RecursionError) as error:
         reason = str(error) if isinstance(error, MetadataError) else "too deeply nested"
         raise damaged_error(directory, reason) from error
@@ -50,7 +52,7 @@ def damaged_error(directory: Path, reason: str) -> TraceError:
 
 
 def _text(content: bytes) -> str:
-    """Take the text out of its packets, if it is in such."""
+    """Return the text, taken out of its packets if there are any."""
     order = BYTE_ORDER_OF_MAGIC.get(content[:4])
     if order is not None:
         parts = []
@@ -63,3 +65,46 @@ def _text(content: bytes) -> str:
             offset += packet_bits // 8
         content = b"".join(parts)
     return content.decode("utf-8", "replace")
+
+
+_MOST_FIELDS = 100_000
+_DEEPEST = 32
+
+
+def _check_sizes(trace: TraceClass) -> None:
+    """Check all structures that a trace declares: types inside types can grow without limit.
+
+    Raises:
+        MetadataError: one has too many fields, or fields inside too many others.
+    """
+    sizes = _Sizes()
+    for structure in _structures(trace):
+        fields, depth = sizes.of(structure)
+        if fields > _MOST_FIELDS:
+            raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
+        if depth > _DEEPEST:
+            raise MetadataError("too deeply nested")
+
+
+def _structures(trace: TraceClass) -> Iterator[Structure]:
+    yield trace.packet_header
+    for stream in trace.streams.values():
+        yield from (stream.packet_context, stream.event_header, stream.event_context)
+        for event in stream.events.values():
+            yield from (event.specific_context, event.payload)
+
+
+class _Sizes:
+    """Numbers of fields and depths of types; each type is counted once."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[int, int]] = {}
+
+    def of(self, declared: Type) -> tuple[int, int]:
+        known = self._known.get(id(declared))
+        if known is None:
+            inner = [self.of(part) for part in parts(declared)]
+            fields = 1 + sum(number for number, _ in inner)
+            known = fields, 1 + max((depth for _, depth in inner), default=0)
+            self._known[id(declared)] = known
+        return known

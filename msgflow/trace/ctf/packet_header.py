@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from uuid import UUID
 
-from msgflow.trace.ctf.extent import DynamicError, Leaf, lay_out
-from msgflow.trace.ctf.metadata_error import MetadataError
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.errors import FieldError, MetadataError
+from msgflow.trace.ctf.field_reader import FieldReader
+from msgflow.trace.ctf.field_types import (
     BYTE,
     CONTENT_SIZE_ROLE,
     DISCARDED_ROLE,
@@ -25,7 +25,7 @@ from msgflow.trace.ctf.types import (
     Scope,
     Structure,
 )
-from msgflow.trace.ctf.walk import FieldError, Walker
+from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import StreamClass, TraceClass
@@ -110,12 +110,12 @@ class HeaderReader:
             FieldError: it is not the header of a packet of this trace.
         """
         if self._start is None:
-            return self._walk(data)
+            return self._read_field_by_field(data)
         found = self._start.read(data)
         stream = self._check(found)
         plan = self._plans[stream.id]
         if plan is None:
-            return self._walk(data)
+            return self._read_field_by_field(data)
         found |= plan.read(data)
         return self._header(stream, found, plan.end, plan.discarded_bits)
 
@@ -152,15 +152,15 @@ class HeaderReader:
             raise FieldError(f"there is no stream class {class_id}")
         return stream
 
-    def _walk(self, data: bytes) -> PacketHeader:
-        walker = Walker(data, len(data) * BYTE)
-        walker.read_scope(Scope.PACKET_HEADER, self._trace.packet_header)
-        stream = self._check(walker.found)
-        context = walker.read_scope(Scope.PACKET_CONTEXT, stream.packet_context)
-        found = dict(walker.found)
+    def _read_field_by_field(self, data: bytes) -> PacketHeader:
+        reader = FieldReader(data, len(data) * BYTE)
+        reader.read_scope(Scope.PACKET_HEADER, self._trace.packet_header)
+        stream = self._check(reader.found)
+        context = reader.read_scope(Scope.PACKET_CONTEXT, stream.packet_context)
+        found = dict(reader.found)
         if isinstance(context.get(_CPU), int):
             found[_CPU] = context[_CPU]
-        return self._header(stream, found, walker.position, 64)
+        return self._header(stream, found, reader.position, 64)
 
     def _header(
         self, stream: StreamClass, found: dict[str, Any], events_at: int, discarded_bits: int

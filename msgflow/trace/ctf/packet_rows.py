@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from msgflow.numpy_arrow import integers_to_arrow
-from msgflow.trace.ctf.quirks import events_may_follow_end
 from msgflow.trace.model import EventBatch
 from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from msgflow.trace.ctf.entries import Entry, PacketEvents
+    from msgflow.trace.ctf.packet_order import Entry, PacketEvents
 
 
 class PacketRows:
@@ -78,3 +77,21 @@ class PacketRows:
             entry.lost,
             entry.packet.header.sequence is not None,
         )
+
+
+def events_may_follow_end(environment: Mapping[str, int | str]) -> bool:
+    """Tell whether events may be later than the end of their packet.
+
+    True of LTTng-UST before 2.11 and LTTng-modules before 2.9.13, 2.10.10 and 2.11.
+    """
+    version = tuple(
+        value if isinstance(value := environment.get(f"tracer_{part}", 0), int) else 0
+        for part in ("major", "minor", "patchlevel")
+    )
+    match environment.get("tracer_name"):
+        case "lttng-ust":
+            return version < (2, 11, 0)
+        case "lttng-modules":
+            return version < (2, 9, 13) or (2, 10, 0) <= version < (2, 10, 10)
+        case _:
+            return False

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
+from bisect import bisect_right
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf import index
-from msgflow.trace.ctf.rising import misplaced
-from msgflow.trace.ctf.types import BYTE
-from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.ctf import packet_index
+from msgflow.trace.ctf.errors import FieldError
+from msgflow.trace.ctf.field_types import BYTE
 from msgflow.trace.files import UnsuitableFileError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
@@ -68,7 +68,7 @@ def packets_of(
     """
     descriptor = os.open(path, os.O_RDONLY)
     try:
-        packets = list(_Hopping(path, descriptor, reader, report).run())
+        packets = list(_PacketFinder(path, descriptor, reader, report).run())
     finally:
         os.close(descriptor)
     early = misplaced([packet.header.begin or 0 for packet in packets])
@@ -83,7 +83,7 @@ def packets_of(
     return [packet for place, packet in enumerate(packets) if place not in early]
 
 
-class _Hopping:
+class _PacketFinder:
     def __init__(
         self,
         path: Path,
@@ -101,10 +101,10 @@ class _Hopping:
         self._foreign: set[str] = set()
         self._patterns = [pattern for pattern in [reader.pattern()] if pattern is not None]
         try:
-            self._index = index.entries(path)
+            self._index = packet_index.entries(path)
         except UnsuitableFileError as error:
             self._index = {}
-            report(index.path_of(path), 0, 0, f"the index is not used: {error.strerror}")
+            report(packet_index.path_of(path), 0, 0, f"the index is not used: {error.strerror}")
 
     def run(self) -> Iterator[Packet]:
         offset = number = 0
@@ -265,3 +265,26 @@ class _Hopping:
                     packet.offset,
                     f"the index says that the packet's {what} is {expected}, the packet {found}",
                 )
+
+
+def misplaced(values: Sequence[int]) -> set[int]:
+    """Return the places to leave out so that the rest never falls, as few as possible."""
+    ends: list[int] = []
+    places_of_ends: list[int] = []
+    previous: list[int] = []
+    for place, value in enumerate(values):
+        # The longest series that this value can end.
+        length = bisect_right(ends, value)
+        previous.append(places_of_ends[length - 1] if length else -1)
+        if length == len(ends):
+            ends.append(value)
+            places_of_ends.append(place)
+        else:
+            ends[length] = value
+            places_of_ends[length] = place
+    kept = set()
+    place = places_of_ends[-1] if places_of_ends else -1
+    while place >= 0:
+        kept.add(place)
+        place = previous[place]
+    return set(range(len(values))) - kept

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
-from msgflow.trace.ctf.describe import describe
-from msgflow.trace.ctf.entries import entries_of
-from msgflow.trace.ctf.index import orphans
-from msgflow.trace.ctf.iteration import Iteration
-from msgflow.trace.ctf.layout import StreamLayout
-from msgflow.trace.ctf.metadata_error import MetadataError
+from msgflow.trace.ctf.batches import Iteration
+from msgflow.trace.ctf.declarations import give_order, is_timeless
+from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.events import BEYOND_END
 from msgflow.trace.ctf.packet_header import HeaderReader
-from msgflow.trace.ctf.probe import begins_of
-from msgflow.trace.ctf.scan import BEYOND_END
+from msgflow.trace.ctf.packet_index import orphans
+from msgflow.trace.ctf.packet_order import entries_of
+from msgflow.trace.ctf.packet_times import begins_of, numbers_of
+from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.streams import streams_of
-from msgflow.trace.ctf.timeless import give_order, is_timeless, numbers_of
+from msgflow.trace.ctf.trace_info import describe
 from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.exclusive import ExclusiveTraceSet
 from msgflow.trace.files import unreadable_error
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from msgflow.trace.ctf.entries import Entry
+    from msgflow.trace.ctf.packet_order import Entry
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
     from msgflow.trace.model import EventBatch, Progress, TraceInfo, TraceLocation

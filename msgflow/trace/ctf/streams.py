@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from msgflow.trace.ctf.layout import StreamLayout
     from msgflow.trace.ctf.packet_header import HeaderReader
     from msgflow.trace.ctf.packets import Packet
+    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 from msgflow.trace.ctf.packets import packets_of
 

@@ -8,11 +8,8 @@ from uuid import UUID
 
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.metadata_error import MetadataError
-from msgflow.trace.ctf.resolve import resolved
-from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
-from msgflow.trace.ctf.tsdl_types import TypeParser, Value
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import (
     CONTENT_SIZE_ROLE,
     DISCARDED_ROLE,
     END_ROLE,
@@ -34,6 +31,9 @@ from msgflow.trace.ctf.types import (
     Variant,
     may_have,
 )
+from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream, tokens_of
+from msgflow.trace.ctf.tsdl_types import TypeParser, Value
+from msgflow.trace.ctf.tsdl_variants import resolved
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

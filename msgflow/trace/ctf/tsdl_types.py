@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.resolve import without_prefix
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.field_types import (
     BYTE,
     Array,
     Choice,
@@ -20,6 +19,7 @@ from msgflow.trace.ctf.types import (
     Type,
     Variant,
 )
+from msgflow.trace.ctf.tsdl_variants import without_prefix
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

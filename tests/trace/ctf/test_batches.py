@@ -18,9 +18,9 @@ from same_batches import Content, differences, read
 from thorough import examples
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import iteration, order, pieces
-from msgflow.trace.ctf.loading import Loader
-from msgflow.trace.ctf.memory import GAP
+from msgflow.trace.ctf import batches, event_order, large_packets
+from msgflow.trace.ctf.packet_memory import Loader
+from msgflow.trace.ctf.stream_layout import GAP
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 
@@ -28,11 +28,11 @@ STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.boolea
 def read_in_pieces(trace: Path, most_bytes: int, most_events: int) -> Content:
     """Read so little at once that packets of other streams keep most packets waiting, and cut."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(iteration, "_SMALLEST_BATCH", most_bytes)
-        patch.setattr(iteration, "_LARGEST_BATCH", most_bytes)
-        patch.setattr(order, "_MOST_EVENTS", most_events)
-        patch.setattr(pieces, "_PIECE", max(most_bytes // GAP, 1) * GAP)
-        patch.setattr(pieces, "_LARGEST_WHOLE", 0)
+        patch.setattr(batches, "SMALLEST_BATCH", most_bytes)
+        patch.setattr(batches, "LARGEST_BATCH", most_bytes)
+        patch.setattr(event_order, "MOST_EVENTS", most_events)
+        patch.setattr(large_packets, "PIECE", max(most_bytes // GAP, 1) * GAP)
+        patch.setattr(large_packets, "LARGEST_WHOLE", 0)
         return read(trace)
 
 

@@ -17,7 +17,7 @@ from same_batches import differences, read
 from thorough import examples
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import layout
+from msgflow.trace.ctf import stream_layout
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 KINDS = {
@@ -48,7 +48,7 @@ def test_columns_as_field_by_field(
     except TraceError:
         return
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(layout, "compile_header", lambda *_: None)
+        patch.setattr(stream_layout, "compile_header", lambda *_: None)
         field_by_field = read(trace)
     assert not differences(at_once, field_by_field)
     places = [

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from same_batches import differences, read
 
-from msgflow.trace.ctf import iteration
+from msgflow.trace.ctf import batches
 
 EXAMPLES = int(os.environ.get("MSGFLOW_EXAMPLES", "6"))
 STYLES = [Style(*flags) for flags in product((False, True), repeat=4)]
@@ -65,7 +65,7 @@ def test_size_of_batches_changes_nothing(
     )
     whole = read(trace)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(iteration, "_SMALLEST_BATCH", 1)
+        patch.setattr(batches, "SMALLEST_BATCH", 1)
         small = read(trace, batch_rows=1)
     assert not differences(whole, small)
     assert whole.damages == small.damages == ()

@@ -10,8 +10,8 @@ import pytest
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, metadata, tsdl
 from msgflow.trace.ctf.declarations import TraceClass
-from msgflow.trace.ctf.metadata_error import MetadataError
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import (
     Array,
     Choice,
     Integer,

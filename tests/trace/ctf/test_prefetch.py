@@ -12,7 +12,7 @@ import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
-from msgflow.trace.ctf import iteration, order
+from msgflow.trace.ctf import batches, event_order
 from msgflow.trace.ctf.prefetch import Prefetch
 
 
@@ -101,18 +101,18 @@ class TestReading:
         self, trace: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """While it is in use, the next ones are loaded elsewhere."""
-        monkeypatch.setattr(iteration, "_SMALLEST_BATCH", 1000)
-        in_use: list[tuple[order.Batch, bytes]] = []
+        monkeypatch.setattr(batches, "SMALLEST_BATCH", 1000)
+        in_use: list[tuple[event_order.Batch, bytes]] = []
         with msgflow.trace.open([trace]) as traces:
-            events = iteration.Iteration._events
+            events = batches.Iteration.events
 
-            def slowly(self: Any, batch: order.Batch, number: int) -> Iterator[Any]:
+            def slowly(self: Any, batch: event_order.Batch, number: int) -> Iterator[Any]:
                 before = bytes(batch.memory.data)
                 yield from events(self, batch, number)
                 time.sleep(0.002)
                 in_use.append((batch, before))
                 assert bytes(batch.memory.data) == before
 
-            monkeypatch.setattr(iteration.Iteration, "_events", slowly)
+            monkeypatch.setattr(batches.Iteration, "events", slowly)
             list(traces.batches(batch_rows=4))
         assert len(in_use) > 10

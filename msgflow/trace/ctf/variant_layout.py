@@ -9,14 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.extent import DynamicError, Leaf, is_dense, lay_out
-from msgflow.trace.ctf.types import BYTE, Array, Integer, Real, Structure, Variant
-from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.ctf.errors import FieldError
+from msgflow.trace.ctf.field_types import BYTE, Array, Integer, Real, Structure, Variant
+from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, is_dense, lay_out
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.trace.ctf.types import Choice, Type
+    from msgflow.trace.ctf.field_types import Choice, Type
 
 _WIDTHS = {8, 16, 32, 64}
 
@@ -26,7 +26,7 @@ class Part:
     """A number, or an array of numbers, on whole bytes.
 
     Attributes:
-        offset: in bytes from the begin of its block.
+        offset: in bytes from the begin of its option.
         dtype: of the number or element, as numpy calls it.
         width: bytes of the number or element.
         count: of the elements of an array, None for a number.
@@ -39,15 +39,15 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Block:
+class OptionLayout:
     """A structure of fixed size, and the variant that it may end in.
 
     Attributes:
         align: in bytes.
         size: of the fixed part, in bytes.
         parts: name, with dots inside nested structures, to where it is.
-        selector: name of the part that chooses the option of `tail`.
-        tail: the variant.
+        selector: name of the part that chooses the option of `variant`.
+        variant: the variant.
         name: of the variant.
     """
 
@@ -55,22 +55,22 @@ class Block:
     size: int
     parts: Mapping[str, Part]
     selector: str = ""
-    tail: Tail | None = None
+    variant: VariantLayout | None = None
     name: str = ""
 
 
 @dataclass(frozen=True)
-class Tail:
+class VariantLayout:
     """The options of a variant.
 
     Attributes:
-        options: of each the declaration and the block.
+        options: of each the declaration and the option.
     """
 
-    options: tuple[tuple[Choice, Block], ...]
-    _chosen: dict[int, Block] = field(default_factory=dict, compare=False, repr=False)
+    options: tuple[tuple[Choice, OptionLayout], ...]
+    _chosen: dict[int, OptionLayout] = field(default_factory=dict, compare=False, repr=False)
 
-    def block(self, value: int) -> Block:
+    def option(self, value: int) -> OptionLayout:
         """Return the option that this value of the selector chooses.
 
         Raises:
@@ -78,20 +78,20 @@ class Tail:
         """
         chosen = self._chosen.get(value)
         if chosen is None:
-            for choice, block in self.options:
+            for choice, option in self.options:
                 if choice.holds(value):
-                    self._chosen[value] = block
-                    return block
+                    self._chosen[value] = option
+                    return option
             raise FieldError(f"a variant has no option for the value {value}")
         return chosen
 
     def has(self, path: Sequence[str]) -> bool:
         """Tell whether a field can be read that is named by its option and what is around it."""
-        for choice, block in self.options:
+        for choice, option in self.options:
             if choice.name == path[0]:
-                is_inner = block.tail is not None and block.name == path[1]
-                return ".".join(path[1:]) in block.parts or (
-                    is_inner and block.tail is not None and block.tail.has(path[2:])
+                is_inner = option.variant is not None and option.name == path[1]
+                return ".".join(path[1:]) in option.parts or (
+                    is_inner and option.variant is not None and option.variant.has(path[2:])
                 )
         return False
 
@@ -101,41 +101,41 @@ class Tail:
         Raises:
             FieldError: it does not fit in front of the byte `limit`.
         """
-        block = self.block(value)
+        option = self.option(value)
         while True:
-            begin = (position + block.align - 1) & -block.align
-            position = begin + block.size
+            begin = (position + option.align - 1) & -option.align
+            position = begin + option.size
             if position > limit:
                 raise FieldError("a field goes beyond the end of the packet")
-            if block.tail is None:
+            if option.variant is None:
                 return position
-            part = block.parts[block.selector]
+            part = option.parts[option.selector]
             at = begin + part.offset
             order = "big" if part.dtype[0] == ">" else "little"
-            block = block.tail.block(
+            option = option.variant.option(
                 int.from_bytes(data[at : at + part.width], order)  # type: ignore[arg-type]
             )
 
 
-def compile_tail(variant: Variant) -> Tail | None:
+def lay_out_variant(variant: Variant) -> VariantLayout | None:
     """Return how to read a variant; None if an option is no structure of fixed size."""
     options = []
     for choice in variant.choices:
         if not isinstance(choice.type, Structure):
             return None
-        block = _compile_block(choice.type)
-        if block is None:
+        option = _lay_out_option(choice.type)
+        if option is None:
             return None
-        options.append((choice, block))
-    return Tail(tuple(options))
+        options.append((choice, option))
+    return VariantLayout(tuple(options))
 
 
 def is_selector(declared: Type) -> bool:
-    """Tell whether a field can choose an option of a tail."""
+    """Tell whether a field can choose an option of a variant."""
     return isinstance(declared, Integer) and not declared.signed and _is_whole(declared)
 
 
-def _compile_block(structure: Structure) -> Block | None:
+def _lay_out_option(structure: Structure) -> OptionLayout | None:
     members = structure.members
     last = members[-1] if members else None
     variant = last.type if last is not None and isinstance(last.type, Variant) else None
@@ -148,15 +148,15 @@ def _compile_block(structure: Structure) -> Block | None:
     align, size = max(structure.align // BYTE, 1), -(-end // BYTE)
     parts = {".".join(leaf.path): part for leaf in leaves if (part := _part(leaf)) is not None}
     if variant is None or last is None:
-        return Block(align, size, parts)
-    reference, tail = variant.selector, compile_tail(variant)
+        return OptionLayout(align, size, parts)
+    reference, layout = variant.selector, lay_out_variant(variant)
     selector = reference.path[0] if len(reference.path) == 1 and reference.scope is None else None
     declared = next((member.type for member in fixed if member.name == selector), None)
-    if tail is None or selector is None or declared is None or end % BYTE:
+    if layout is None or selector is None or declared is None or end % BYTE:
         return None
     if not is_selector(declared) or selector not in parts:
         return None
-    return Block(align, size, parts, selector, tail, last.name)
+    return OptionLayout(align, size, parts, selector, layout, last.name)
 
 
 def _part(leaf: Leaf) -> Part | None:

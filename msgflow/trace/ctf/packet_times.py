@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.entries import Entry
 from msgflow.trace.ctf.events import find_events, read_events, without_absurd
-from msgflow.trace.ctf.loading import Loader
+from msgflow.trace.ctf.packet_memory import Loader
+from msgflow.trace.ctf.packet_order import Entry
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import numpy as np
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.packets import Packet
     from msgflow.trace.ctf.streams import Stream
+
+
+def numbers_of(streams: Iterable[Stream]) -> dict[Packet, tuple[int, int]]:
+    """Return a number for each packet, in place of the clock's value and of the time."""
+    packets = (packet for stream in streams for packet in stream.packets)
+    return {packet: (number, number) for number, packet in enumerate(packets)}
 
 
 def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.errors import FieldError
+from msgflow.trace.ctf.field_types import (
     BYTE,
+    EVENT_CLASS_ROLE,
     TIME_ROLE,
     Array,
     Integer,
@@ -26,15 +29,13 @@ from msgflow.trace.ctf.types import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+
 _MOST_EMPTY_ELEMENTS = 1 << 16
 _MOST_VARIABLE_BYTES = 10
 
 
-class FieldError(Exception):
-    """A field cannot be read; the message says why."""
-
-
-class Walker:
+class FieldReader:
     """Reads the fields of one packet.
 
     Attributes:
@@ -256,3 +257,71 @@ def _smallest_size(field_type: Type) -> int:
             return sum(_smallest_size(member.type) for member in members)
         case _:
             return 0
+
+
+@dataclass(frozen=True, slots=True)
+class HeaderValues:
+    """An event's header: its class, its time stamp and the size of that in bits."""
+
+    event: EventClass
+    time: int | None
+    time_bits: int
+
+
+class EventReader:
+    """Reads events of one packet, at any bit."""
+
+    def __init__(self, trace: TraceClass, stream: StreamClass, data: memoryview, end: int) -> None:
+        """Read the packet's own header, which fields of events may refer to.
+
+        Args:
+            trace: the trace's declarations.
+            stream: the packet's stream class.
+            data: what begins with the packet.
+            end: the bit at which its content ends.
+        """
+        self._stream = stream
+        self._reader = FieldReader(data, end)
+        self._end = end
+        self._reader.read_scope(Scope.PACKET_HEADER, trace.packet_header)
+        self._reader.read_scope(Scope.PACKET_CONTEXT, stream.packet_context)
+
+    def begin(self, position: int) -> int:
+        """Return where an event begins that is due at this bit; at the end if none is left."""
+        begin = aligned(position, self._stream.event_header.align)
+        return min(begin, self._end) if position < self._end else self._end
+
+    def header(self, position: int) -> HeaderValues:
+        """Read the header of the event that begins at this bit.
+
+        Raises:
+            FieldError: there is none, or no event class of its id.
+        """
+        reader = self._reader
+        reader.position = position
+        reader.found.pop(TIME_ROLE, None)
+        reader.found[EVENT_CLASS_ROLE] = 0
+        reader.read_scope(Scope.EVENT_HEADER, self._stream.event_header)
+        event = self._stream.events.get(reader.found[EVENT_CLASS_ROLE])
+        if event is None:
+            raise FieldError(f"there is no event class {reader.found[EVENT_CLASS_ROLE]}")
+        return HeaderValues(event, reader.found.get(TIME_ROLE), reader.time_bits)
+
+    def event(self, position: int) -> dict[Scope, dict[str, Any]]:
+        """Read the contexts and payload of the event that begins at this bit.
+
+        Raises:
+            FieldError: they do not fit into the packet.
+        """
+        event = self.header(position).event
+        read = self._reader.read_scope
+        return {
+            Scope.EVENT_CONTEXT: read(Scope.EVENT_CONTEXT, self._stream.event_context),
+            Scope.SPECIFIC_CONTEXT: read(Scope.SPECIFIC_CONTEXT, event.specific_context),
+            Scope.PAYLOAD: read(Scope.PAYLOAD, event.payload),
+        }
+
+    def event_end(self, position: int) -> int:
+        """Return the bit at which the event ends that begins at this bit."""
+        self.event(position)
+        return self._reader.position

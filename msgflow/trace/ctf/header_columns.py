@@ -1,4 +1,4 @@
-"""From positions of events to their classes, times and bodies, for many events at once."""
+"""Columns of event headers: classes, times and bodies of many events, from their positions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.event_header import Form, Place
-    from msgflow.trace.ctf.layout import StreamLayout
-    from msgflow.trace.ctf.memory import Memory
+    from msgflow.trace.ctf.packet_memory import Memory
+    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""One pass over a set of traces: from packets to record batches."""
+"""Batches of events and packets, from one pass over a set of traces."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema
-from msgflow.trace.ctf.arrow_types import declared_schema, hexadecimal_names
-from msgflow.trace.ctf.build import EventRows, build_batch
-from msgflow.trace.ctf.events import walk_of
-from msgflow.trace.ctf.order import ordered_batches
+from msgflow.trace.ctf.arrow import declared_schema, hexadecimal_names
+from msgflow.trace.ctf.event_order import ordered_batches
+from msgflow.trace.ctf.events import event_reader_of
+from msgflow.trace.ctf.field_types import BYTE
 from msgflow.trace.ctf.packet_rows import PacketRows
-from msgflow.trace.ctf.plans import ClassPlan, make_plan
 from msgflow.trace.ctf.prefetch import Prefetch
+from msgflow.trace.ctf.record_batch import ClassPlan, EventRows, build_batch, make_plan
 from msgflow.trace.ctf.thread_names import ThreadNames
-from msgflow.trace.ctf.types import BYTE
 from msgflow.trace.model import EventBatch, Progress
 
 if TYPE_CHECKING:
@@ -25,13 +24,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from msgflow.trace.ctf.entries import Entry
-    from msgflow.trace.ctf.layout import StreamLayout
-    from msgflow.trace.ctf.order import Batch
-    from msgflow.trace.ctf.slow import PacketWalk
+    from msgflow.trace.ctf.event_order import Batch
+    from msgflow.trace.ctf.field_reader import EventReader
+    from msgflow.trace.ctf.packet_order import Entry
+    from msgflow.trace.ctf.stream_layout import StreamLayout
 
-_LARGEST_BATCH = 8 << 20
-_SMALLEST_BATCH = 64 << 10
+LARGEST_BATCH = 8 << 20
+SMALLEST_BATCH = 64 << 10
 _BYTES_PER_ROW = 256
 _AHEAD = 1
 
@@ -74,14 +73,16 @@ class Iteration:
 
     def run(self) -> Iterator[EventBatch]:
         """Yield all batches."""
-        size = min(max(self._batch_rows * _BYTES_PER_ROW, _SMALLEST_BATCH), _LARGEST_BATCH)
+        size = min(max(self._batch_rows * _BYTES_PER_ROW, SMALLEST_BATCH), LARGEST_BATCH)
         total = sum(entry.size for entry in self._entries) or 1
         done = 0
         latest_ns = 0
         packets = PacketRows(self._report_damage)
-        # Events of the next batch are found while columns of this one are made and used.
+        # A thread finds the events of the next batch while the columns of this one are made.
         batches = Prefetch(
-            lambda: ordered_batches(self._entries, size, self._report_damage, self._walked()),
+            lambda: ordered_batches(
+                self._entries, size, self._report_damage, self._field_by_field()
+            ),
             _AHEAD,
         )
         try:
@@ -89,7 +90,7 @@ class Iteration:
                 packets.add(batch.packets)
                 if batch.ts_ns.size:
                     latest_ns = int(batch.ts_ns[-1])
-                yield from self._events(batch, number)
+                yield from self.events(batch, number)
                 yield from packets.take(self._batch_rows, number)
                 done += sum(packet.entry.size for packet in batch.packets)
                 if done < total:
@@ -98,11 +99,11 @@ class Iteration:
             batches.close()
         self._report_progress(1.0, latest_ns)
 
-    def _walked(self) -> set[StreamLayout]:
-        """Return the streams of which events are read field by field: that needs whole packets."""
+    def _field_by_field(self) -> set[StreamLayout]:
+        """Return the streams with events read field by field: their packets cannot be cut."""
         plans = itertools.chain.from_iterable(self._plans.values())
-        slow = {layout for layout, _ in self._classes if layout.header is None}
-        return slow | {plan.stream for plan in plans if plan.is_slow}
+        without_header = {layout for layout, _ in self._classes if layout.header is None}
+        return without_header | {plan.stream for plan in plans if plan.is_field_by_field}
 
     def _planned(self, wanted: Mapping[str, pa.Schema]) -> dict[str, list[ClassPlan]]:
         plans: dict[str, list[ClassPlan]] = {}
@@ -112,21 +113,22 @@ class Iteration:
                 plans.setdefault(name, []).append(make_plan(layout, known, wanted[name]))
         return plans
 
-    def _events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
+    def events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
+        """Yield the wanted events of a batch, class by class; `number` is that of the round."""
         first_id = self.event_count
         self.event_count += batch.ts_ns.size
         by_class, ends = _split(batch, len(self._classes))
         counts = np.diff(ends, prepend=0)
         self._counts += counts
-        walks: dict[int, PacketWalk] = {}
+        readers: dict[int, EventReader] = {}
 
-        def walk_at(packet: int, position: int) -> tuple[PacketWalk, int]:
+        def reader_at(packet: int, position: int) -> tuple[EventReader, int]:
             entry, base = batch.entries[packet], batch.bases[packet]
             layout = entry.stream.layout
-            if packet not in walks:
-                walks[packet] = walk_of(layout, batch.memory, entry, base)
-            is_slow = layout.header is None
-            return walks[packet], position if is_slow else (position - base) * BYTE
+            if packet not in readers:
+                readers[packet] = event_reader_of(layout, batch.memory, entry, base)
+            is_field_by_field = layout.header is None
+            return readers[packet], position if is_field_by_field else (position - base) * BYTE
 
         for name, plans in self._plans.items():
             parts = []
@@ -135,7 +137,7 @@ class Iteration:
                 if counts[place]:
                     of_class = by_class[ends[place] - counts[place] : ends[place]]
                     rows = _rows(batch, of_class, first_id)
-                    parts.append(build_batch(plan, batch.memory, rows, self._names, walk_at))
+                    parts.append(build_batch(plan, batch.memory, rows, self._names, reader_at))
             if parts:
                 whole = parts[0] if len(parts) == 1 else _in_order(parts)
                 for begin in range(0, whole.num_rows, self._batch_rows):

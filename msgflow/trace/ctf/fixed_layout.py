@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from msgflow.trace.ctf.types import (
+from msgflow.trace.ctf.field_types import (
     Array,
     Integer,
     Real,

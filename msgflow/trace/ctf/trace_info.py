@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf.probe import end_of
+from msgflow.trace.ctf.packet_times import end_of
 from msgflow.trace.model import TraceInfo
 
 if TYPE_CHECKING:
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+    from msgflow.trace.ctf.field_types import Structure
     from msgflow.trace.ctf.streams import Stream
-    from msgflow.trace.ctf.types import Structure
     from msgflow.trace.time_base import TimeBase
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}

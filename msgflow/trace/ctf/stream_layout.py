@@ -1,4 +1,4 @@
-"""Everything needed to find the events of one stream class."""
+"""Layout of a stream class: how to find and read its events."""
 
 from __future__ import annotations
 
@@ -6,23 +6,17 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from msgflow.trace.ctf.errors import FieldError
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
-from msgflow.trace.ctf.slow import PacketWalk
-from msgflow.trace.ctf.types import (
-    BYTE,
-    Array,
-    Optional,
-    Sequence,
-    Structure,
-    Type,
-    Variant,
-    aligned,
-)
-from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.ctf.field_reader import EventReader
+from msgflow.trace.ctf.field_types import BYTE, Type, aligned, parts
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+
+GAP = 64
+"""Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
 
 _MOST_RESIDUES = 8
 
@@ -63,15 +57,15 @@ class StreamLayout:
     """How to find the events of one stream class.
 
     Attributes:
-        residues: positions that differ by a multiple of this are laid out alike.
-        header: how to read event headers at once, None if they must be read one by one.
+        residues: events whose positions differ by a multiple of this have the same layout.
+        header: how to read many event headers at once; None: they are read field by field.
         classes: event class id to layout.
     """
 
     def __init__(
         self, trace_index: int, trace: TraceClass, stream: StreamClass, first_number: int
     ) -> None:
-        """Work it out.
+        """Compile the layouts of all event classes.
 
         Args:
             trace_index: place of the trace in the set.
@@ -91,17 +85,21 @@ class StreamLayout:
         )
         self.residues = min(align // BYTE, _MOST_RESIDUES)
         self.header: EventHeader | None = None
-        # From selector * `residues` + residue to what follows such a header, and its size.
+        # From selector * `residues` + residue to the body behind such a header, and the header's
+        # size in bytes.
         self._short_forms: dict[int, tuple[EventBody, int]] = {}
         if align // BYTE <= _MOST_RESIDUES:
             self.header = compile_header(stream.event_header, self.residues)
+        if self.header is not None and self.header.largest_size > GAP:
+            # A header may begin right in front of the end of what is in memory.
+            self.header = None
         self.classes = {
             event_id: ClassLayout(number, event, compile_body(stream, event, self.residues))
             for number, (event_id, event) in enumerate(stream.events.items(), first_number)
         }
 
     def span(self, base: int, events_at: int, content_bits: int) -> Span:
-        """Return where events lie in a packet that lies at `base`; needs `header`."""
+        """Return where events lie in a packet at the byte `base`; needs `header`."""
         assert self.header is not None
         align = self.header.align * BYTE
         begin = base + aligned(events_at, align) // BYTE
@@ -110,15 +108,15 @@ class StreamLayout:
 
     @cached_property
     def only_id(self) -> int:
-        """Id of the events whose headers have none."""
+        """Id of events whose headers have no id."""
         return next(iter(self.classes)) if len(self.classes) == 1 else 0
 
     @cached_property
     def sizes_by_selector(self) -> list[dict[int, int]]:
-        """Sizes of events in bytes, padding in front of the next header included.
+        """Sizes of events in bytes, including the padding in front of the next header.
 
-        A dictionary for each residue of the event's position, from the selector, with the bits
-        below it that were read along, to the size. Events whose size varies are not in it.
+        For each residue of the event's position, a dictionary from the selector, shifted as it
+        lies in its word, to the size. Events whose size varies are not in it.
         """
         header = self.header
         assert header is not None
@@ -186,29 +184,19 @@ class StreamLayout:
         elif body.fields is not None:
             end = body.end(data, body_at, span.limit)
         else:
-            walk = self.walk(
+            reader = self.event_reader(
                 memoryview(data)[span.base : span.limit], (span.limit - span.base) * BYTE
             )
-            end = span.base + (walk.event_end((position - span.base) * BYTE) + BYTE - 1) // BYTE
+            end = span.base + (reader.event_end((position - span.base) * BYTE) + BYTE - 1) // BYTE
         if end > span.limit or end == position:
             raise FieldError("an event goes beyond the end of the packet")
         return aligned(end, header.align)
 
-    def walk(self, data: memoryview, bits: int) -> PacketWalk:
-        """Return the slow path through a packet of so many bits."""
-        return PacketWalk(self.trace, self.stream, data, bits)
+    def event_reader(self, data: memoryview, bits: int) -> EventReader:
+        """Return what reads events of a packet of so many bits field by field."""
+        return EventReader(self.trace, self.stream, data, bits)
 
 
 def largest_align(declared: Type) -> int:
-    """Return the largest alignment of a type and everything in it."""
-    match declared:
-        case Structure():
-            return max(declared.align, *(largest_align(m.type) for m in declared.members), 1)
-        case Array() | Sequence():
-            return max(declared.align, largest_align(declared.element))
-        case Variant():
-            return max(1, *(largest_align(choice.type) for choice in declared.choices), 1)
-        case Optional():
-            return largest_align(declared.content)
-        case _:
-            return declared.align
+    """Return the largest alignment of a type and everything in it, in bits."""
+    return max(declared.align, *map(largest_align, parts(declared)), 1)

@@ -1,6 +1,6 @@
-"""Cuts large packets into pieces, which are read like packets.
+"""Large packets, cut into pieces that are read like packets.
 
-A packet of each CPU has to be at hand, and they may have many megabytes.
+A packet of each CPU must be in memory at the same time, and packets may have many megabytes.
 """
 
 from __future__ import annotations
@@ -12,33 +12,33 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msgflow.numpy_arrow import distinct
-from msgflow.trace.ctf.entries import PacketEvents
 from msgflow.trace.ctf.events import find_events, read_events, without_absurd
-from msgflow.trace.ctf.memory import GAP
+from msgflow.trace.ctf.packet_order import PacketEvents
+from msgflow.trace.ctf.stream_layout import GAP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from msgflow.trace.ctf.entries import Entry
-    from msgflow.trace.ctf.loading import Loader
+    from msgflow.trace.ctf.packet_memory import Loader
+    from msgflow.trace.ctf.packet_order import Entry
 
-# A multiple of `GAP`: so no two pieces begin at the same.
-_PIECE = 1 << 19
-_LARGEST_WHOLE = 2 * _PIECE
+# Bytes of a piece. Pieces begin at multiples of `GAP`, as this one is: no two at the same.
+PIECE = 1 << 19
+LARGEST_WHOLE = 2 * PIECE
 
 
 def cut(
     loader: Loader, entry: Entry, report: Callable[[Entry, int, str], None]
 ) -> tuple[PacketEvents, list[Entry]] | None:
-    """Return what the events of a packet say of it, and its pieces in order of time.
+    """Return a packet's times and counts, and its pieces in order of time.
 
-    Its events are found once, for all pieces; `report` is called for what is damaged.
+    Its events are found once, for all pieces; `report` is called for damage.
 
     Returns:
-        None if it is better read as a whole: it is small, a piece already, empty, or its times
-        make no sense.
+        None if the packet is better read as a whole: it is small, a piece already, empty, or its
+        times make no sense.
     """
-    if entry.size <= _LARGEST_WHOLE or entry.until is not None:
+    if entry.size <= LARGEST_WHOLE or entry.until is not None:
         return None
     memory = loader.alone(entry)
     if memory is None:
@@ -55,10 +55,10 @@ def cut(
     if not (is_sound and begins.size and (ts_ns[1:] >= ts_ns[:-1]).all()):
         return None
     entry.events = None
-    first = distinct(np.searchsorted(begins, np.arange(0, begins[-1] + 1, _PIECE)))
+    first = distinct(np.searchsorted(begins, np.arange(0, begins[-1] + 1, PIECE)))
     pieces = []
     for at, end in pairwise([*first.tolist(), begins.size]):
-        # Positions are laid out alike that differ by a multiple of it.
+        # Events have the same layout at positions that differ by a multiple of `GAP`.
         skipped = int(begins[at]) // GAP * GAP
         piece = replace(
             entry,

@@ -191,6 +191,21 @@ class Optional:
 Type = Integer | VariableInteger | Real | String | Array | Sequence | Structure | Variant | Optional
 
 
+def parts(declared: Type) -> list[Type]:
+    """Return the types directly inside a type."""
+    match declared:
+        case Structure(members=members):
+            return [member.type for member in members]
+        case Variant(choices=choices):
+            return [choice.type for choice in choices]
+        case Array(element=element) | Sequence(element=element):
+            return [element]
+        case Optional(content=content):
+            return [content]
+        case _:
+            return []
+
+
 def may_have(declared: Type, role: str) -> bool:
     """Tell whether a field of this type can be what the role says."""
     if role != UUID_ROLE:

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msgflow.trace.ctf.entries import PacketEvents
 from msgflow.trace.ctf.events import Events, find_events, read_events, without_absurd
-from msgflow.trace.ctf.loading import Loader
-from msgflow.trace.ctf.pieces import cut
+from msgflow.trace.ctf.large_packets import cut
+from msgflow.trace.ctf.packet_memory import Loader
+from msgflow.trace.ctf.packet_order import PacketEvents
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from msgflow.trace.ctf.entries import Entry
-    from msgflow.trace.ctf.layout import StreamLayout
-    from msgflow.trace.ctf.memory import Memory
+    from msgflow.trace.ctf.packet_memory import Memory
+    from msgflow.trace.ctf.packet_order import Entry
+    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 _NEVER_NS = 1 << 64
-_MOST_EVENTS = 1 << 18
+MOST_EVENTS = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -222,8 +222,8 @@ def _parts(
     """Yield what is loaded in parts, as large packets make it large: columns of it take memory."""
     bases = [entry.base for entry in loaded.entries]
     cpus = [entry.packet.header.cpu for entry in loaded.entries]
-    for begin in range(0, max(order.size, 1), _MOST_EVENTS):
-        rows = order[begin : begin + _MOST_EVENTS]
+    for begin in range(0, max(order.size, 1), MOST_EVENTS):
+        rows = order[begin : begin + MOST_EVENTS]
         yield Batch(
             memory=loaded.memory,
             entries=loaded.entries,

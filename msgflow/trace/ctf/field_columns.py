@@ -1,4 +1,4 @@
-"""The fields of many events of one class, gathered from memory into numpy arrays."""
+"""Columns of fields: many events of one class, gathered from memory into numpy arrays."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from msgflow.trace.ctf.memory import Memory
-    from msgflow.trace.ctf.tail import Block, Part, Tail
+    from msgflow.trace.ctf.packet_memory import Memory
+    from msgflow.trace.ctf.variant_layout import OptionLayout, Part, VariantLayout
 
 _WIDEST_ROW = 256
 _WORD = 8
@@ -24,7 +24,7 @@ _HIGHS = np.uint64(0x8080808080808080)
 
 
 class FieldRows:
-    """The plain fields of events of one class."""
+    """The plain fields of events of one class, a row for each event."""
 
     def __init__(
         self,
@@ -33,15 +33,20 @@ class FieldRows:
         bodies: NDArray[np.int64],
         wanted: Iterable[int],
         *,
-        with_tail: bool = False,
+        with_variant: bool = False,
     ) -> None:
-        """Look at the bodies that begin at `bodies`; `wanted` are the fields that will be read.
+        """Prepare to read fields.
 
-        `with_tail`: fields of the variant at the end will be read as well.
+        Args:
+            body: how the events are laid out.
+            memory: where they lie.
+            bodies: where contexts and payload of each event begin: bytes of memory.
+            wanted: places of the fields that will be read in the list of fields.
+            with_variant: fields of the variant at the end will be read as well.
         """
         assert body.fields is not None
         self._fields = body.fields
-        self._blocks: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], Block]] = {}
+        self._options: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]] = {}
         self._memory = memory
         self._bodies = bodies
         self._positions: dict[int, NDArray[np.int64]] = {}
@@ -49,14 +54,16 @@ class FieldRows:
         self._rows: NDArray[Any] | None = None
         self._first = 0
         self._offsets: tuple[int, ...] | None = None
-        if body.tail is not None and with_tail:
-            tail_at = self._walk(len(self._fields) - 1)
+        if body.variant is not None and with_variant:
+            variant_at = self._follow(len(self._fields) - 1)
             everywhere = np.arange(bodies.size)
             values = self.numbers(body.selector)
-            for name, rows, at, block in _blocks(body.tail, memory, everywhere, tail_at, values):
-                self._blocks[f"{body.tail_name}.{name}"] = (rows, at, block)
+            for name, rows, at, option in _options(
+                body.variant, memory, everywhere, variant_at, values
+            ):
+                self._options[f"{body.variant_name}.{name}"] = (rows, at, option)
         elif body.offsets is None:
-            self._walk(max(wanted, default=-1))
+            self._follow(max(wanted, default=-1))
         elif len({tuple(offset) for offset in zip(*body.offsets, strict=True)}) <= 1:
             self._offsets = tuple(offset[0] for offset in body.offsets)
             self._take_rows(wanted)
@@ -67,7 +74,7 @@ class FieldRows:
                 self._positions[number] = bodies + table[residue]
 
     def words(self, number: int, dtype: str) -> NDArray[Any]:
-        """Return what lies at a field as this type."""
+        """Return the bytes at a field as this type, a value for each row."""
         if self._rows is not None and self._offsets is not None:
             at = self._offsets[number] - self._first
             if at + np.dtype(dtype).itemsize <= self._rows.dtype.itemsize:
@@ -83,7 +90,7 @@ class FieldRows:
         return self._memory.view(dtype)[self._position(number)]
 
     def numbers(self, number: int) -> NDArray[Any]:
-        """Return the values of a number."""
+        """Return the values of a field that is a number."""
         return self.words(number, self._fields[number].dtype)
 
     def elements(self, number: int) -> tuple[NDArray[np.int64], NDArray[Any]]:
@@ -107,16 +114,16 @@ class FieldRows:
         cut, at = _flat(offsets[:-1], lengths, 1)
         return cut, content[at]
 
-    def in_tail(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
-        """Return the rows that have a field of the tail, and its values; None if no row has.
+    def in_variant(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+        """Return the rows that have a field of the variant, and its values; None if no row has it.
 
-        Of an array, the values have a column per element. The name has dots between the names of
-        the variants, their options and the structures around the field.
+        The values of an array have a column for each element. The name has dots between the names
+        of the variants, their options and the structures around the field.
         """
         words = name.split(".")
         for depth in range(len(words) - 1, 0, -1):
-            rows, at, block = self._blocks.get(".".join(words[:depth]), (None, None, None))
-            part = None if block is None else block.parts.get(".".join(words[depth:]))
+            rows, at, option = self._options.get(".".join(words[:depth]), (None, None, None))
+            part = None if option is None else option.parts.get(".".join(words[depth:]))
             if rows is not None and at is not None and part is not None:
                 return rows, _values(self._memory, at, part)
         return None
@@ -127,7 +134,7 @@ class FieldRows:
         return self._positions[number]
 
     def _take_rows(self, wanted: Iterable[int]) -> None:
-        """Take the part of each event that holds the wanted fields, in one go."""
+        """Copy the part of each event that holds the wanted fields, all at once."""
         assert self._offsets is not None
         ends = [
             (self._offsets[number], self._offsets[number] + (self._fields[number].size or 0))
@@ -141,8 +148,8 @@ class FieldRows:
             width = max(last - first, 1)
             self._rows = self._memory.view(f"V{width}")[self._bodies + first]
 
-    def _walk(self, last: int) -> NDArray[np.int64]:
-        """Find where fields begin whose place varies, up to the field `last`; return its end."""
+    def _follow(self, last: int) -> NDArray[np.int64]:
+        """Find where fields begin, up to the field `last`, as places vary; return where it ends."""
         at = self._bodies
         for number, field in enumerate(self._fields[: last + 1]):
             if field.align > 1:
@@ -160,28 +167,28 @@ class FieldRows:
         return at
 
 
-def _blocks(
-    tail: Tail,
+def _options(
+    variant: VariantLayout,
     memory: Memory,
     rows: NDArray[np.int64],
     due: NDArray[np.int64],
     values: NDArray[Any],
-) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64], Block]]:
-    """Yield name, rows that have it, where it begins there, and block, of all chosen options."""
+) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64], OptionLayout]]:
+    """Yield each chosen option: its name, the rows that have it, where it begins, its layout."""
     present = distinct(values).tolist()
-    for choice, block in tail.options:
-        choosing = [value for value in present if tail.block(value) is block]
+    for choice, option in variant.options:
+        choosing = [value for value in present if variant.option(value) is option]
         if not choosing:
             continue
         is_chosen = np.isin(values, choosing)
         chosen = rows[is_chosen]
-        at = (due[is_chosen] + (block.align - 1)) & -block.align
-        yield choice.name, chosen, at, block
-        if block.tail is not None:
-            selected = _values(memory, at, block.parts[block.selector])
-            inner = _blocks(block.tail, memory, chosen, at + block.size, selected)
-            for name, found, found_at, inner_block in inner:
-                yield f"{choice.name}.{block.name}.{name}", found, found_at, inner_block
+        at = (due[is_chosen] + (option.align - 1)) & -option.align
+        yield choice.name, chosen, at, option
+        if option.variant is not None:
+            selected = _values(memory, at, option.parts[option.selector])
+            inner = _options(option.variant, memory, chosen, at + option.size, selected)
+            for name, found, found_at, inner_option in inner:
+                yield f"{choice.name}.{option.name}.{name}", found, found_at, inner_option
 
 
 def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:
@@ -193,7 +200,7 @@ def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:
 
 
 def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return how many bytes there are in front of the next NUL; there must be one."""
+    """Return the number of bytes in front of the next NUL; there must be one."""
     lengths = np.zeros(begins.size, np.int64)
     at = begins
     rows = np.arange(begins.size)

@@ -1,28 +1,64 @@
-"""Brings packets into memory."""
+"""Memory that holds the packets of a batch, and the loader that fills it from files."""
 
 from __future__ import annotations
 
 import os
 import weakref
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from msgflow.trace.ctf.memory import GAP, PADDING, Memory, room_for
+import numpy as np
+
+from msgflow.trace.ctf.stream_layout import GAP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from msgflow.trace.ctf.entries import Entry
+    from numpy.typing import NDArray
+
+    from msgflow.trace.ctf.packet_order import Entry
+
+PADDING = 2 * GAP
+"""Bytes behind all packets."""
 
 _MOST_FILES = 64
 _ONES = b"\xff" * GAP
 
 
+class Memory:
+    """Bytes that Python and numpy share.
+
+    Attributes:
+        data: for Python.
+        bytes: for numpy.
+    """
+
+    def __init__(self, data: bytearray) -> None:
+        self.data = data
+        self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)
+        self._views: dict[str, NDArray[Any]] = {}
+
+    def view(self, dtype: str) -> NDArray[Any]:
+        """Return an array whose n-th element begins at the n-th byte."""
+        found = self._views.get(dtype)
+        if found is None:
+            width = np.dtype(dtype).itemsize
+            count = max(len(self.data) - width + 1, 0)
+            found = np.ndarray((count,), dtype, self.data, strides=(1,))
+            self._views[dtype] = found
+        return found
+
+
+def room_for(size: int) -> int:
+    """Return the bytes that a packet of this size takes with the gap behind it."""
+    return (size + GAP + GAP - 1) // GAP * GAP
+
+
 class Loader:
     """Keeps the packets of the current batch in memory.
 
-    What a batch does not use up is copied to the next one. The room of memories that nobody uses
-    any more is used again.
+    Packets that the next batch needs, too, are copied to its memory. Buffers of memories that are
+    no longer in use are used again.
 
     Attributes:
         memory: where the packets of the current batch are.
@@ -34,7 +70,7 @@ class Loader:
         self._files: dict[Path, int] = {}
 
     def load(self, entries: Sequence[Entry]) -> list[Entry]:
-        """Put these packets into memory in this order, those that are there already included.
+        """Put these packets into memory in this order, including those that are there already.
 
         Returns:
             packets that their files no longer hold.
@@ -51,7 +87,7 @@ class Loader:
                     target[at:end] = source[entry.base : entry.base + entry.size]
                 elif not self._read(entry, target[at:end]):
                     missing.append(entry)
-                # Where no event can begin: it stops the scan.
+                # No event begins with ones: what is damaged does not go on into the next packet.
                 target[end : end + GAP] = _ONES
                 entry.base = at
                 at += room_for(entry.size)
