@@ -11,7 +11,7 @@ RUN python -m venv /opt/msgflow && /opt/msgflow/bin/pip install --no-cache-dir .
 
 FROM python:3.12-slim
 COPY --from=build /opt/msgflow /opt/msgflow
-# Nobody's home: with `--user` it may be anybody's.
+# No user's home: `--user` may name any user.
 ENV PATH=/opt/msgflow/bin:$PATH HOME=/tmp PYTHONUNBUFFERED=1
 RUN useradd --no-create-home --uid 1000 msgflow && mkdir /data && chown msgflow /data
 USER msgflow

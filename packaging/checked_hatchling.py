@@ -1,7 +1,8 @@
-"""Builds with hatchling, after a look at the Python that asks for it.
+"""Build backend: hatchling, after a check of the version of Python.
 
-pip compares the version of Python with `requires-python` only after it has searched for every
-dependency, and where one of them has no release for an old Python it ends with pages about that.
+pip searches for all dependencies before it compares the version of Python with `requires-python`.
+On Python 3.10, which Ubuntu 22.04 has, it ends with pages about a dependency that has no release
+for that Python.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""What the order of the events says of each of them: its thread, and what that did before.
+"""Sequences of events on threads: the thread of each event, and what it did before.
 
 A *sequence* is a kind of events on one thread, such as begins and ends of callbacks; the catalogue
 says which tracepoints belong to which. Only a reader has all events in hand in their total order:
@@ -33,7 +33,7 @@ THREAD_SCHEMA = pa.schema(
         pa.field("vtid", pa.int32(), nullable=False),
     ]
 )
-"""Threads by what their events say of them; `trace_index` is a trace of their host."""
+"""Threads as their events name them; `trace_index` is a trace of their host."""
 
 THREAD_NAME_SCHEMA = pa.schema(
     [
@@ -54,7 +54,7 @@ _NONE = -1
 
 @dataclass(frozen=True)
 class Placed:
-    """Events of a round with what the order says of them.
+    """Events of a round with their threads and predecessors.
 
     Attributes:
         batches: (event name, batch), with the columns of the staging tables.
@@ -68,7 +68,7 @@ class Placed:
 
 
 class Sequences:
-    """Follows all threads through the rounds of a reader, which it must be given in order."""
+    """State of all threads through the rounds of a reader, which must come in order."""
 
     def __init__(self, catalogue: Catalogue, hosts: Sequence[int]) -> None:
         """Start before the first event.
@@ -166,7 +166,7 @@ class Sequences:
 
 
 class _Threads:
-    """Numbers threads, which are (host, PID namespace, pid, tid), from 0 as they are first seen."""
+    """Numbers of threads, that is of (host, PID namespace, pid, tid), in order of appearance."""
 
     def __init__(self, hosts: Sequence[int]) -> None:
         self._hosts = np.asarray(hosts, np.int64)
@@ -199,7 +199,7 @@ class _Threads:
 
 
 class _Numbers:
-    """Numbers values from 0 as they are first seen."""
+    """Numbers of values from 0, in order of appearance."""
 
     def __init__(self) -> None:
         self._values = np.empty(0, np.int64)
@@ -263,7 +263,7 @@ class _Groups:
 
 
 class _Latest:
-    """What is known of the latest event of a sequence on each thread."""
+    """The latest event of a sequence on each thread."""
 
     def __init__(self, origins: Sequence[Origin]) -> None:
         self._values = {origin: np.empty(0, np.int64) for origin in origins}
@@ -279,7 +279,7 @@ class _Latest:
         is_member: NDArray[Any],
         events: Mapping[Origin, NDArray[Any]],
     ) -> dict[Origin, NDArray[Any]]:
-        """Return what is latest before each event of `groups`, and go on to the round's end."""
+        """Return the latest event before each one of `groups`; remember the last of the round."""
         places = np.arange(is_member.size, dtype=np.int32)
         places[is_member == 0] = _NONE
         until = np.maximum.accumulate(places, out=places)

@@ -1,7 +1,12 @@
-"""msgflow's own decoder of CTF 1.8 and CTF 2, on numpy and pyarrow alone.
+"""Decoder of CTF 1.8 and CTF 2, on numpy and pyarrow alone.
 
-Metadata becomes a tree of types (`tsdl`, `json_metadata`); the stream files become a table of
-packets (`packets`). Packets are read in batches in order of time. A scan finds where each event
-begins, the only step that must go from event to event (`scan`); after it everything is a gather
-over all events of one class (`gather`).
+1. Metadata in TSDL or JSON becomes declarations made of field types (`metadata`, `declarations`,
+   `field_types`).
+2. Stream files become a table of packets in order of time (`packets`, `packet_order`).
+3. Packets are loaded in batches, and their events are found and put in order of time
+   (`packet_memory`, `events`, `event_order`). Finding is the only step that goes from event to
+   event.
+4. The fields of all events of one class become columns at once (`header_columns`,
+   `field_columns`, `record_batch`). Whatever has no layout for that is read field by field
+   (`field_reader`): slower, but any type will do.
 """

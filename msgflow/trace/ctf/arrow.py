@@ -1,4 +1,4 @@
-"""Which Arrow type holds every value of a field."""
+"""Arrow types and arrays for fields: which type holds all values, and arrays from numpy."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SIGNED = {8: pa.int8(), 16: pa.int16(), 32: pa.int32(), 64: pa.int64()}
 
 
 def arrow_type(declared: Type) -> pa.DataType:
-    """Return the type; a variant is a structure of all its options, of which one is not NULL."""
+    """Return the Arrow type; a variant is a structure of all its options, all but one NULL."""
     match declared:
         case Integer():
             if declared.arrow == "bool":
@@ -55,12 +55,12 @@ def arrow_type(declared: Type) -> pa.DataType:
 
 
 def declared_schema(structure: Structure) -> pa.Schema:
-    """Return the columns of a payload, all its fields."""
+    """Return the columns of a payload: one for each field."""
     return pa.schema([(member.name, arrow_type(member.type)) for member in structure.members])
 
 
 def hexadecimal_names(structure: Structure) -> set[str]:
-    """Return the fields that are, or are arrays of, integers to be shown in base 16."""
+    """Return the names of fields to show in base 16: integers, and arrays of them."""
     return {member.name for member in structure.members if _is_hexadecimal(member.type)}
 
 
@@ -71,7 +71,7 @@ def _is_hexadecimal(declared: Type) -> bool:
 
 
 def number_array(values: NDArray[Any], data_type: pa.DataType) -> pa.Array:
-    """Return numbers; integers that do not fit are wrapped round as C would."""
+    """Return numbers; integers that do not fit wrap round, as in C."""
     return to_arrow(_converted(values, data_type))
 
 
@@ -89,7 +89,7 @@ def list_array(
 def scattered_array(
     found: list[tuple[NDArray[np.int64], NDArray[Any]]], count: int, data_type: pa.DataType
 ) -> pa.Array:
-    """Return a column of which only some rows have a value.
+    """Return a column in which only some rows have a value.
 
     Args:
         found: rows and their values, or a row of elements for each; no row twice.

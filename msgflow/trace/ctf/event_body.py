@@ -1,4 +1,4 @@
-"""What follows an event's header: its contexts and payload, as a list of plain fields."""
+"""Body of an event: the contexts and payload behind its header, as a list of plain fields."""
 
 from __future__ import annotations
 
@@ -84,9 +84,9 @@ class EventBody:
     """How to read the contexts and payload of one event class.
 
     Attributes:
-        fields: its fields in order; None if they must be read one by one.
-        sizes: of the whole in bytes, by residue of its position; None if that varies.
-        offsets: of each field, by residue; None if the sizes are.
+        fields: its fields in order; None if they must be read field by field.
+        sizes: of the body in bytes, by residue of its position; None if the size varies.
+        offsets: of each field in bytes, by residue; None if `sizes` is None.
         variant: the variant behind the fields, None if there is none.
         variant_name: its name in the payload.
         selector: place in the list of the field that chooses its option.
@@ -106,7 +106,7 @@ class EventBody:
 
     @cached_property
     def steps(self) -> tuple[tuple[int, int, Kind, int], ...]:
-        """What leads from the begin of a body to its end, as few steps as possible.
+        """Steps from the begin of a body to its end, as few as possible.
 
         Alignment, and what follows: NOTHING goes on by so many bytes, NUMBER is a length or
         selector of so many bytes, STRING is a text, and of SEQUENCE there are as many elements of
@@ -156,12 +156,12 @@ class EventBody:
 
 
 def compile_body(stream: StreamClass, event: EventClass, residues: int) -> EventBody:
-    """Return how to read the body of an event class.
+    """Compile the layout of the body of an event class.
 
     Args:
         stream: its stream class.
         event: the event class.
-        residues: how many residues of positions are told apart.
+        residues: number of residues of positions with layouts of their own.
     """
     structures = {
         Scope.EVENT_CONTEXT: stream.event_context,
@@ -301,7 +301,7 @@ def _is_plain_element(element: Type) -> bool:
 
 
 def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) -> int | None:
-    """Return the place of the field with the length, None if it is not a plain one before."""
+    """Return the place of the field with the length, None if no plain field before has it."""
     reference = declared.length
     if len(reference.path) != 1:
         return None

@@ -1,4 +1,4 @@
-"""Event headers that can be read from many events at once.
+"""Layout of event headers, for reading many headers at once.
 
 A header is an id and a time stamp; with LTTng there are two forms of it, and the first number
 tells which one and, in the short form, the id as well.
@@ -55,7 +55,7 @@ class Place:
         return f"{'>' if self.big_endian else '<'}u{self.width}"
 
     def read(self, data: bytearray, begin: int, residue: int) -> int:
-        """Read it from the header that begins at this byte."""
+        """Return the integer of the header that begins at this byte."""
         first = begin + self.offsets[residue]
         order = "big" if self.big_endian else "little"
         word = int.from_bytes(data[first : first + self.width], order)  # type: ignore[arg-type]
@@ -106,11 +106,11 @@ class EventHeader:
 
 
 def compile_header(structure: Structure, residues: int) -> EventHeader | None:
-    """Return how to read such headers at once; None if they must be read one by one.
+    """Compile the layout of headers; None if they must be read field by field.
 
     Args:
         structure: the header.
-        residues: how many residues of positions are told apart.
+        residues: number of residues of positions with layouts of their own.
     """
     if structure.align % BYTE or not structure.members:
         return None

@@ -1,4 +1,4 @@
-"""Merges packets of all streams into batches whose events follow each other in time."""
+"""Order of events: packets of all streams, merged into batches of events in order of time."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Batch:
     Attributes:
         memory: where the packets lie.
         entries: the packets in memory, in the order of their rows.
-        bases: where they lie in memory; `Entry.base` may be of a later batch already.
-        packets: of the packets that were not in a batch before, what their events say of them.
+        bases: where they lie in memory; `Entry.base` may already belong to a later batch.
+        packets: summaries of the packets that were in no batch before.
         in_packet: which of `entries` each event is in.
         classes: numbers of the event classes.
         ts_ns: times.
@@ -66,7 +66,7 @@ class _Loaded:
         new: which of the packets were not there before.
         counts: rows of each packet.
         clock: values of the clock.
-        rank_ns: times that the events are ordered by: none is before `Entry.order_ns`, where
+        rank_ns: times to order the events by: none is before `Entry.order_ns`, where
             batches are cut. The order would differ with their size.
         rest: as in `Batch`, with a row per event in memory.
     """
@@ -90,16 +90,16 @@ def ordered_batches(
     report: Callable[[Entry, int, str], None],
     whole: Collection[StreamLayout] = (),
 ) -> Iterator[Batch]:
-    """Read packets, given in order of time, about `size` bytes of them at once.
+    """Read packets, about `size` bytes at once, and yield their events in order of time.
 
     An event at or after the begin of the next unread packet may have to wait for events of that
     one: its packet stays in memory for the next batch. Of large packets it is a piece that stays.
     So no more is held than a batch and a piece or so per stream.
 
     Args:
-        entries: the packets.
+        entries: the packets, in order of time.
         size: bytes of a batch.
-        report: called with a packet, the byte of it and a message for everything damaged.
+        report: called for damage with the packet, its byte and a message.
         whole: packets of these streams cannot be cut.
     """
     loader = Loader()
@@ -130,7 +130,7 @@ def ordered_batches(
             held, are_cut = _unfinished(loaded, until_ns)
             _forget(loaded.entries, held)
             since_ns = until_ns
-            # It takes memory, and the next one will.
+            # Free its memory before the next packets are loaded.
             del loaded
     finally:
         loader.close()
@@ -193,7 +193,7 @@ def _ranks(
     first = (np.cumsum(counts) - counts)[filled]
     if not filled.size or (np.minimum.reduceat(ts_ns, first) >= begins[filled]).all():
         return ts_ns
-    # A damaged packet: events of it are earlier than its begin.
+    # A damaged packet has events that are earlier than its begin.
     return np.maximum(ts_ns, np.repeat(begins, counts))
 
 
@@ -219,7 +219,7 @@ def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDAr
 def _parts(
     loaded: _Loaded, packets: list[PacketEvents], order: NDArray[np.int64]
 ) -> Iterator[Batch]:
-    """Yield what is loaded in parts, as large packets make it large: columns of it take memory."""
+    """Yield what is loaded in parts: columns of all events of large packets take much memory."""
     bases = [entry.base for entry in loaded.entries]
     cpus = [entry.packet.header.cpu for entry in loaded.entries]
     for begin in range(0, max(order.size, 1), MOST_EVENTS):
@@ -241,7 +241,7 @@ def _parts(
 
 
 def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
-    """Yield what the events of new packets say of them; of pieces `cut` says it."""
+    """Yield summaries of the new packets; `cut` makes those of packets in pieces."""
     ts_ns, clock = loaded.ts_ns, loaded.clock
     falls = np.flatnonzero(ts_ns[1:] < ts_ns[:-1]) + 1
     owners = loaded.in_packet[falls]
@@ -263,9 +263,9 @@ def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
 
 
 def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
-    """Return the packets that have events at or after this time, and whether only these are left.
+    """Return the packets with events at or after this time, and whether they have no others left.
 
-    That is so unless time runs backward in one of them.
+    Others are left if time runs backward in a packet.
     """
     if until_ns >= _NEVER_NS:
         return [], True
@@ -297,7 +297,7 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
 
 
 def _forget(entries: Sequence[Entry], held: Sequence[Entry]) -> None:
-    """Drop what was found in packets that are done."""
+    """Forget the positions of events of packets that are done."""
     kept = set(map(id, held))
     for entry in entries:
         if id(entry) not in kept:

@@ -1,4 +1,4 @@
-"""Reads fields of any type one by one: slow, and right for every layout."""
+"""Reader of fields of any type, one field at a time: slow, but right for every layout."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ class FieldReader:
         if smallest:
             room = (self._end - begin) // smallest
         else:
-            # Nothing in the packet bounds how many there are, in one array and in arrays of such.
+            # The size of the packet does not limit how many there are: elements take no bits.
             room = _MOST_EMPTY_ELEMENTS - self._empty_elements
             self._empty_elements += length
         if length > room:
@@ -181,7 +181,7 @@ class FieldReader:
         return values
 
     def _fill(self, field_type: Structure, values: dict[str, Any]) -> None:
-        """Read a structure into `values`, which its own members can look up meanwhile."""
+        """Read a structure into `values`, in which later members look up lengths and selectors."""
         self._take(0, field_type.align)
         self._frames.append(values)
         for member in field_type.members:
@@ -261,7 +261,7 @@ def _smallest_size(field_type: Type) -> int:
 
 @dataclass(frozen=True, slots=True)
 class HeaderValues:
-    """An event's header: its class, its time stamp and the size of that in bits."""
+    """Header of an event: its class, its time stamp and the size of the time stamp in bits."""
 
     event: EventClass
     time: int | None
@@ -269,7 +269,7 @@ class HeaderValues:
 
 
 class EventReader:
-    """Reads events of one packet, at any bit."""
+    """Reader of the events of one packet, which may begin at any bit."""
 
     def __init__(self, trace: TraceClass, stream: StreamClass, data: memoryview, end: int) -> None:
         """Read the packet's own header, which fields of events may refer to.
@@ -287,7 +287,7 @@ class EventReader:
         self._reader.read_scope(Scope.PACKET_CONTEXT, stream.packet_context)
 
     def begin(self, position: int) -> int:
-        """Return where an event begins that is due at this bit; at the end if none is left."""
+        """Return the aligned begin of the event at or behind this bit; the end if none is left."""
         begin = aligned(position, self._stream.event_header.align)
         return min(begin, self._end) if position < self._end else self._end
 
@@ -295,7 +295,7 @@ class EventReader:
         """Read the header of the event that begins at this bit.
 
         Raises:
-            FieldError: there is none, or no event class of its id.
+            FieldError: no header begins there, or no event class has its id.
         """
         reader = self._reader
         reader.position = position

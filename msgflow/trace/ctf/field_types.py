@@ -1,4 +1,4 @@
-"""The types of fields, whichever language the metadata is in. Sizes and alignments are in bits."""
+"""Types of fields, for metadata in any language. Sizes and alignments are in bits."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Scope(IntEnum):
 
 @dataclass(frozen=True)
 class Reference:
-    """Where a length or a selector is found.
+    """Path to the field with a length or a selector.
 
     Attributes:
-        scope: the path starts at this structure; None: at the innermost structure around that
+        scope: structure at which the path starts; None: the innermost structure around that
             has a member of the path's first name.
         path: names of members; None is the structure around the current one.
     """
@@ -58,8 +58,8 @@ class Integer:
         labels: of an enumeration, label to ranges of values (both ends belong to it).
         is_text: an array of these is text.
         roles: what the value is for.
-        arrow: 'integer', 'bool' or 'bits': what the value is shown as.
-        base: the base in which to show it.
+        arrow: 'integer', 'bool' or 'bits': kind of the Arrow type.
+        base: number base for showing it: 10 or 16.
     """
 
     size: int
@@ -100,14 +100,14 @@ class String:
 
 
 class _Elements:
-    """What fixed and variable numbers of elements have in common."""
+    """Common properties of arrays and sequences."""
 
     element: Type
     minimum_align: int
 
     @property
     def align(self) -> int:
-        """That of the element, even when there is none."""
+        """Alignment of the elements, even where there are none."""
         return max(self.minimum_align, self.element.align)
 
     @property
@@ -207,7 +207,7 @@ def parts(declared: Type) -> list[Type]:
 
 
 def may_have(declared: Type, role: str) -> bool:
-    """Tell whether a field of this type can be what the role says."""
+    """Tell whether a field of this type can have the role."""
     if role != UUID_ROLE:
         return isinstance(declared, Integer | VariableInteger)
     if not isinstance(declared, Array) or declared.length != _UUID_BYTES:

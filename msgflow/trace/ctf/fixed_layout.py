@@ -1,4 +1,4 @@
-"""Where the fields of a type lie when that does not depend on their values."""
+"""Fixed layout: places of the fields of a type, where they do not depend on values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MOST_STEPS = 100_000
 
 
 class DynamicError(Exception):
-    """Where a field ends depends on values."""
+    """The layout of a type is not fixed."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ def lay_out(
     leaves: list[Leaf] | None = None,
     path: tuple[str, ...] = (),
 ) -> int:
-    """Return the bit at which a field that is due at `position` ends.
+    """Return the bit at which a field ends that begins at `position` or, aligned, behind it.
 
     Args:
         declared: the type of the field.
         position: in bits from the begin of the packet.
-        leaves: if given, gets the numbers in it.
+        leaves: if given, the numbers in the field are added to it.
         path: names of the structures around it.
 
     Raises:
@@ -58,7 +58,7 @@ def lay_out(
 class _Layout:
     def __init__(self, leaves: list[Leaf] | None) -> None:
         self._leaves = leaves
-        # Of arrays in arrays there may be as many elements as atoms in the world.
+        # Arrays inside arrays may have more elements than a loop can count.
         self._steps = 0
 
     def end(self, declared: Type, position: int, path: tuple[str, ...]) -> int:

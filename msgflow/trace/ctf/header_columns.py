@@ -42,7 +42,7 @@ def read_headers(
     Args:
         layout: of their stream class.
         memory: where they lie.
-        positions: as a scan found them, packet after packet.
+        positions: bytes of memory at which events begin, packet after packet.
         counts: events of each packet.
         befores: value of the clock before the first of them in each packet.
     """

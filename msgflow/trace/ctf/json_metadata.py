@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _SEPARATOR = "\x1e"
-# Beyond everything that can make sense, and short enough to be shown.
+# Larger than any number that makes sense, and short enough for a message.
 _LARGEST = 1 << 80
 _MOST_DIGITS = 30
 _LONE_HALF = re.compile(r"\\u[dD][89a-fA-F]")

@@ -1,4 +1,4 @@
-"""The field classes of CTF 2 metadata."""
+"""Field types from CTF 2 metadata, which calls them field classes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ Ranges = tuple[tuple[int, int], ...]
 
 
 class TypeReader:
-    """Turns field classes into types; knows the aliases of them."""
+    """Reader of field classes and their aliases."""
 
     def __init__(self) -> None:
         self._aliases: dict[str, Type] = {}

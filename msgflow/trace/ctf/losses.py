@@ -1,4 +1,4 @@
-"""Events and packets that were lost, from the counters in the packets."""
+"""Losses of events and packets, from the counters in the packets."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Losses:
     Attributes:
         events: in the packet; None: unknown.
         packets: right before it.
-        problem: what makes no sense, if anything.
+        problem: message about a counter that makes no sense, None if all is well.
     """
 
     events: int | None
@@ -32,7 +32,7 @@ class Losses:
 
 
 class LossCounter:
-    """Turns the counters of one packet after the other into what each lost.
+    """Losses of one packet after the other, as differences of its counters.
 
     A recording may be rotated into several directories, or be given as several snapshots: the
     counter of lost events and the numbers of the packets go on in the next one.
@@ -72,18 +72,18 @@ class LossCounter:
         if counts:
             self._counters[recording] = header.discarded
         if packet.is_cut or (lost and discarded):
-            # What was discarded in packets that are not there, and what behind them, nothing tells.
+            # The events may have been lost in the missing packets or in this one.
             return Losses(None, lost, problem)
         return Losses(discarded, lost, problem)
 
 
 def recording_of(stream: Stream, uuid: str | None, path: str) -> Recording:
-    """Return what a stream's counter of lost events counts for."""
+    """Return the recording whose lost events the counter of a stream counts."""
     return uuid or path, stream.class_id, stream.instance
 
 
 def _rise(before: int, counter: int, bits: int) -> int:
     if counter >= before:
         return counter - before
-    # A narrow counter has wrapped round; a wide one cannot, it has started again.
+    # A narrow counter has wrapped round. A wide one cannot: it has started again.
     return counter if bits == 64 else counter - before + (1 << bits)

@@ -1,4 +1,4 @@
-"""Reads what a packet says of itself: its header and context."""
+"""Headers of packets: their sizes, times, numbers and counters of lost events."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _KNOWN_ROLES = {
 
 @dataclass(frozen=True, slots=True)
 class PacketHeader:
-    """What a packet says of itself; None where it does not.
+    """Header and context of a packet; None for what they do not have.
 
     Attributes:
         stream: its stream class.
@@ -63,7 +63,7 @@ class PacketHeader:
         discarded: events lost in the stream so far.
         discarded_bits: size of that counter.
         cpu: the CPU it was written on.
-        foreign: uuid of the trace that it belongs to, if that is not the uuid of the metadata.
+        foreign: uuid of the packet's trace, if it differs from the uuid of the metadata.
     """
 
     stream: StreamClass
@@ -84,11 +84,11 @@ class HeaderReader:
     """Reads the packet headers of one trace.
 
     Attributes:
-        size: bytes that are enough to read any header, as far as that can be told.
+        size: number of bytes that hold any header, unless its size varies.
     """
 
     def __init__(self, trace: TraceClass) -> None:
-        """Look at the headers that a trace declares.
+        """Compile the headers that a trace declares.
 
         Raises:
             MetadataError: one is too long.
@@ -120,7 +120,7 @@ class HeaderReader:
         return self._header(stream, found, plan.end, plan.discarded_bits)
 
     def pattern(self, uuid_text: str | None = None) -> bytes | None:
-        """Return bytes with which every packet begins, None if there are none to rely on.
+        """Return the bytes with which every packet begins, None if they are not always the same.
 
         `uuid_text` is the uuid in the packets, where it is not that of the metadata.
         """
@@ -185,7 +185,7 @@ class HeaderReader:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Bytes in which a value lies; an array of bytes is no number."""
+    """Bytes that hold a value: a number, or an array of bytes."""
 
     first: int
     last: int
@@ -204,7 +204,7 @@ class _Place:
 
 
 class _Plan:
-    """Where the values of a structure lie, when that is always the same.
+    """Places of the values of a structure of fixed layout.
 
     Attributes:
         places: role (or name) to place.

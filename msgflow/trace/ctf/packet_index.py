@@ -33,7 +33,7 @@ class IndexEntry(NamedTuple):
 
 
 def path_of(stream_file: Path) -> Path:
-    """Return where the index of a stream file lies, if it has one."""
+    """Return the path of the index of a stream file, whether or not it exists."""
     return stream_file.parent / DIRECTORY / f"{stream_file.name}{_SUFFIX}"
 
 
@@ -44,10 +44,10 @@ def orphans(directory: Path) -> list[Path]:
 
 
 def entries(stream_file: Path) -> dict[int, IndexEntry]:
-    """Return what the index of this file says, by offset; nothing if it is missing or no index.
+    """Return the entries of a file's index, by offset; nothing if there is no valid index.
 
     Raises:
-        UnsuitableFileError: it is no file, or longer than an index of this file could be.
+        UnsuitableFileError: the index is no regular file, or too long for this stream file.
     """
     try:
         # An entry is shorter than its packet.

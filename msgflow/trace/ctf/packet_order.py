@@ -1,4 +1,4 @@
-"""The packets of a set of traces in the order in which they are read."""
+"""Order of the packets of all traces: in time, without copies."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class Entry:
 
     Attributes:
         stream: its stream.
-        packet: where it lies.
-        position: its place in the stream, copies left out.
+        packet: where it lies in its file.
+        position: its place in the stream, copies not counted.
         begin: value of the clock at its begin.
-        order_ns: what is read of it comes at this time at the earliest. Events that are earlier,
+        order_ns: time of the first event at the earliest. Events that are earlier,
             in a damaged packet, are put there.
         discarded: events lost in it.
         lost: packets lost right before it.
         base: where it lies in memory, in bytes.
-        events: begins of its events as found by the scan, relative to `base`, those that are done
-            left out; None before.
+        events: begins of its events relative to `base`, without those that are done; None until
+            they are found.
         clock_before: value of the clock at the event before these, or at the begin.
         skipped: of a piece of a packet, bytes in front of it, which are read before.
         until: where the piece ends; None: what is read is the whole packet.
@@ -57,25 +57,25 @@ class Entry:
 
     @property
     def size(self) -> int:
-        """Bytes of content that are read."""
+        """Bytes of content to read."""
         content = (self.packet.content_bits + 7) // 8
         return (content if self.until is None else self.until) - self.skipped
 
     @property
     def place(self) -> tuple[int, int, int]:
-        """What orders events of the same time: rank of the stream, place in it."""
+        """Order of events of the same time: rank of the stream, places in stream and packet."""
         return self.stream.rank, self.position, self.skipped
 
 
 @dataclass(frozen=True)
 class PacketEvents:
-    """What the events of a packet say of it.
+    """Summary of the events of a packet.
 
     Attributes:
         entry: the packet.
         count: of its events.
         first: value of the clock at the first event, None if there is none.
-        last: at the last.
+        last: value at the last event.
         last_ns: time of the last.
         falls_back: time runs backward in it.
     """
@@ -90,12 +90,12 @@ class PacketEvents:
 
 @dataclass(frozen=True)
 class Entries:
-    """What to read.
+    """Packets to read, and how many were left out.
 
     Attributes:
         packets: in order of time.
-        copies: packets left out that another trace holds as well.
-        repeated: trace index to the packets left out that the same trace holds twice.
+        copies: number of packets left out because another trace holds them, too.
+        repeated: trace index to number of packets left out because the trace holds them twice.
     """
 
     packets: list[Entry]
@@ -109,7 +109,7 @@ def entries_of(
     begins: Mapping[Packet, tuple[int, int]],
     report: Callable[[Entry, int, str], None],
 ) -> Entries:
-    """Return what to read in order of time, copies left out.
+    """Return the packets to read, in order of time and without copies.
 
     The same packet may be given twice (a copied directory, overlapping snapshots): same trace
     uuid, stream class, stream instance and begin. The one of the first trace is read. In one
@@ -170,7 +170,7 @@ _CHUNK = 1 << 20
 
 
 class Repetitions:
-    """Remembers packets by what they say of themselves."""
+    """Packets seen so far, to notice one that a trace holds twice, as in a copied file."""
 
     def __init__(self) -> None:
         self._seen: dict[tuple[object, ...], Packet] = {}
@@ -207,6 +207,6 @@ def _are_equal(one: Packet, other: Packet) -> bool:
                 if first.read(size) != second.read(size):
                     return False
                 left -= size
-    except OSError:  # said when the packet is read
+    except OSError:  # reading the packet will report it
         return False
     return True

@@ -1,4 +1,4 @@
-"""Packets as rows, and checks of the times in them."""
+"""Rows of packets, and checks of their times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class PacketRows:
     """Collects packets as they are read."""
 
     def __init__(self, report: Callable[[Entry, int, str], None]) -> None:
-        """Call `report` for packets whose events contradict them."""
+        """Call `report` for packets whose times contradict those of their events."""
         self._report = report
         self._rows: list[tuple[Any, ...]] = []
 
@@ -36,7 +36,7 @@ class PacketRows:
             self._rows.append(self._row(entry, packet.count, packet.last, last_ns))
 
     def take(self, most: int, number: int) -> Iterator[EventBatch]:
-        """Give away what was collected in this round, at most so many rows at once."""
+        """Yield and forget the rows of this round, at most `most` in a batch."""
         for begin in range(0, len(self._rows), most):
             rows = self._rows[begin : begin + most]
             columns = [

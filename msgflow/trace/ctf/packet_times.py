@@ -1,4 +1,4 @@
-"""Looks into single packets for times that their headers do not tell."""
+"""Times of packets whose headers do not have them: found by reading the events."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def end_of(stream: Stream, packet: Packet) -> int | None:
 
 
 def _clock_values(stream: Stream, packet: Packet, begin: int) -> NDArray[np.uint64]:
-    """Return the times of a packet's events; damage is told when it is read for good."""
+    """Return the times of a packet's events; later reading reports its damage."""
     loader = Loader()
     entry = Entry(stream, packet, 0, begin, 0, 0, 0)
     try:

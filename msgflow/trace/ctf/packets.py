@@ -1,4 +1,4 @@
-"""The packets of a stream file, from hopping over it; what is damaged is left out and told."""
+"""Packets of a stream file, found by hopping from one to the next; damaged ones are reported."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
 
 _CHUNK = 1 << 20
-# A buffer of a tracer is far smaller; a packet is read as a whole.
+# Buffers of tracers are far smaller; a packet is loaded as a whole.
 _LARGEST_CONTENT = 1 << 30
-# Smaller holes may be zeros that somebody's copy did not write.
+# Smaller holes may be zeros that a copying program left out.
 _SMALLEST_HOLE = 1 << 16
 _LARGEST_CPU = (1 << 31) - 1
 _HOLE = "the file has a hole within this packet, it was not copied whole"
@@ -171,7 +171,7 @@ class _PacketFinder:
             raise FieldError("the packet ends before it begins")
 
     def _check_uuid(self, header: PacketHeader, offset: int, number: int) -> None:
-        """Say once that a uuid is not that of the metadata; read on, as Babeltrace does."""
+        """Report once a uuid that is not that of the metadata; read on, as Babeltrace does."""
         if header.foreign is None or header.foreign in self._foreign:
             return
         pattern = self._reader.pattern(header.foreign)
@@ -187,7 +187,7 @@ class _PacketFinder:
         )
 
     def _bits_before_hole(self, offset: int, content_bits: int) -> int:
-        """Return how much of a packet's content is in front of the first large hole of the file."""
+        """Return how many bits of a packet lie in front of the first large hole of the file."""
         if not self._is_sparse:
             return content_bits
         at, end = offset, offset + (content_bits + BYTE - 1) // BYTE
@@ -199,14 +199,14 @@ class _PacketFinder:
         return content_bits
 
     def _next_data(self, offset: int) -> int:
-        """Return the first offset from this one on that is in no hole, or the file's end."""
+        """Return the first offset outside of holes from this one on, or the file's end."""
         try:
             return os.lseek(self._descriptor, offset, os.SEEK_DATA)
         except OSError:
             return self._file_size
 
     def _without_swallowed(self, offset: int, size: int, content_bits: int, number: int) -> int:
-        """Return where a packet really ends whose unused end holds the next one."""
+        """Return the size of a packet, cut where another packet lies in its unused end."""
         used = (content_bits + BYTE - 1) // BYTE
         if not self._patterns or size - used < len(self._patterns[0]):
             return size
@@ -219,7 +219,7 @@ class _PacketFinder:
         return found - offset
 
     def _next_begin(self, offset: int) -> int:
-        """Return where a packet begins after the one at `offset`, which cannot be read."""
+        """Return where the next packet begins after an unreadable one at `offset`."""
         known = [begin for begin in self._index if offset < begin < self._file_size]
         if known:
             return min(known)
@@ -268,7 +268,7 @@ class _PacketFinder:
 
 
 def misplaced(values: Sequence[int]) -> set[int]:
-    """Return the places to leave out so that the rest never falls, as few as possible."""
+    """Return the places of the fewest values without which the rest never falls."""
     ends: list[int] = []
     places_of_ends: list[int] = []
     previous: list[int] = []

@@ -1,4 +1,4 @@
-"""Lets an iterator run ahead of its consumer, in a thread of its own."""
+"""Prefetching: an iterator runs ahead of its consumer, in a thread of its own."""
 
 from __future__ import annotations
 

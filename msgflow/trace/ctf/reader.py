@@ -1,4 +1,4 @@
-"""The reader on msgflow's own decoder."""
+"""Reader of traces by msgflow's own decoder."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ class CtfTraceSet(ExclusiveTraceSet):
     def _report_in_packet(self, entry: Entry, offset: int, message: str) -> None:
         packet = entry.packet
         if packet.is_cut and message == BEYOND_END:
-            return  # told when the packet was found
+            return  # reported when the packet was found
         self._report(
             Damage(
                 entry.stream.trace_index,

@@ -91,7 +91,7 @@ class StreamLayout:
         if align // BYTE <= _MOST_RESIDUES:
             self.header = compile_header(stream.event_header, self.residues)
         if self.header is not None and self.header.largest_size > GAP:
-            # A header may begin right in front of the end of what is in memory.
+            # Reading it all at once might go beyond the end of the memory.
             self.header = None
         self.classes = {
             event_id: ClassLayout(number, event, compile_body(stream, event, self.residues))
@@ -134,7 +134,7 @@ class StreamLayout:
         return sizes
 
     def _short_form(self, event_id: int) -> Form | None:
-        """Return the form in which the selector is this id, None if there is none."""
+        """Return the form whose selector is this id, None if no form is."""
         assert self.header is not None
         for form in self.header.forms:
             if form.holds(event_id):
@@ -146,7 +146,7 @@ class StreamLayout:
         """Return the form of a header with this selector.
 
         Raises:
-            FieldError: there is none.
+            FieldError: no form has it.
         """
         assert self.header is not None
         for form in self.header.forms:

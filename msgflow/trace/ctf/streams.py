@@ -1,4 +1,4 @@
-"""The data streams of a trace, and the packets of each in order."""
+"""Data streams of a trace: the packets of each in order, from all its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Thread names as a dictionary that all batches share: few of them, repeated in every event."""
+"""Thread names: a dictionary shared by all batches, as every event repeats one of few names."""
 
 from __future__ import annotations
 

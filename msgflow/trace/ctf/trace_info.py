@@ -1,4 +1,4 @@
-"""What a trace declares about itself."""
+"""Description of a trace: host, tracer, clock, begin and end."""
 
 from __future__ import annotations
 

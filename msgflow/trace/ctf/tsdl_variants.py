@@ -1,6 +1,6 @@
-"""Finds out which selector values choose which option of a TSDL variant.
+"""Variants of TSDL: which values of the selector choose which option.
 
-TSDL says it by the labels of the selector, an enumeration declared somewhere before.
+The selector is an enumeration declared before, and its labels are the names of the options.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class _Resolver:
     def _type(self, declared: Type, frames: Frames) -> Type:
         self._count += 1
         if self._count > _MOST_FIELDS:
-            # Structures that contain each other by name can be made to explode.
+            # Structures that contain others by name can grow without limit.
             raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
         match declared:
             case Structure():

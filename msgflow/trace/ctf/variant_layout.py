@@ -1,7 +1,7 @@
-"""A variant at the end of an event whose options are structures of fixed size.
+"""Layout of a variant at the end of an event, whose options are structures of fixed size.
 
-Headers of network packets in kernel traces are such: what follows depends on a field before, and
-an option may itself end in such a variant. Where all this lies can be told for many events at once.
+Kernel traces have the headers of network packets in such variants. An option may itself end in
+such a variant. With this layout the variants of many events are read at once.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class VariantLayout:
     """The options of a variant.
 
     Attributes:
-        options: of each the declaration and the option.
+        options: declaration and layout of each option.
     """
 
     options: tuple[tuple[Choice, OptionLayout], ...]
@@ -86,7 +86,7 @@ class VariantLayout:
         return chosen
 
     def has(self, path: Sequence[str]) -> bool:
-        """Tell whether a field can be read that is named by its option and what is around it."""
+        """Tell whether there is a field at this path: option, and names of members in it."""
         for choice, option in self.options:
             if choice.name == path[0]:
                 is_inner = option.variant is not None and option.name == path[1]
@@ -118,7 +118,7 @@ class VariantLayout:
 
 
 def lay_out_variant(variant: Variant) -> VariantLayout | None:
-    """Return how to read a variant; None if an option is no structure of fixed size."""
+    """Compile the layout of a variant; None if an option is no structure of fixed size."""
     options = []
     for choice in variant.choices:
         if not isinstance(choice.type, Structure):
@@ -131,7 +131,7 @@ def lay_out_variant(variant: Variant) -> VariantLayout | None:
 
 
 def is_selector(declared: Type) -> bool:
-    """Tell whether a field can choose an option of a variant."""
+    """Tell whether a field of this type can be a selector: an unsigned integer of whole bytes."""
     return isinstance(declared, Integer) and not declared.signed and _is_whole(declared)
 
 
@@ -160,7 +160,7 @@ def _lay_out_option(structure: Structure) -> OptionLayout | None:
 
 
 def _part(leaf: Leaf) -> Part | None:
-    """Return where a number or array lies; None if that is not on whole bytes."""
+    """Return the place of a number or array; None if it does not lie on whole bytes."""
     if leaf.position % BYTE:
         return None
     element: Type = leaf.type
@@ -179,6 +179,6 @@ def _is_whole(number: Integer | Real) -> bool:
 
 
 def dtype_of(number: Integer | Real) -> str:
-    """Return what numpy calls a number of whole bytes."""
+    """Return numpy's name for a number of whole bytes."""
     kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
     return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"

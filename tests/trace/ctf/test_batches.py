@@ -90,7 +90,7 @@ def test_time_that_runs_backward_in_a_packet_that_waits(tmp_path: Path) -> None:
 
 
 def test_events_earlier_than_their_packet(tmp_path: Path) -> None:
-    """They come where the packet begins: before that, nobody knows of them."""
+    """They come where the packet begins, as the reader knows of them only then."""
     trace = beside_others(tmp_path, (5, 12, 40, 41), 20, (10, 15, 25, 45))
     whole = read(trace)
     assert [row[-1] for row in whole.rows["test:n"]] == [10, 15, 5, 12, 25, 40, 41, 45]
@@ -98,7 +98,7 @@ def test_events_earlier_than_their_packet(tmp_path: Path) -> None:
         assert not differences(whole, read_in_pieces(trace, most_bytes, most_events))
 
 
-def test_room_is_used_again_when_nobody_uses_it() -> None:
+def test_buffers_that_are_no_longer_in_use_are_used_again() -> None:
     """Columns of a batch may be made while the packets after it are loaded."""
     loader = Loader()
     loader.load([])

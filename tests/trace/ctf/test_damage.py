@@ -1,4 +1,4 @@
-"""Damage is told with its place, and what is not damaged is read."""
+"""Damage is reported with its place; everything else is read."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_uuid_that_is_not_that_of_the_metadata(trace: Path) -> None:
 
 
 def test_metadata_of_another_trace(trace: Path) -> None:
-    """It is told once of a file, and where packets begin is found by the uuid that they have."""
+    """It is reported once for a file; packets are found by the uuid that they have."""
     text = (trace / "metadata").read_text()
     (trace / "metadata").write_text(text.replace("11111111-", "11111112-"))
     size = packet_size(trace)
