@@ -6,7 +6,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.conditions import has_no_row
 from msgflow.db.noted import forget, note
 from msgflow.db.tables import STORE
 
@@ -14,6 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import duckdb
+
+    from msgflow.sql.header import Header
 
 # What `synchronise` writes.
 _CLOCKS = {"store.clock", "store.clock_uncertainty"}
@@ -94,20 +95,30 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     """Derive one of `derived_tables` anew, inside the open transaction."""
     columns = ", ".join(STORE.tables[f"store.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
-    if has_no_row(con, f"derive.{name}", run_id):
+    when = _header(f"derive.{name}").when
+    if when and not any(_has_rows(con, each, run_id) for each in when):
         return
     con.execute(
-        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_source(name)}",
+        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_of_run(f'derive.{name}')}",
         [run_id],
     )
 
 
-def _source(name: str) -> str:
-    """Return what to read the rows of one run, given as parameter, from."""
-    kinds = {header.name: header.kind for header in objects.views()}
-    if kinds[f"derive.{name}"] == "macro":
-        return f"derive.{name}(?)"
-    return f"derive.{name} WHERE run_id = ?"
+def _has_rows(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> bool:
+    """Tell whether a table, view or macro has a row of a run."""
+    return bool(con.execute(f"SELECT 1 FROM {_of_run(name)} LIMIT 1", [run_id]).fetchall())
+
+
+def _of_run(name: str) -> str:
+    """Return what to read the rows of one run from, which is its only parameter."""
+    if name not in STORE.tables and _header(name).kind == "macro":
+        return f"{name}(?)"
+    return f"{name} WHERE run_id = ?"
+
+
+@cache
+def _header(name: str) -> Header:
+    return next(header for header in objects.views() if header.name == name)
 
 
 def learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:

@@ -46,10 +46,6 @@ if TYPE_CHECKING:
     from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress
 
-# Below, the model is hardly more work than its planning, which one thread does for each statement.
-# Ctrl-C waits for what the second connection runs: a tenth of a second at most.
-_EVENTS_SIDE_BY_SIDE = 2_000_000
-
 
 @dataclass(frozen=True)
 class IngestProgress:
@@ -249,8 +245,7 @@ def _write(
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
     watch.enter("building the model")
     with staging.writing(con), _created_meanwhile(target):
-        is_small = sum(loaded.event_counts.values()) < _EVENTS_SIDE_BY_SIDE
-        model.build(con, keep=keep_staging is not None, is_small=is_small)
+        model.build(con, keep=keep_staging is not None)
     if target.is_new:
         attach(con, target.path, is_new=True)
     if keep_staging is not None:

@@ -143,6 +143,19 @@ def _tables() -> tuple[str, ...]:
     )
 
 
+def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
+    """Return the tables and views of `raw` and `staging` without a row, as `schema.name`."""
+    rows = con.execute(
+        "SELECT database_name || '.' || table_name FROM duckdb_tables() "
+        "WHERE database_name IN ('raw', 'staging') AND estimated_size = 0"
+    ).fetchall()
+    empty = {name for (name,) in rows}
+    views = calls.parts().items()
+    return empty | {
+        f"raw.{view}" for view, tables in views if empty.issuperset(f"raw.{t}" for t in tables)
+    }
+
+
 def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
     """Make the views of all events, over tables that are not empty: others take long to plan."""
     known = load().of_threads

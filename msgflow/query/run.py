@@ -28,7 +28,6 @@ from msgflow.query.show.human import format_duration
 from msgflow.run.choice import Run, choose_runs
 from msgflow.run.window import format_epoch, time_window
 from msgflow.sql.failure import is_of_the_file, out_of_memory
-from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
 
 if TYPE_CHECKING:
@@ -93,7 +92,10 @@ def run_query(
             read, or rows that the query does not have.
         QueryError: the database could not run it.
     """
-    used = [parsed(connection, statement).named_parameters for statement in header.statements]
+    used = [
+        connection.extract_statements(statement)[0].named_parameters
+        for statement in header.statements
+    ]
     if not header.has_window and not start is end is skip_first is None:
         raise UsageError(
             f"the query has no time window — {header.name}",

@@ -14,11 +14,10 @@
     -- heading: rank, latency_ns
     -- note: clocks
     -- after: staging.taken_apart
+    -- when: staging.gap
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
-`note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ,
-`note: gate` that something is mostly empty, and soon found to be: it is asked for a row before what
-is made of it is planned.
+`note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ.
 `brief` names the columns that a narrow terminal is to show, the most important first, `answer`
 those that stay where they are 0 in all rows, since this is what people ask for, `heading` those
 that stand above a table on a terminal, once for each value of the first, on which the others
@@ -28,7 +27,9 @@ public view over the table of its name, a column may be named alone: it is what 
 What is in `schema/health` has a `severity`; findings and diagnostics the `phase` of an ingest that
 they come from, a `cause` and a `cure`, in place of which a diagnostic may name the `finding` that
 has them. An object is made after all objects that its statement names; `after` adds one that it
-does not name.
+does not name. `when` names tables, or macros of a run, without whose rows the object has none: if
+none of them has a row, an ingest leaves the object empty and does not run its SQL. In
+`schema/model` such an object declares its columns, as the empty table is made of them.
 
 What a statement looks up stays in memory until it ends. A query may therefore go in steps: before
 its own statement stand others, each of the form `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
@@ -65,10 +66,10 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "phase",
-    "finding", "note", "after", "brief", "answer", "heading", "slowest",
+    "finding", "note", "after", "when", "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks", "gate")
+_NOTES = ("clocks",)
 # Of an ingest, in their order: where what is found comes from.
 PHASES = ("reading", "model", "clocks", "links", "database")
 
@@ -147,8 +148,7 @@ class Header:
         severity: of a check, finding or diagnostic, else None.
         cause: where a finding comes from, else None.
         cure: what to do about a finding, else None.
-        note: 'clocks' where rows compare times of several hosts, 'gate' where it is asked for a row
-            before what is made of it, else None.
+        note: 'clocks' where rows compare times of several hosts, else None.
         body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.
@@ -159,6 +159,7 @@ class Header:
         finding: of a diagnostic, the finding that has its cause and cure, else None.
         steps: what a query makes before, in order.
         after: objects that come before this one although its statements do not name them.
+        when: tables and macros of a run; if none of them has a row, this has none.
     """
 
     name: str
@@ -182,6 +183,7 @@ class Header:
     finding: str | None = None
     steps: tuple[Step, ...] = ()
     after: tuple[str, ...] = ()
+    when: tuple[str, ...] = ()
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -190,7 +192,7 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.after} - {self.name}))
+        return tuple(sorted({*named, *self.after, *self.when} - {self.name}))
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -281,6 +283,7 @@ def parse(text: str, path: Path) -> Header:
         finding=single.get("finding"),
         steps=steps,
         after=_names(single.get("after", "")),
+        when=_names(single.get("when", "")),
     )
 
 

@@ -10,6 +10,7 @@
 --     senders had ended says nothing where a publisher whose topic is not known published at that
 --     moment.
 -- grain: one row per take whose publication is not known
+-- when: derive.unlinked_take
 CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT

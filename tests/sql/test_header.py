@@ -76,11 +76,13 @@ def test_everything_is_parsed() -> None:
 
 def test_an_object_needs_what_its_statements_name() -> None:
     header = parse_with(
-        "-- after: staging.d\nCREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
+        "-- after: staging.d\n-- when: store.e, derive.f\n"
+        "CREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
         "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
         "JOIN query_table('raw.a') USING (id)"
     )
-    assert header.needs == ("derive.f", "main.b", "raw.a", "staging.d", "store.c")
+    assert header.needs == ("derive.f", "main.b", "raw.a", "staging.d", "store.c", "store.e")
+    assert header.when == ("store.e", "derive.f")
     assert header.relations == {"e"}
 
 
