@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import UsageError
-from msgflow.ingest import reconciled, staging, whole
+from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.ignored import is_ignored, matches
 from msgflow.ingest.implausible import Implausible
@@ -221,8 +221,9 @@ class _Tables:
             return
         self.add("thread", item.threads)
         self.add("thread_name", item.thread_names)
-        for table, rows in whole.staged(item.batches):
-            self.add(table, rows)
+        tracepoints = load().tracepoints
+        for name, rows in item.batches:
+            self.add(tracepoints[name].table, rows)
 
     def add(self, table: str, rows: pa.RecordBatch) -> None:
         """Add rows to a table.

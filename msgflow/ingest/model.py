@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.tables import STORE
-from msgflow.ingest import calls, staging
+from msgflow.ingest import staging
 from msgflow.ingest.reported import restore
 
 if TYPE_CHECKING:
@@ -61,10 +61,6 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
         ((count,),) = con.execute(table).fetchall()
         if not count:
             empty.add(header.name)
-    if header.name == calls.TAKEN_APART and header.name not in empty:
-        for call in calls.CALLS:
-            calls.take_apart(con, call)
-        empty -= {f"raw.{calls.apart(layer)}" for layer in calls.layers()}
 
 
 def _finished(headers: tuple[Header, ...], position: int) -> set[str]:
@@ -94,11 +90,10 @@ def _needs(header: Header) -> frozenset[str]:
     """Return what an object needs, with the tables of `raw` one by one."""
     if staging.OF_ALL_EVENTS & set(header.needs):
         return frozenset(header.needs) | _raw_tables()
-    words = set(re.findall(r"\w+", header.body))
-    tables = {table for word in words for table in calls.parts().get(word, (word,))}
-    return frozenset(header.needs) | {f"raw.{table}" for table in tables} & _raw_tables()
+    words = re.findall(r"\w+", header.body)
+    return frozenset(header.needs) | {f"raw.{word}" for word in words} & _raw_tables()
 
 
 @functools.cache
 def _raw_tables() -> frozenset[str]:
-    return frozenset(f"raw.{table}" for table in staging.read_tables())
+    return frozenset(f"raw.{table}" for table in staging.event_tables())

@@ -2,8 +2,7 @@
 
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
-tracepoint, the packets, and the threads, all as read; calls whose layers directly follow each
-other are rows of tables of their own, and views then show all events of a tracepoint (`calls.py`).
+tracepoint, the packets, and the threads, all as read.
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
@@ -17,10 +16,8 @@ from event to event), and the objects of `schema/model`.
 from __future__ import annotations
 
 import contextlib
-from functools import cache
 from typing import TYPE_CHECKING
 
-from msgflow.ingest import calls
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
 
 if TYPE_CHECKING:
@@ -126,10 +123,9 @@ def _tables() -> tuple[str, ...]:
     catalogue = load()
     return (
         *(
-            each.create_table_sql("raw", catalogue.labels, calls.apart(each))
+            each.create_table_sql("raw", catalogue.labels)
             for each in catalogue.tracepoints.values()
         ),
-        *calls.statements(),
         _PACKET_TABLE,
         _THREAD_TABLES,
         _SOURCE_TABLE,
@@ -144,16 +140,12 @@ def _tables() -> tuple[str, ...]:
 
 
 def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
-    """Return the tables and views of `raw` and `staging` without a row, as `schema.name`."""
+    """Return the tables of `raw` and `staging` without a row, as `schema.name`."""
     rows = con.execute(
         "SELECT database_name || '.' || table_name FROM duckdb_tables() "
         "WHERE database_name IN ('raw', 'staging') AND estimated_size = 0"
     ).fetchall()
-    empty = {name for (name,) in rows}
-    views = calls.parts().items()
-    return empty | {
-        f"raw.{view}" for view, tables in views if empty.issuperset(f"raw.{t}" for t in tables)
-    }
+    return {name for (name,) in rows}
 
 
 def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
@@ -166,17 +158,13 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    for table in (*read_tables(), "packet", "thread", "thread_name"):
+    for table in (*event_tables(), "packet", "thread", "thread_name"):
         con.execute(f"TRUNCATE raw.{table}")
 
 
-@cache
-def read_tables() -> tuple[str, ...]:
-    """Return the tables of `raw` that events are read into."""
-    return (
-        *(calls.apart(tracepoint) for tracepoint in load().tracepoints.values()),
-        *(call.table for call in calls.CALLS),
-    )
+def event_tables() -> tuple[str, ...]:
+    """Return the tables of `raw` that events are read into, without their schema."""
+    return tuple(tracepoint.table for tracepoint in load().tracepoints.values())
 
 
 @contextlib.contextmanager
@@ -225,10 +213,7 @@ def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Write all that is staged and has rows to `directory` as Parquet.
-
-    Calls that were put together are written as the events that they are of.
-    """
+    """Write all that is staged and has rows to `directory` as Parquet."""
     directory.mkdir(parents=True, exist_ok=True)
     names = con.execute(
         "SELECT database_name || '.' || table_name FROM duckdb_tables() "
@@ -236,10 +221,8 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
         "UNION ALL SELECT database_name || '.' || view_name FROM duckdb_views() "
         "WHERE database_name IN ('raw', 'staging') AND NOT internal ORDER BY ALL"
     ).fetchall()
-    parts = {f"raw.{table}" for tables in calls.parts().values() for table in tables}
     for (name,) in names:
-        is_told = name in parts or name in OF_ALL_EVENTS
-        if not is_told and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
+        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
             target = _quoted(directory / f"{name}.parquet")
             con.execute(f"COPY {name} TO '{target}' (FORMAT parquet)")
 

@@ -13,7 +13,6 @@
     -- answer: lost
     -- heading: rank, latency_ns
     -- note: clocks
-    -- after: staging.taken_apart
     -- when: staging.gap
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
@@ -26,10 +25,10 @@ names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choos
 public view over the table of its name, a column may be named alone: it is what the table declares.
 What is in `schema/health` has a `severity`; findings and diagnostics the `phase` of an ingest that
 they come from, a `cause` and a `cure`, in place of which a diagnostic may name the `finding` that
-has them. An object is made after all objects that its statement names; `after` adds one that it
-does not name. `when` names tables, or macros of a run, without whose rows the object has none: if
-none of them has a row, an ingest leaves the object empty and does not run its SQL. In
-`schema/model` such an object declares its columns, as the empty table is made of them.
+has them. `when` names tables, or macros of a run, without whose rows the object has none: if none
+of them has a row, an ingest leaves the object empty and does not run its SQL. In `schema/model`
+such an object declares its columns, as the empty table is made of them. An object is made after all
+objects that its statement or its `when` names.
 
 What a statement looks up stays in memory until it ends. A query may therefore go in steps: before
 its own statement stand others, each of the form `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
@@ -66,7 +65,7 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "phase",
-    "finding", "note", "after", "when", "brief", "answer", "heading", "slowest",
+    "finding", "note", "when", "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
@@ -158,7 +157,6 @@ class Header:
         phase: of a finding or diagnostic, one of `PHASES`, else None.
         finding: of a diagnostic, the finding that has its cause and cure, else None.
         steps: what a query makes before, in order.
-        after: objects that come before this one although its statements do not name them.
         when: tables and macros of a run; if none of them has a row, this has none.
     """
 
@@ -182,7 +180,6 @@ class Header:
     phase: str | None = None
     finding: str | None = None
     steps: tuple[Step, ...] = ()
-    after: tuple[str, ...] = ()
     when: tuple[str, ...] = ()
 
     @cached_property
@@ -192,7 +189,7 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.after, *self.when} - {self.name}))
+        return tuple(sorted({*named, *self.when} - {self.name}))
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -282,7 +279,6 @@ def parse(text: str, path: Path) -> Header:
         phase=phase,
         finding=single.get("finding"),
         steps=steps,
-        after=_names(single.get("after", "")),
         when=_names(single.get("when", "")),
     )
 

@@ -29,18 +29,23 @@ def lossy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ).directory
 
 
+def read(con: duckdb.DuckDBPyConnection, path: Path) -> None:
+    """Read a trace into `raw` and `staging`."""
+    staging.attach(con, None)
+    with trace.open([path]) as traces:
+        load_traces(
+            con, traces, hostnames={}, ignore=(), may_hold=False, replace=False,
+            interrupts=Interrupts(), progress=None,
+        )  # fmt: skip
+
+
 def built(path: Path, emptied: tuple[str, ...] = ()) -> dict[str, Any]:
     """Build the whole model, nothing skipped, and return (columns, count) of each `when` object.
 
     Tables of `emptied` lose their rows before anything reads them.
     """
     with duckdb.connect() as con:
-        staging.attach(con, None)
-        with trace.open([path]) as traces:
-            load_traces(
-                con, traces, hostnames={}, ignore=(), may_hold=False, replace=False,
-                interrupts=Interrupts(), progress=None,
-            )  # fmt: skip
+        read(con, path)
         staging.narrow(con, staging.empty_tables(con))
         for name in emptied:
             if name.startswith("raw."):
@@ -86,6 +91,26 @@ def test_an_object_without_a_row_has_its_columns_all_the_same(planned: dict[str,
                 f"SELECT column_name, column_type FROM (DESCRIBE {header.name})"
             ).fetchall()
             assert columns == planned[header.name][0], header.name
+
+
+def test_what_was_read_is_dropped_once_nothing_needs_it(lossy: Path) -> None:
+    """Only what is not evaluated before it is stored stays until then."""
+    with duckdb.connect() as con:
+        read(con, lossy)
+        before = tables_with_rows(con)
+        model.build(con)
+        after = tables_with_rows(con)
+    assert len(before) > 20
+    assert after == {
+        f"ros2_rclcpp_executor_{state}" for state in ("get_next_ready", "wait_for_work", "execute")
+    }
+
+
+def tables_with_rows(con: duckdb.DuckDBPyConnection) -> set[str]:
+    rows = con.execute(
+        "SELECT table_name FROM duckdb_tables() WHERE database_name = 'raw' AND estimated_size > 0"
+    ).fetchall()
+    return {name for (name,) in rows}
 
 
 def test_a_full_disk_is_said_at_once(

@@ -8,8 +8,7 @@ import duckdb
 import pyarrow as pa
 import pytest
 
-from msgflow.db import objects
-from msgflow.ingest import calls, load, model, staging
+from msgflow.ingest import load, staging
 
 
 @pytest.fixture
@@ -66,14 +65,3 @@ def test_what_is_staged_is_in_files(tmp_path: Path) -> None:
         ).fetchall()
     assert dict(places)["raw"] == str(tmp_path / "raw.duckdb")
     assert dict(places)["staging"] == str(tmp_path / "staging.duckdb")
-
-
-def test_what_was_read_goes_once_nothing_needs_it() -> None:
-    """Only what is not evaluated before it is stored stays until then."""
-    headers = objects.load("model")
-    left = model._raw_tables() - model._finished(headers, len(headers) - 1)
-    states = ("get_next_ready", "wait_for_work", "execute")
-    assert left == {
-        *(f"raw.ros2_rclcpp_executor_{state}" for state in states),
-        *(f"raw.{call.table}" for call in calls.CALLS),
-    }

@@ -17,7 +17,7 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 
-from msgflow.ingest import reconciled, staging, whole
+from msgflow.ingest import reconciled, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
@@ -205,8 +205,8 @@ class StagedEvents:
             placed = Sequences(load(), numbers).place(batches)
             _insert(con, "raw.thread", placed.threads)
             _insert(con, "raw.thread_name", placed.thread_names)
-            for table, batch in whole.staged(placed.batches):
-                _insert(con, f"raw.{table}", batch)
+            for name, batch in placed.batches:
+                _insert(con, f"raw.{load().tracepoints[name].table}", batch)
         _insert(con, "raw.packet", packets)
 
     def _all_packets(self) -> list[dict[str, Any]]:
