@@ -1,4 +1,4 @@
-"""Stores what is costly to infer: each derived view becomes rows of the table of its name."""
+"""Derivation of links: rows of objects in `derive` are stored in the tables of their names."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
     from msgflow.sql.header import Header
 
-# What `synchronise` writes.
+# Tables that `synchronise` writes.
 _CLOCKS = {"store.clock", "store.clock_uncertainty"}
 
-# Tables of `store` whose rows can learn their topic from a link.
+# Tables of `store` whose rows can learn their topic from messages.
 _TOPIC_OWNERS = ("publisher", "subscription")
 _TOPICS = "derive.topic_learned"
 
@@ -34,9 +34,9 @@ def derive(
 
     Args:
         con: a writable connection to a database with current views.
-        run_id: the run; nothing happens to others.
-        synchronise: called once messages are linked, to bring clocks together; they stay as they
-            are when None.
+        run_id: the run; other runs stay as they are.
+        synchronise: called once messages are linked, to correct the clocks; None leaves them as
+            they are.
     """
     learn_topics(con, run_id)
     for name in derived_tables():
@@ -54,7 +54,7 @@ def derive(
 
 
 def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Derive anew what depends on the correction of clocks, inside the open transaction."""
+    """Derive the tables anew that depend on corrected clocks, inside the open transaction."""
     for name in derived_tables():
         if _reads_clocks(name):
             derive_table(con, name, run_id)
@@ -81,7 +81,7 @@ def _reads_clocks(name: str) -> bool:
 
 @cache
 def derivation_hash() -> str:
-    """Return the SHA-256 of the SQL that derives what is stored of links and of what is missing."""
+    """Return the SHA-256 of the SQL that derives the stored tables and the learned topics."""
     names = objects.sources_of([_TOPICS, *(f"derive.{name}" for name in derived_tables())])
     return objects.hash_of(
         text
@@ -110,7 +110,7 @@ def _has_rows(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> bool:
 
 
 def _of_run(name: str) -> str:
-    """Return what to read the rows of one run from, which is its only parameter."""
+    """Return the FROM clause for the rows of one run, which is its only parameter."""
     if name not in STORE.tables and _header(name).kind == "macro":
         return f"{name}(?)"
     return f"{name} WHERE run_id = ?"
@@ -122,7 +122,7 @@ def _header(name: str) -> Header:
 
 
 def learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Tell topics from messages anew, inside the open transaction."""
+    """Learn unknown topics from messages anew, inside the open transaction."""
     for kind in _TOPIC_OWNERS:
         con.execute(
             f"UPDATE store.{kind} SET topic_name = NULL, is_internal = false, "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.tables import STORE
 from msgflow.ingest import staging
-from msgflow.ingest.reported import restore
+from msgflow.ingest.caret_initialisation import restore
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

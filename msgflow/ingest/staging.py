@@ -1,4 +1,4 @@
-"""Staging: what was read, and what the model makes of it, until it is stored.
+"""Staging: the events as read and the tables of the model, until they are stored.
 
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
@@ -91,7 +91,7 @@ CREATE TABLE staging.damage (
 """
 
 OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
-"""The views that say of all events what the tables of each tracepoint say."""
+"""Views of all events, which unite the tables of all tracepoints."""
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
@@ -103,14 +103,14 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
     """
     for name in ("raw", "staging"):
         path = ":memory:" if directory is None else _quoted(directory / f"{name}.duckdb")
-        # What is staged is of no use after a crash.
+        # Staged tables are of no use after a crash.
         con.execute(f"ATTACH '{path}' AS {name} (RECOVERY_MODE no_wal_writes)")
     for statement in _tables():
         con.execute(statement)
 
 
 def statements() -> tuple[str, ...]:
-    """Return what creates all that is staged before the model is built, in `raw` and `staging`."""
+    """Return the statements that create the tables and views of events in `raw` and `staging`."""
     catalogue = load()
     return (
         *_tables(),
@@ -149,7 +149,7 @@ def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
 
 
 def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
-    """Make the views of all events, over tables that are not empty: others take long to plan."""
+    """Create the views of all events over the tables that have rows: empty ones cost planning."""
     known = load().of_threads
     left = [each for each in known if f"raw.{each.table}" not in empty]
     con.execute(_event_view(left or known))
@@ -169,10 +169,9 @@ def event_tables() -> tuple[str, ...]:
 
 @contextlib.contextmanager
 def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
-    """Keep what is staged as it is first written, meanwhile.
+    """Write staged tables once, without compression, inside this block.
 
-    It is read a few times and thrown away: writing it anew, or compressed, costs more than it
-    saves.
+    They are read a few times and dropped: to rewrite or compress them costs more than it saves.
     """
     con.execute("SET force_compression = 'uncompressed'")
     con.execute("SET wal_autocheckpoint = '1TB'")
@@ -182,9 +181,9 @@ def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
 
 
 def leave(con: duckdb.DuckDBPyConnection) -> None:
-    """Let the connection close without writing what is staged once more.
+    """Let the connection close without a checkpoint of the staged tables.
 
-    That holds for all databases of the connection: what must last needs a checkpoint before.
+    This holds for all databases of the connection: the target needs a checkpoint before.
     """
     con.execute("PRAGMA disable_checkpoint_on_shutdown")
 
@@ -213,7 +212,7 @@ def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Write all that is staged and has rows to `directory` as Parquet."""
+    """Write all staged tables and views with rows to `directory` as Parquet."""
     directory.mkdir(parents=True, exist_ok=True)
     names = con.execute(
         "SELECT database_name || '.' || table_name FROM duckdb_tables() "

@@ -19,8 +19,7 @@ from thorough import examples, few
 import msgflow.trace
 from msgflow.errors import TraceError
 from msgflow.ingest.catalogue import load
-from msgflow.ingest.implausible import Implausible
-from msgflow.ingest.load import _placed
+from msgflow.ingest.load import ImplausibleValues, _placed
 from msgflow.ingest.sequences import Placed, Sequences
 from msgflow.trace.ctf import compiled, compiled_columns, events
 
@@ -37,7 +36,7 @@ def batches(trace: Path, *, placed: bool = False) -> list[Any]:
             if placed:
                 sequences = Sequences(load(), [0] * len(traces.traces))
                 read = traces.batches(load().arrow_schemas())
-                for item in _placed(read, sequences, None, Implausible()):
+                for item in _placed(read, sequences, None, ImplausibleValues()):
                     found += [item] if isinstance(item, tuple) else _tables(item)
             else:
                 found += [(item.name, item.batch) for item in traces.batches()]

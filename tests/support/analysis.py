@@ -19,7 +19,7 @@ from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.tables import STORE
 from msgflow.ingest import model, staging
-from msgflow.ingest.reported import restore
+from msgflow.ingest.caret_initialisation import restore
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 # What is stored of links and of what is missing comes of whole derivations.

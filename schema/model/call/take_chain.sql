@@ -1,8 +1,8 @@
 -- name: staging.take_chain
 -- description: Layers of one take stitched together, as for publications. A take whose rmw layer
---     failed is none, although upper layers may report it. One without rcl layer is the
---     middleware's own, where its reader belongs to no rcl subscription and never had an rcl layer
---     either, although rcl takes are traced.
+--     failed does not count, although upper layers may report it. Nor does a take of the middleware
+--     itself: it has no rcl layer, although rcl takes are traced, and its reader belongs to no rcl
+--     subscription and never had an rcl layer.
 -- grain: one row per successful take, or dequeue
 WITH middleware AS (
     SELECT
