@@ -288,8 +288,8 @@ class Database:
     ) -> QueryResult:
         """Run a named query.
 
-        Rows can be chosen by the kinds of names in the columns of the query. Names may be globs, and
-        several in a list or between commas.
+        Rows can be chosen by the kinds of names in the columns of the query. Names may be globs,
+        and several in a list or between commas.
 
         Args:
             name: of the query, see `list_queries`.

@@ -1,4 +1,4 @@
-"""Stores what is costly to infer: each derived view becomes rows of the table of its name."""
+"""Derivation of links: rows of objects in `derive` are stored in the tables of their names."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.conditions import has_no_row
 from msgflow.db.noted import forget, note
 from msgflow.db.tables import STORE
 
@@ -15,10 +14,12 @@ if TYPE_CHECKING:
 
     import duckdb
 
-# What `synchronise` writes.
+    from msgflow.sql.header import Header
+
+# Tables that `synchronise` writes.
 _CLOCKS = {"store.clock", "store.clock_uncertainty"}
 
-# Tables of `store` whose rows can learn their topic from a link.
+# Tables of `store` whose rows can learn their topic from messages.
 _TOPIC_OWNERS = ("publisher", "subscription")
 _TOPICS = "derive.topic_learned"
 
@@ -33,9 +34,9 @@ def derive(
 
     Args:
         con: a writable connection to a database with current views.
-        run_id: the run; nothing happens to others.
-        synchronise: called once messages are linked, to bring clocks together; they stay as they
-            are when None.
+        run_id: the run; other runs stay as they are.
+        synchronise: called once messages are linked, to correct the clocks; None leaves them as
+            they are.
     """
     learn_topics(con, run_id)
     for name in derived_tables():
@@ -53,7 +54,7 @@ def derive(
 
 
 def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Derive anew what depends on the correction of clocks, inside the open transaction."""
+    """Derive the tables anew that depend on corrected clocks, inside the open transaction."""
     for name in derived_tables():
         if _reads_clocks(name):
             derive_table(con, name, run_id)
@@ -80,7 +81,7 @@ def _reads_clocks(name: str) -> bool:
 
 @cache
 def derivation_hash() -> str:
-    """Return the SHA-256 of the SQL that derives what is stored of links and of what is missing."""
+    """Return the SHA-256 of the SQL that derives the stored tables and the learned topics."""
     names = objects.sources_of([_TOPICS, *(f"derive.{name}" for name in derived_tables())])
     return objects.hash_of(
         text
@@ -94,24 +95,34 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     """Derive one of `derived_tables` anew, inside the open transaction."""
     columns = ", ".join(STORE.tables[f"store.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
-    if has_no_row(con, f"derive.{name}", run_id):
+    when = _header(f"derive.{name}").when
+    if when and not any(_has_rows(con, each, run_id) for each in when):
         return
     con.execute(
-        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_source(name)}",
+        f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_of_run(f'derive.{name}')}",
         [run_id],
     )
 
 
-def _source(name: str) -> str:
-    """Return what to read the rows of one run, given as parameter, from."""
-    kinds = {header.name: header.kind for header in objects.views()}
-    if kinds[f"derive.{name}"] == "macro":
-        return f"derive.{name}(?)"
-    return f"derive.{name} WHERE run_id = ?"
+def _has_rows(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> bool:
+    """Tell whether a table, view or macro has a row of a run."""
+    return bool(con.execute(f"SELECT 1 FROM {_of_run(name)} LIMIT 1", [run_id]).fetchall())
+
+
+def _of_run(name: str) -> str:
+    """Return the FROM clause for the rows of one run, which is its only parameter."""
+    if name not in STORE.tables and _header(name).kind == "macro":
+        return f"{name}(?)"
+    return f"{name} WHERE run_id = ?"
+
+
+@cache
+def _header(name: str) -> Header:
+    return next(header for header in objects.views() if header.name == name)
 
 
 def learn_topics(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Tell topics from messages anew, inside the open transaction."""
+    """Learn unknown topics from messages anew, inside the open transaction."""
     for kind in _TOPIC_OWNERS:
         con.execute(
             f"UPDATE store.{kind} SET topic_name = NULL, is_internal = false, "

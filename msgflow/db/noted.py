@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from msgflow.db.conditions import conditions_of_diagnostics, conditions_of_views, is_empty, presence
 from msgflow.db.diagnostic import diagnostics, short_name, statement
 
 if TYPE_CHECKING:
@@ -30,16 +29,12 @@ def note(con: duckdb.DuckDBPyConnection, run_id: int, phase: str, **values: Any)
         phase: 'clocks', 'links' or 'database'.
         values: parameters of the diagnostics of this phase, besides the run.
     """
-    known = {**conditions_of_views(), **conditions_of_diagnostics()}
-    has_none = presence(con, run_id)
-    headers = [header for header in _stored(phase) if not is_empty(header.name, known, has_none)]
-    if headers:
-        con.execute(
-            "INSERT INTO store.diagnostic (run_id, trace_id, name, severity, count, detail) "
-            "SELECT $run_id, trace_id, name, severity, count, detail "
-            f"FROM (\n{statement(headers)})",
-            {"run_id": run_id} | values,
-        )
+    con.execute(
+        "INSERT INTO store.diagnostic (run_id, trace_id, name, severity, count, detail) "
+        "SELECT $run_id, trace_id, name, severity, count, detail "
+        f"FROM (\n{statement(_stored(phase))})",
+        {"run_id": run_id} | values,
+    )
 
 
 def _stored(phase: str) -> list[Header]:

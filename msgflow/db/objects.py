@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Folders whose objects are in the database; each may need only itself and those to its left.
 PUBLIC = "public"
-# Views are put together of what lies here.
+# Diagnostics, which views combine.
 DIAGNOSTICS = "health/diagnostic"
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
@@ -83,7 +83,7 @@ def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
 
 
 def sources(by_name: Mapping[str, Header], name: str) -> list[str]:
-    """Return which of these objects one is made of: those that it needs, and those of its tables.
+    """Return the objects among these that one reads, directly or through a stored table.
 
     The rows of a table `store.x` come from `derive.x`, if there is such an object.
     """
@@ -114,7 +114,7 @@ def hash_of(texts: Iterable[str]) -> str:
 
 @cache
 def definition_hash() -> str:
-    """Return the SHA-256 of all that `apply` would create.
+    """Return the SHA-256 of all definitions that `apply` would create.
 
     This reads the files without parsing them, so that a database opens quickly.
     """
@@ -122,7 +122,7 @@ def definition_hash() -> str:
 
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:
-    """Return these objects and tables, and all that they are made of, directly or not."""
+    """Return these objects and tables, and all that they read, directly or not."""
     by_name = {header.name: header for header in views()}
     found: set[str] = set()
     waiting = list(names)

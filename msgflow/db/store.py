@@ -13,18 +13,18 @@ if TYPE_CHECKING:
     from sqlalchemy import Column, Table
 
 
-# A join that does not fit into memory gives rows in any order, in which ids and times take far more
-# room in the file. Sorting fewer rows costs more than it saves. The size of a view is not known: if
-# one table is large, all are sorted.
+# A join that does not fit into memory returns rows in any order, and unsorted ids and times take
+# far more room in the file. Sorting fewer rows than this costs more than it saves. The size of a
+# view is not known: if one table is large, all are sorted.
 _ROWS_WORTH_ORDERING = 1_000_000
 
 
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Copy what staging has under the name of a store table, inside the open transaction.
+    """Copy each staged table that has the name of a store table, inside the open transaction.
 
-    Ids in staging are above 0; the store adds its highest id to them. Tables without a row are left
-    out, as each statement takes longer than its few rows. DuckDB knows these tables as of the start
-    of the transaction: staging is filled before, and a transaction stores one run.
+    Ids in staging are above 0; the store adds its highest id to them. Tables without a row are
+    skipped, since a statement takes longer than its few rows. DuckDB sees staging as of the start
+    of the transaction: staging has to be filled before, and a transaction stores one run.
     """
     staged = dict(
         con.execute(

@@ -1,4 +1,4 @@
-"""The catalogue of tracepoints: what is loaded of each event, and the staging table it goes to.
+"""Catalogue of tracepoints: the fields to load of each event, and its staging table.
 
 The data is in `tracepoints.toml`; this gives it Arrow and SQL form.
 """
@@ -51,7 +51,7 @@ class Field:
 
 
 class Origin(Enum):
-    """What can be told of a predecessor: the column's suffix."""
+    """What a column says of a predecessor; the value is the suffix of its name."""
 
     EVENT_ID = "event_id"
     TS_NS = "ts_ns"
@@ -60,11 +60,11 @@ class Origin(Enum):
 
 @dataclass(frozen=True)
 class Predecessor:
-    """A column about the latest event of a sequence that is before this one on its thread.
+    """A column about the latest earlier event of a sequence on the same thread.
 
     Attributes:
-        sequence: which events are looked at.
-        origin: what of the predecessor.
+        sequence: the sequence of events.
+        origin: what the column says of the predecessor.
     """
 
     sequence: str
@@ -72,7 +72,7 @@ class Predecessor:
 
     @property
     def column(self) -> str:
-        """Name of the column; NULL in it: there is no such event."""
+        """Name of the column, which is NULL where there is no such event."""
         return f"previous_{self.sequence}_{self.origin.value}"
 
 
@@ -85,14 +85,14 @@ class Tracepoint:
         description: one sentence.
         fields: its payload, over all versions.
         aliases: other names that it has in traces.
-        sequences: kinds of events on one thread that it belongs to.
-        predecessors: what is staged about the events before it.
-        label: what successors call it, None where none asks.
+        sequences: sequences of its thread that the event belongs to.
+        predecessors: columns about the events before it.
+        label: the name that columns of its successors show, None if no column shows it.
         since: first version of tracetools that has it, None for other providers.
         until: last version of tracetools that has it, None if it is still there.
         where: other places that have it, None if there are no others.
-        is_kernel: it is of the kernel: in no provider, and whatever thread it interrupted has
-            nothing to do with it.
+        is_kernel: the kernel emits it: it has no provider, and nothing to do with the thread that
+            it interrupted.
     """
 
     name: str
@@ -155,16 +155,15 @@ class Tracepoint:
             *((field.name, field.type) for field in self.fields),
         )
 
-    def create_table_sql(self, catalog: str, labels: Iterable[str], name: str | None = None) -> str:
+    def create_table_sql(self, catalog: str, labels: Iterable[str]) -> str:
         """Return the statement that creates the staging table in this catalog or schema.
 
         Args:
             catalog: where it is made.
-            labels: all that successors call events.
-            name: of the table; None: its usual one.
+            labels: all labels of the catalogue.
         """
         body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in self.columns(labels))
-        return f'CREATE TABLE "{catalog}"."{name or self.table}" (\n{body}\n)'
+        return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -30,12 +31,14 @@ from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.store import delete, store
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.ingest import judge, model, staging
+from msgflow.ingest import model, refusals, staging
+from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import Loaded, load_traces
-from msgflow.ingest.names import fallback_name, free_name, hostnames_of, require_free_name
 from msgflow.links import declare_links, read_links
+from msgflow.run.choice import is_run_name
 from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
+from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -46,19 +49,15 @@ if TYPE_CHECKING:
     from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress
 
-# Below, the model is hardly more work than its planning, which one thread does for each statement.
-# Ctrl-C waits for what the second connection runs: a tenth of a second at most.
-_EVENTS_SIDE_BY_SIDE = 2_000_000
-
 
 @dataclass(frozen=True)
 class IngestProgress:
     """How far an ingest has come.
 
     Attributes:
-        stage: what is being done, for people.
+        stage: the work that is going on, for people.
         events: events read so far.
-        fraction: part of this stage that is done, 0 to 1; None where nobody knows.
+        fraction: part of this stage that is done, 0 to 1; None if it is not known.
         events_per_second: rate of reading so far.
     """
 
@@ -167,7 +166,7 @@ def ingest(
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
         with trace_package.open(paths, reader=reader, strict=strict) as traces:
-            judge.require_ros_traces(traces.traces)
+            refusals.require_ros_traces(traces.traces)
             hostnames = hostnames_of(traces.traces, hosts or {})
             migrate.require_ingestable(database)
             with (
@@ -198,7 +197,7 @@ def ingest(
                         interrupts=interrupts,
                         progress=watch.reading,
                     )
-                judge.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
+                refusals.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
                 events = sum(loaded.event_counts.values())
                 run = interruptible(
@@ -249,8 +248,7 @@ def _write(
 ) -> tuple[int, str, tuple[Diagnostic, ...]]:
     watch.enter("building the model")
     with staging.writing(con), _created_meanwhile(target):
-        is_small = sum(loaded.event_counts.values()) < _EVENTS_SIDE_BY_SIDE
-        model.build(con, keep=keep_staging is not None, is_small=is_small)
+        model.build(con, keep=keep_staging is not None)
     if target.is_new:
         attach(con, target.path, is_new=True)
     if keep_staging is not None:
@@ -310,6 +308,32 @@ def _store(
     return run_id, run_name
 
 
+def fallback_name(paths: Sequence[str | Path]) -> str:
+    """Return the name of a run for which none is given: that of the first path."""
+    name = archive.stem(Path(os.path.realpath(paths[0])))
+    return name if is_run_name(name) else f"run-{name}".rstrip("-")
+
+
+def require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
+    """Raise a `UsageError` if a run of the database has that name."""
+    if name in _run_names(con):
+        raise UsageError(
+            f"the database has a run of that name already — {name}",
+            "give another --name, or --replace",
+        )
+
+
+def free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
+    """Return the name, with a number behind it if a run of the database has it."""
+    taken = _run_names(con)
+    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(candidate for candidate in candidates if candidate not in taken)
+
+
+def _run_names(con: duckdb.DuckDBPyConnection) -> set[str]:
+    return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
+
+
 def _check(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     failed = [
         {"name": result.name, "row_count": result.row_count, "description": result.description}
@@ -364,7 +388,7 @@ def _target(database: Path, directory: Path) -> Iterator[_Target]:
 
 @contextlib.contextmanager
 def _created_meanwhile(target: _Target) -> Iterator[None]:
-    """Create the database while something else is done that leaves Python alone."""
+    """Create a new database in another thread while DuckDB builds the model."""
     if not target.is_new:
         yield
         return

@@ -1,4 +1,4 @@
-"""Inserts what was read in a thread of its own, while the next is read."""
+"""Inserter: a thread that inserts one batch while the next one is read."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _SECONDS_BETWEEN_LOOKS = 0.1
 class Inserter(Generic[_Item]):
     """A context manager that hands items to `insert`, one after the other, in order.
 
-    Leaving it waits until all are inserted, or drops them when it is left by an exception. What
-    `insert` raises is raised by the next `put`, or on leaving.
+    Leaving it waits until all items are inserted. An exception that leaves it drops the items that
+    still wait. An error of `insert` is raised by the next `put`, or on leaving.
     """
 
     def __init__(self, insert: Callable[[_Item], None]) -> None:
@@ -32,10 +32,10 @@ class Inserter(Generic[_Item]):
         self._thread = threading.Thread(target=self._work, name="insert batches")
 
     def put(self, item: _Item) -> None:
-        """Hand over an item; waits while too many are waiting.
+        """Hand over an item, and wait as long as too many are waiting.
 
         Raises:
-            BaseException: whatever inserting an earlier one raised.
+            BaseException: the error of an earlier `insert`.
         """
         while True:
             if self._error is not None:

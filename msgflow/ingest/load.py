@@ -3,38 +3,37 @@
 from __future__ import annotations
 
 import contextlib
+import fnmatch
 import itertools
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import duckdb
+import pyarrow as pa
 
-from msgflow.errors import UsageError
-from msgflow.ingest import reconciled, staging, whole
+from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import load
-from msgflow.ingest.ignored import is_ignored, matches
-from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.inserter import Inserter
+from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
-from msgflow.sql.statement import program
+from msgflow.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    import pyarrow as pa
-
     from msgflow.ingest.catalogue import Tracepoint
-    from msgflow.ingest.reconciled import Corrections
+    from msgflow.ingest.overlapping_traces import Corrections
     from msgflow.sql.interrupt import Interrupts
 
-# Rows that wait for a commit take memory that nothing limits.
-_ROWS_PER_TRANSACTION = 2_000_000
-# DuckDB's row group: fewer at once cost more each.
-_ROWS_PER_INSERT = 122_880
-# Rows that wait for more, of all tables.
-_MOST_WAITING = 500_000
+_TIMES = {"timestamp", "source_timestamp", "message_timestamp", "init_timestamp", "period"}
+# 146 years in nanoseconds: differences of any two times fit, as they do in the reader.
+_LATEST_NS = (1 << 62) - 1
+# Bytes. ROS allows 255 for a name; symbols of templates can be long. Every message is joined with
+# the name of its topic.
+_LONGEST_NAME = 1 << 10
+_LONGEST_SYMBOL = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def load_traces(
         traces: what to read.
         hostnames: trace index -> name of the host, where the user gave one.
         ignore: patterns of event names to leave out, such as 'dds:*'.
-        may_hold: a database is current that may hold some of these packets already.
+        may_hold: the current database may hold some of these packets already.
         replace: packets that the database holds already are no error.
         interrupts: asked at every batch.
         progress: called with the reader's progress and the seconds since the begin.
@@ -82,7 +81,7 @@ def load_traces(
     wanted = {
         name: tracepoint.arrow_schema()
         for name, tracepoint in catalogue.in_traces.items()
-        if not is_ignored(name, ignore)
+        if not _is_ignored(name, ignore)
     }
     sources = _sources(traces.traces, hostnames)
     for source in sources:
@@ -94,11 +93,11 @@ def load_traces(
         if progress is not None:
             progress(state, time.monotonic() - started)
 
-    tables = _Tables(con, may_hold=may_hold, may_replace=replace)
+    tables = RawTables(con, may_hold=may_hold, may_replace=replace)
 
-    def read(corrections: Corrections | None) -> Implausible:
+    def read(corrections: Corrections | None) -> ImplausibleValues:
         batches = traces.batches(wanted, progress=report)
-        implausible = Implausible()
+        implausible = ImplausibleValues()
         sequences = Sequences(catalogue, _hosts(sources))
         con.begin()
         try:
@@ -115,7 +114,7 @@ def load_traces(
         return implausible
 
     implausible = read(None)
-    corrections = reconciled.find(con)
+    corrections = overlapping_traces.corrections_of(con)
     if corrections:
         staging.empty(con)
         implausible = read(corrections)
@@ -145,7 +144,7 @@ def load_traces(
                 damage.message,
             ],
         )
-    for match in matches(ignore, traces.event_counts):
+    for match in _ignored_events(ignore, traces.event_counts):
         con.execute("INSERT INTO staging.ignored VALUES (?, ?, ?)", match)
     for left_out in implausible.rows():
         con.execute("INSERT INTO staging.implausible VALUES (?, ?, ?, ?)", left_out)
@@ -162,9 +161,9 @@ def _placed(
     batches: Iterable[EventBatch],
     sequences: Sequences,
     corrections: Corrections | None,
-    implausible: Implausible,
+    implausible: ImplausibleValues,
 ) -> Iterator[Placed | tuple[str, pa.RecordBatch]]:
-    """Yield the events of all batches, round by round, and (table, rows) of what has no thread."""
+    """Yield the events of all batches, round by round, and (table, rows) of packets and kernel."""
     tracepoints = load().in_traces
     for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
         events = []
@@ -184,89 +183,10 @@ def _placed(
 
 
 def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, pa.RecordBatch]:
-    """Return table and rows of an event of the kernel, whose contexts say nothing."""
+    """Return table and rows of an event of the kernel, without its contexts."""
     columns = [name for name, _ in tracepoint.common_columns]
     columns += [field.name for field in tracepoint.fields]
     return tracepoint.table, batch.select(columns)
-
-
-class _Tables:
-    """The tables of `raw`, filled inside a transaction that is committed now and then.
-
-    Rows wait until there are enough of them, or `flush` is called.
-
-    Attributes:
-        replaced: ids of the runs that hold some of the packets added already.
-    """
-
-    def __init__(
-        self, con: duckdb.DuckDBPyConnection, *, may_hold: bool, may_replace: bool
-    ) -> None:
-        self._con = con
-        self._may_hold = may_hold
-        self._may_replace = may_replace
-        self._waiting: dict[str, list[pa.RecordBatch]] = {}
-        self._counts: dict[str, int] = {}
-        self._uncommitted = 0
-        self.replaced: set[int] = set()
-
-    def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:
-        """Add the events of a round, or (table, rows).
-
-        Raises:
-            UsageError: the database holds these packets already, and must not replace them.
-        """
-        if isinstance(item, tuple):
-            self.add(*item)
-            return
-        self.add("thread", item.threads)
-        self.add("thread_name", item.thread_names)
-        for table, rows in whole.staged(item.batches):
-            self.add(table, rows)
-
-    def add(self, table: str, rows: pa.RecordBatch) -> None:
-        """Add rows to a table.
-
-        Raises:
-            UsageError: the database holds these packets already, and must not replace them.
-        """
-        if table == PACKET and self._may_hold:
-            self.replaced |= self._same_packets(rows)
-        self._waiting.setdefault(table, []).append(rows)
-        self._counts[table] = self._counts.get(table, 0) + rows.num_rows
-        if self._counts[table] >= _ROWS_PER_INSERT:
-            self._insert(table)
-        elif sum(self._counts.values()) > _MOST_WAITING:
-            self._insert(max(self._counts, key=self._counts.__getitem__))
-
-    def flush(self) -> None:
-        """Insert what waits."""
-        for table in list(self._waiting):
-            self._insert(table)
-
-    def _insert(self, table: str) -> None:
-        import pyarrow as pa
-
-        rows = pa.Table.from_batches(self._waiting.pop(table))
-        self._con.from_arrow(rows).insert_into(f"raw.main.{table}")
-        self._uncommitted += self._counts.pop(table)
-        if self._uncommitted >= _ROWS_PER_TRANSACTION:
-            self._con.commit()
-            self._con.begin()
-            self._uncommitted = 0
-
-    def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
-        self._con.register("packet_batch", rows)
-        try:
-            runs = self._con.execute(program().text("known_packet")).fetchall()
-        finally:
-            self._con.unregister("packet_batch")
-        if runs and not self._may_replace:
-            raise UsageError(
-                f"these packets are in the database already — run {runs[0][1]} ({runs[0][0]})",
-                "give --replace to read them again in place of that run",
-            )
-        return {run_id for run_id, _ in runs}
 
 
 def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[list[object]]:
@@ -296,3 +216,60 @@ def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
     """Number the hosts of traces: (clock, hostname), see `schema/model/identity/host.sql`."""
     numbers: dict[tuple[object, object], int] = {}
     return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
+
+
+def _is_ignored(name: str, patterns: Sequence[str]) -> bool:
+    """Tell whether a name of events matches one of the patterns, such as 'dds:*'."""
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _ignored_events(
+    patterns: Sequence[str], counts: Mapping[tuple[int, str], int]
+) -> Iterator[tuple[int, str, str | None]]:
+    """Yield (place, pattern, event) for each event that a pattern matches, else with None.
+
+    Args:
+        patterns: patterns of the event names to leave out.
+        counts: (trace index, event name) -> events that occurred.
+    """
+    occurred = sorted({name for (_, name), count in counts.items() if count})
+    for place, pattern in enumerate(dict.fromkeys(patterns)):
+        matching = [name for name in occurred if _is_ignored(name, [pattern])]
+        yield from ((place, pattern, name) for name in matching or (None,))
+
+
+class ImplausibleValues:
+    """Payload values that cannot be times or names: NULL replaces them, and they are counted.
+
+    One of them must not end an ingest.
+    """
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[str, str, str], int] = {}
+
+    def without(self, name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
+        """Return events of this name with NULL in place of implausible values."""
+        for place, field in enumerate(batch.schema):
+            values = batch.column(place)
+            if field.name in _TIMES:
+                what, numbers, least, most = "times", to_numpy(values), -_LATEST_NS, _LATEST_NS
+            elif pa.types.is_string(field.type):
+                what, numbers, least = "names: too long", text_lengths(values), 0
+                most = _LONGEST_SYMBOL if field.name == "symbol" else _LONGEST_NAME
+            else:
+                continue
+            if not numbers.size or (least <= numbers.min() and numbers.max() <= most):
+                continue
+            bad = is_valid(values) & ~((least <= numbers) & (numbers <= most))
+            if bad.any():
+                self._count(name, field.name, what, int(bad.sum()))
+                batch = batch.set_column(place, field, without(values, bad))
+        return batch
+
+    def _count(self, name: str, column: str, what: str, bad: int) -> None:
+        self._counts[name, column, what] = self._counts.get((name, column, what), 0) + bad
+
+    def rows(self) -> Iterator[tuple[str, str, str, int]]:
+        """Yield (event, field, what its values cannot be, how many were left out)."""
+        for key, count in sorted(self._counts.items()):
+            yield *key, count

@@ -1,9 +1,8 @@
-"""Staging: what was read, and what the model makes of it, until it is stored.
+"""Staging: the events as read and the tables of the model, until they are stored.
 
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
-tracepoint, the packets, and the threads, all as read; calls whose layers directly follow each
-other are rows of tables of their own, and views then show all events of a tracepoint (`calls.py`).
+tracepoint, the packets, and the threads, all as read.
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
@@ -17,10 +16,8 @@ from event to event), and the objects of `schema/model`.
 from __future__ import annotations
 
 import contextlib
-from functools import cache
 from typing import TYPE_CHECKING
 
-from msgflow.ingest import calls
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
 
 if TYPE_CHECKING:
@@ -94,7 +91,7 @@ CREATE TABLE staging.damage (
 """
 
 OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
-"""The views that say of all events what the tables of each tracepoint say."""
+"""Views of all events, which unite the tables of all tracepoints."""
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
@@ -106,14 +103,14 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
     """
     for name in ("raw", "staging"):
         path = ":memory:" if directory is None else _quoted(directory / f"{name}.duckdb")
-        # What is staged is of no use after a crash.
+        # Staged tables are of no use after a crash.
         con.execute(f"ATTACH '{path}' AS {name} (RECOVERY_MODE no_wal_writes)")
     for statement in _tables():
         con.execute(statement)
 
 
 def statements() -> tuple[str, ...]:
-    """Return what creates all that is staged before the model is built, in `raw` and `staging`."""
+    """Return the statements that create the tables and views of events in `raw` and `staging`."""
     catalogue = load()
     return (
         *_tables(),
@@ -126,10 +123,9 @@ def _tables() -> tuple[str, ...]:
     catalogue = load()
     return (
         *(
-            each.create_table_sql("raw", catalogue.labels, calls.apart(each))
+            each.create_table_sql("raw", catalogue.labels)
             for each in catalogue.tracepoints.values()
         ),
-        *calls.statements(),
         _PACKET_TABLE,
         _THREAD_TABLES,
         _SOURCE_TABLE,
@@ -143,8 +139,17 @@ def _tables() -> tuple[str, ...]:
     )
 
 
+def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
+    """Return the tables of `raw` and `staging` without a row, as `schema.name`."""
+    rows = con.execute(
+        "SELECT database_name || '.' || table_name FROM duckdb_tables() "
+        "WHERE database_name IN ('raw', 'staging') AND estimated_size = 0"
+    ).fetchall()
+    return {name for (name,) in rows}
+
+
 def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
-    """Make the views of all events, over tables that are not empty: others take long to plan."""
+    """Create the views of all events over the tables that have rows: empty ones cost planning."""
     known = load().of_threads
     left = [each for each in known if f"raw.{each.table}" not in empty]
     con.execute(_event_view(left or known))
@@ -153,25 +158,20 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    for table in (*read_tables(), "packet", "thread", "thread_name"):
+    for table in (*event_tables(), "packet", "thread", "thread_name"):
         con.execute(f"TRUNCATE raw.{table}")
 
 
-@cache
-def read_tables() -> tuple[str, ...]:
-    """Return the tables of `raw` that events are read into."""
-    return (
-        *(calls.apart(tracepoint) for tracepoint in load().tracepoints.values()),
-        *(call.table for call in calls.CALLS),
-    )
+def event_tables() -> tuple[str, ...]:
+    """Return the tables of `raw` that events are read into, without their schema."""
+    return tuple(tracepoint.table for tracepoint in load().tracepoints.values())
 
 
 @contextlib.contextmanager
 def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
-    """Keep what is staged as it is first written, meanwhile.
+    """Write staged tables once, without compression, inside this block.
 
-    It is read a few times and thrown away: writing it anew, or compressed, costs more than it
-    saves.
+    They are read a few times and dropped: to rewrite or compress them costs more than it saves.
     """
     con.execute("SET force_compression = 'uncompressed'")
     con.execute("SET wal_autocheckpoint = '1TB'")
@@ -181,9 +181,9 @@ def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
 
 
 def leave(con: duckdb.DuckDBPyConnection) -> None:
-    """Let the connection close without writing what is staged once more.
+    """Let the connection close without a checkpoint of the staged tables.
 
-    That holds for all databases of the connection: what must last needs a checkpoint before.
+    This holds for all databases of the connection: the target needs a checkpoint before.
     """
     con.execute("PRAGMA disable_checkpoint_on_shutdown")
 
@@ -212,10 +212,7 @@ def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
-    """Write all that is staged and has rows to `directory` as Parquet.
-
-    Calls that were put together are written as the events that they are of.
-    """
+    """Write all staged tables and views with rows to `directory` as Parquet."""
     directory.mkdir(parents=True, exist_ok=True)
     names = con.execute(
         "SELECT database_name || '.' || table_name FROM duckdb_tables() "
@@ -223,10 +220,8 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
         "UNION ALL SELECT database_name || '.' || view_name FROM duckdb_views() "
         "WHERE database_name IN ('raw', 'staging') AND NOT internal ORDER BY ALL"
     ).fetchall()
-    parts = {f"raw.{table}" for tables in calls.parts().values() for table in tables}
     for (name,) in names:
-        is_told = name in parts or name in OF_ALL_EVENTS
-        if not is_told and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
+        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
             target = _quoted(directory / f"{name}.parquet")
             con.execute(f"COPY {name} TO '{target}' (FORMAT parquet)")
 

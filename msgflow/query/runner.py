@@ -26,7 +26,6 @@ from msgflow.query.selection import (
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors
-from msgflow.sql.parsed import parsed
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.values import format_duration
 
@@ -78,7 +77,10 @@ def run_query(
             read, or rows that the query does not have.
         QueryError: the database could not run it.
     """
-    used = [parsed(connection, statement).named_parameters for statement in header.statements]
+    used = [
+        connection.extract_statements(statement)[0].named_parameters
+        for statement in header.statements
+    ]
     if part.has_window and not header.has_window:
         raise UsageError(
             f"the query has no time window — {header.name}",

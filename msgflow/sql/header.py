@@ -13,25 +13,30 @@
     -- answer: lost
     -- heading: rank, latency_ns
     -- note: clocks
-    -- after: staging.taken_apart
+    -- when: staging.gap
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
-`note: clocks` says that rows compare times of hosts, so that the runner names clocks that differ,
-`note: gate` that something is mostly empty, and soon found to be: it is asked for a row before what
-is made of it is planned.
-`brief` names the columns that a narrow terminal is to show, the most important first, `answer`
-those that stay where they are 0 in all rows, since this is what people ask for, `heading` those
-that stand above a table on a terminal, once for each value of the first, on which the others
-depend, `slowest` the one that `--slowest N` goes by. The unit of a column may also be what it
-names: 'node', 'topic', 'callback', 'host' or 'path', for the options that choose rows by them. Of a
-public view over the table of its name, a column may be named alone: it is what the table declares.
-What is in `schema/health` has a `severity`; findings and diagnostics the `phase` of an ingest that
-they come from, a `cause` and a `cure`, in place of which a diagnostic may name the `finding` that
-has them. An object is made after all objects that its statement names; `after` adds one that it
-does not name.
 
-What a statement looks up stays in memory until it ends. A query may therefore go in steps: before
-its own statement stand others, each of the form `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
+- `note: clocks`: rows compare times of hosts, so the runner names clocks that differ.
+- `brief`: the columns that a narrow terminal shows, the most important first.
+- `answer`: columns that stay where they are 0 in all rows, since people ask for them.
+- `heading`: columns that stand above a table on a terminal, once for each value of the first one,
+  on which the others depend.
+- `slowest`: the column that `--slowest N` goes by.
+- `when`: tables, or macros of a run. If none of them has a row, this object has none either, and an
+  ingest leaves it empty without running its SQL. In `schema/model` such an object declares its
+  columns, from which the empty table is made. Only objects that take long to plan have it.
+
+The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
+'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
+column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
+`severity`; findings and diagnostics have the `phase` of an ingest that they come from, and a
+`cause` and a `cure`, or instead of both the `finding` that has them. An object is made after all
+objects that its statement or its `when` names.
+
+The tables that a statement looks up stay in memory until it ends. A query may therefore go in
+steps: other statements stand before its own, each of the form
+`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`.
 """
 
 from __future__ import annotations
@@ -65,11 +70,11 @@ _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
     "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "phase",
-    "finding", "note", "after", "brief", "answer", "heading", "slowest",
+    "finding", "note", "when", "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
-_NOTES = ("clocks", "gate")
-# Of an ingest, in their order: where what is found comes from.
+_NOTES = ("clocks",)
+# Phases of an ingest that findings and diagnostics come from, in their order.
 PHASES = ("reading", "model", "clocks", "links", "database")
 
 
@@ -144,21 +149,20 @@ class Header:
             same, but never made a table) or 'macro' (the body is the whole statement).
         params: parameters in the order of the file.
         columns: output columns in the order of the file.
-        severity: of a check, finding or diagnostic, else None.
-        cause: where a finding comes from, else None.
-        cure: what to do about a finding, else None.
-        note: 'clocks' where rows compare times of several hosts, 'gate' where it is asked for a row
-            before what is made of it, else None.
+        severity: severity of a check, finding or diagnostic, else None.
+        cause: cause of a finding, else None.
+        cure: remedy for a finding, else None.
+        note: 'clocks' where rows compare times of several hosts, else None.
         body: the SQL below the header; of a query in steps, the statement that returns its rows.
         path: the file.
         brief: columns for where not all have a place, the most important first.
         answer: columns that are shown also where they are 0 or empty throughout.
-        heading: columns that are told once, above the rows: the first tells which rows they are of.
+        heading: columns that stand once above their rows: the first says which rows these are.
         slowest: column by which rows are the slowest, else None.
         phase: of a finding or diagnostic, one of `PHASES`, else None.
         finding: of a diagnostic, the finding that has its cause and cure, else None.
         steps: what a query makes before, in order.
-        after: objects that come before this one although its statements do not name them.
+        when: tables and macros of a run; if none of them has a row, this has none.
     """
 
     name: str
@@ -181,7 +185,7 @@ class Header:
     phase: str | None = None
     finding: str | None = None
     steps: tuple[Step, ...] = ()
-    after: tuple[str, ...] = ()
+    when: tuple[str, ...] = ()
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -190,7 +194,7 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.after} - {self.name}))
+        return tuple(sorted({*named, *self.when} - {self.name}))
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -280,7 +284,7 @@ def parse(text: str, path: Path) -> Header:
         phase=phase,
         finding=single.get("finding"),
         steps=steps,
-        after=_names(single.get("after", "")),
+        when=_names(single.get("when", "")),
     )
 
 

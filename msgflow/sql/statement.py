@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
-from msgflow.sql.parsed import parsed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -60,8 +59,7 @@ class Statements:
             values: its parameters; those with a default may be left out, others are ignored.
         """
         inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
-        text = self.text(name)
-        statement = parsed(connection, text)
+        (statement,) = connection.extract_statements(self.text(name))
         used = statement.named_parameters
         bound = {key: values.get(key, inherited.get(key)) for key in used}
         return connection.sql(statement, params=bound)

@@ -1,15 +1,16 @@
 -- name: derive.orphan_take
 -- kind: macro
--- description: Why the publication of a take is not known; the first reason that holds. The stamp
+-- description: Why the publication of a take is not known: the first reason that holds. The stamp
 --     is compared on the host of each process that could have sent it: those with a publisher of
---     the topic (known senders), those with one whose topic is not known or of which initialisation
---     is missing (possible senders), and all with any publisher where the topic is not known. What
---     comes out of a ring buffer has no stamp: it was put in after the message before it, which
---     came from there. A stamp that a message of another topic has, behind a gap since the
+--     the topic (known senders), those with a publisher of unknown topic or with missing
+--     initialisation (possible senders), and all with any publisher where the topic is not known.
+--     What comes out of a ring buffer has no stamp: it was put in after the message before it,
+--     which came from there. A stamp that a message of another topic has, behind a gap since the
 --     subscription was created: another subscription may have its handle by then. That all known
 --     senders had ended says nothing where a publisher whose topic is not known published at that
 --     moment.
 -- grain: one row per take whose publication is not known
+-- when: derive.unlinked_take
 CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT

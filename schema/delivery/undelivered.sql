@@ -1,14 +1,14 @@
 -- name: derive.undelivered
 -- kind: macro
--- description: Why a subscription did not take a message of its topic; the first reason that
---     holds. Everything is compared on the clock of the receiver. `not_delivered` rests on a
---     wait: a message in the queue would have ended it. A wait tells this only where a single
---     thread reads, and only if it lasted ten times as long as messages usually need, at least a
---     millisecond. A reader that gets no CPU seems to wait, too, but takes the message when it
---     wakes up. `overwritten` and `lost_in_transport` are told apart by the depth of the queue
---     alone. Nothing is said where the subscription took a message in that time that could not be
---     identified. Nor are messages said to be overwritten where the subscription took none of the
---     publisher, and no later one.
+-- description: Why a subscription did not take a message of its topic: the first reason that holds.
+--     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
+--     message in the queue would have ended it. A wait tells this only where a single thread reads,
+--     and only if it lasted ten times as long as messages usually need, at least a millisecond. A
+--     reader that gets no CPU seems to wait, too, but takes the message when it wakes up.
+--     `overwritten` and `lost_in_transport` differ by the depth of the queue alone. Nothing is said
+--     where the subscription took a message in that time that could not be identified. Nor are
+--     messages said to be overwritten where the subscription took none of the publisher, and no
+--     later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (
@@ -268,7 +268,7 @@ facts AS (
     ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id
         AND coalesce(b.awake_until_ns, b.until_ns) >= g.start_ns
     ASOF LEFT JOIN gap AS i ON b.process_id = i.process_id AND b.arrival_ns >= i.start_ns
-    ASOF LEFT JOIN (SELECT * FROM derive.vain_take WHERE run_id = only_run) AS f
+    ASOF LEFT JOIN (SELECT * FROM derive.empty_take WHERE run_id = only_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
         SELECT subscription_id, taken_ns, false AS for_no_stamp

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import duckdb
 import pytest
 
 from msgflow.db import derive, objects
+from msgflow.db.sandbox import open_file
+from msgflow.ingest import ingest
+from msgflow.sim import Recording, simulate
 from msgflow.sql.header import parse
 
 
@@ -72,3 +76,46 @@ def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPa
     for not_read in ("derive.executor_busy", "main.flow_edge", "derive.link_diagnostic"):
         assert hashes(not_read) == now, not_read
     derive.derivation_hash.cache_clear()
+
+
+SOMETIMES_EMPTY = {
+    header.name: header
+    for header in objects.views()
+    if header.when and header.name.removeprefix("derive.") in derive.derived_tables()
+}
+
+
+def test_only_tables_that_are_derived_are_skipped() -> None:
+    assert SOMETIMES_EMPTY.keys() == {header.name for header in objects.views() if header.when}
+    assert len(SOMETIMES_EMPTY) >= 3
+
+
+def test_tables_have_no_row_without_those_of_their_when(tmp_path: Path) -> None:
+    """Of a run without stamps, with losses, in which each of them has rows."""
+    path = tmp_path / "run.duckdb"
+    recording = Recording(lost_event_share=0.3)
+    simulate("pipeline", tmp_path / "trace", factor=0.05, layout="humble", recording=recording)
+    ingest([tmp_path / "trace"], path)
+    with open_file(path, read_only=False) as con:
+        for name, header in SOMETIMES_EMPTY.items():
+            con.begin()
+            assert count(con, name) > 0, name
+            for each in header.when:
+                empty(con, each)
+            assert count(con, name) == 0, name
+            derive.derive_table(con, name.removeprefix("derive."), 1)
+            con.rollback()
+
+
+def count(con: duckdb.DuckDBPyConnection, macro: str) -> int:
+    return int(con.execute(f"SELECT count(*) FROM {macro}(1)").fetchall()[0][0])
+
+
+def empty(con: duckdb.DuckDBPyConnection, name: str) -> None:
+    """Delete the rows of a table, or let a macro return none."""
+    if name.startswith("store."):
+        con.execute(f"DELETE FROM {name}")
+        return
+    (header,) = (each for each in objects.views() if each.name == name)
+    head, body = header.body.split(" AS TABLE\n", 1)
+    con.execute(f"{head} AS TABLE\nSELECT * FROM ({body}) WHERE false")

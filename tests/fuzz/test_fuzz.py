@@ -29,7 +29,7 @@ import json, os, signal, tempfile
 from pathlib import Path
 from typing import Any
 import fuzz
-import msgflow.cli.app, msgflow.database, msgflow.ingest.implausible, msgflow.ingest.load
+import msgflow.cli.app, msgflow.database, msgflow.ingest.load
 from msgflow import Database, TraceError
 
 findings, query, ingest = Database.findings, Database.query, Database.ingest

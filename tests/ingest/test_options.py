@@ -11,7 +11,7 @@ import duckdb
 import pytest
 
 from msgflow.ingest import IngestProgress, ingest
-from msgflow.ingest.names import hostnames_of
+from msgflow.ingest.hostnames import hostnames_of
 from msgflow.trace import open as open_traces
 
 Make = Callable[..., Path]

@@ -14,8 +14,9 @@ from ingested import contents
 from thorough import few
 
 from msgflow.db.workspace import workspace
-from msgflow.ingest import ingest, load
+from msgflow.ingest import ingest
 from msgflow.ingest import ingest as ingest_function
+from msgflow.ingest.raw_tables import RawTables
 
 
 class Interruption(BaseException):
@@ -28,7 +29,7 @@ def fail(*_: object, **__: object) -> Any:
 
 def fail_while_reading(monkeypatch: pytest.MonkeyPatch) -> None:
     """After some batches, so that there is something to undo."""
-    add = load._Tables.add
+    add = RawTables.add
     left = iter(range(4))
 
     def add_some(*arguments: Any) -> None:
@@ -36,7 +37,7 @@ def fail_while_reading(monkeypatch: pytest.MonkeyPatch) -> None:
             raise Interruption
         add(*arguments)
 
-    monkeypatch.setattr(load._Tables, "add", add_some)
+    monkeypatch.setattr(RawTables, "add", add_some)
 
 
 def fail_at(monkeypatch: pytest.MonkeyPatch, name: str) -> None:

@@ -31,7 +31,7 @@ CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGIN
     is_copy BOOLEAN);
 CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
     subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1);
-CREATE TABLE derive.vain_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
+CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
     failed_ns BIGINT);
 CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
     state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
@@ -331,7 +331,7 @@ def test_an_attempt_failed_before_a_later_message_was_taken(
     delivery.publish(0, 300_000)
     missing = delivery.publish(300 * MS)
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [failed])
+    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [failed])
     assert delivery.reason(missing) == reason
 
 
@@ -342,7 +342,7 @@ def test_a_gap_leaves_open_whether_the_attempt_that_failed_was_the_only_one(
     delivery.publish(0, 300_000)
     missing = delivery.publish(300 * MS)
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [305 * MS])
+    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [305 * MS])
     delivery.misses(306 * MS, 307 * MS)
     assert delivery.reason(missing) == "receiver_gap"
 
@@ -353,7 +353,7 @@ def test_a_take_without_a_message_leaves_open_what_failed(delivery: Delivery) ->
     delivery.publish(0, 300_000)
     missing = delivery.publish(300 * MS)
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [305 * MS])
+    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [305 * MS])
     taken = 315 * MS
     delivery.con.execute(
         "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (99, ?, NULL)",
@@ -578,7 +578,7 @@ def test_of_messages_of_a_publisher_at_the_same_moment_the_first_take_counts(
     missing = delivery.publish(300 * MS)
     for at in taken:
         delivery.publish(310 * MS, at)
-    delivery.con.execute("INSERT INTO derive.vain_take (failed_ns) VALUES (?)", [325 * MS])
+    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [325 * MS])
     assert delivery.reason(missing) == "lost_in_transport"
 
 
@@ -631,7 +631,7 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
         for start in chance.sample(moments, 2):
             con.execute("INSERT INTO gap VALUES (?, ?, ?)", [number, start, start + 5 * MS])
         for failed in chance.sample(moments, 3):
-            con.execute("INSERT INTO derive.vain_take VALUES (1, ?, ?)", [number, failed + 1])
+            con.execute("INSERT INTO derive.empty_take VALUES (1, ?, ?)", [number, failed + 1])
         start = begin
         while start < 2_000 * MS:
             end = start + chance.randrange(4 * MS, 30 * MS)

@@ -28,7 +28,7 @@ FULL = """\
 -- column: size DECIMAL(18,3)  Size
 -- column: start_ns BIGINT [epoch ns]
 --     When
--- after: main.a,
+-- when: main.a,
 --     main.b
 -- answer: median_ns
 -- heading: start_ns, median_ns
@@ -66,7 +66,7 @@ def test_everything_is_parsed() -> None:
         Column("size", "DECIMAL(18,3)", None, "Size"),
         Column("start_ns", "BIGINT", "epoch ns", "When"),
     )
-    assert header.after == ("main.a", "main.b")
+    assert header.when == ("main.a", "main.b")
     assert header.severity == "warning"
     assert header.brief == ("start_ns", "median_ns")
     assert header.answer == ("median_ns",)
@@ -76,7 +76,8 @@ def test_everything_is_parsed() -> None:
 
 def test_an_object_needs_what_its_statements_name() -> None:
     header = parse_with(
-        "-- after: staging.d\nCREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
+        "-- when: staging.d, derive.f\n"
+        "CREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
         "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
         "JOIN query_table('raw.a') USING (id)"
     )

@@ -16,7 +16,6 @@ from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.database import Database
 from msgflow.db import objects
-from msgflow.ingest.calls import TAKEN_APART
 from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.statement import program
@@ -86,13 +85,6 @@ def test_every_sql_file_lies_in_a_known_folder() -> None:
 @each(FILES)
 def test_the_name_is_the_place(file: SqlFile) -> None:
     assert file.header.name == file.expected_name
-
-
-@each(FILES)
-def test_what_reads_calls_apart_comes_after_they_are_taken_apart(file: SqlFile) -> None:
-    is_changed = re.search(r"\b(?:raw\.whole_[a-z_]+|[a-z0-9_]+_apart)\b", file.header.body)
-    is_model = file.layer == "model" and file.header.name != TAKEN_APART
-    assert (TAKEN_APART in file.header.after) == bool(is_model and is_changed)
 
 
 @each(FILES)

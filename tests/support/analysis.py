@@ -19,7 +19,7 @@ from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.tables import STORE
 from msgflow.ingest import model, staging
-from msgflow.ingest.reported import restore
+from msgflow.ingest.caret_initialisation import restore
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 # What is stored of links and of what is missing comes of whole derivations.
@@ -46,10 +46,8 @@ class Analysis:
         staging.attach(self._connection, None)
         self._tables = self._tables_of("raw"), self._tables_of("staging")
         self._views = self._views_of_staging()
-        # Tables of the model that stand there without a row, as those before needed them.
-        self._kept: set[str] = set()
         self._built: set[str] | None = None
-        self._growing: model.Growing | None = None
+        self._empty: set[str] | None = None
         self._derived: frozenset[str] = frozenset()
         # What is stored is never committed, unless somebody takes the database: to take it back
         # costs one statement, to delete it one for each table.
@@ -67,7 +65,7 @@ class Analysis:
         self._clear()
         events.write(self._connection)
         restore(self._connection)
-        self._built, self._growing = set(), None
+        self._built, self._empty = set(), None
         self._derived = frozenset()
         return self
 
@@ -123,18 +121,11 @@ class Analysis:
         if not missing:
             return
         self._empty_store()
-        if self._growing is None:
-            self._growing = model.Growing(self._connection)
-            self._growing.empty -= self._kept  # not known of this system yet
-            staging.narrow(self._connection, self._growing.empty)
+        if self._empty is None:
+            self._empty = staging.empty_tables(self._connection)
+            staging.narrow(self._connection, self._empty)
         for header in missing:
-            if header.name in self._kept and self._growing.is_empty(header.name):
-                self._growing.empty.add(header.name)
-            else:
-                if header.name in self._kept:
-                    self._connection.execute(f"DROP TABLE {header.name}")
-                    self._kept.discard(header.name)
-                self._growing.add(header)
+            model.create(self._connection, header, self._empty)
             self._built.add(header.name)
         self._connection.begin()
         self._is_stored = True
@@ -177,10 +168,7 @@ class Analysis:
         self._empty_store()
         con = self._connection
         raw, given = self._tables
-        if self._growing is not None:
-            built = {each.name for each in objects.load("model") if each.kind == "view"}
-            self._kept = (self._kept - self._built) | (built & self._growing.empty)
-        for table in self._tables_of("staging", "estimated_size > 0") - given:
+        for table in self._tables_of("staging") - given:
             con.execute(f"DROP TABLE staging.{table}")
         for view in self._views_of_staging() - self._views:
             con.execute(f"DROP VIEW staging.{view}")

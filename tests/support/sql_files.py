@@ -11,13 +11,13 @@ from msgflow.sql.header import Header, read
 
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
-    "model", "reconcile", "store", "link", "clock", "delivery", "flow", "stat", "public",
+    "model", "overlap", "store", "link", "clock", "delivery", "flow", "stat", "public",
     "check", "finding", "diagnostic", "queries", "program",
 )  # fmt: skip
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
     "model": "staging",
-    "reconcile": "reconcile",
+    "overlap": "overlap",
     "link": "derive",
     "clock": "derive",
     "delivery": "derive",

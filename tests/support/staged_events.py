@@ -17,7 +17,7 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 
-from msgflow.ingest import reconciled, staging, whole
+from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace import COMMON_SCHEMA, PACKET_SCHEMA
@@ -184,7 +184,7 @@ class StagedEvents:
             con.execute(f"INSERT INTO staging.declared VALUES {', '.join(texts)}")
         packets = pa.RecordBatch.from_pylist(self._all_packets(), schema=PACKET_SCHEMA)
         self._read(con, batches, packets)
-        corrections = reconciled.find(con)
+        corrections = overlapping_traces.corrections_of(con)
         if corrections:
             staging.empty(con)
             self._read(con, [(n, corrections.applied(batch)) for n, batch in batches], packets)
@@ -205,8 +205,8 @@ class StagedEvents:
             placed = Sequences(load(), numbers).place(batches)
             _insert(con, "raw.thread", placed.threads)
             _insert(con, "raw.thread_name", placed.thread_names)
-            for table, batch in whole.staged(placed.batches):
-                _insert(con, f"raw.{table}", batch)
+            for name, batch in placed.batches:
+                _insert(con, f"raw.{load().tracepoints[name].table}", batch)
         _insert(con, "raw.packet", packets)
 
     def _all_packets(self) -> list[dict[str, Any]]:

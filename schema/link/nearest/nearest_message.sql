@@ -11,6 +11,7 @@
 --     difference of the clocks is not known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
+-- when: store.stamp_clock
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
 -- A clock does not jump there and back within a stretch. If a single stretch tells nothing, the
 -- clock went on between those beside it.

@@ -3,7 +3,6 @@
 -- description: Processes that publish and never show the stamp of a message.
 -- grain: one row per such process
 -- param: only_run BIGINT  Run to look at
--- note: gate
 CREATE OR REPLACE MACRO derive.unstamped_process(only_run) AS TABLE
 SELECT process_id
 FROM store.publication

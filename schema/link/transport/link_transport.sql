@@ -7,7 +7,7 @@
 --     publication and the take (on hosts with different clocks: within the publication), or a gap
 --     of the receiver's trace likewise, the better candidate may be in the gap. A reader of ring
 --     buffers may get a message through the middleware as well, without a callback: that take is
---     a copy that nobody gets. So are the takes of a placeholder that nothing joins with the
+--     a copy that no callback gets. So are the takes of a placeholder that nothing joins with the
 --     reader of the buffer.
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at

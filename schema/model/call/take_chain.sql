@@ -1,7 +1,110 @@
 -- name: staging.take_chain
--- kind: inline
--- description: All takes that were successful, the whole ones and the rest.
--- grain: one row per successful take or dequeue
-FROM staging.take_whole
+-- description: Layers of one take stitched together, as for publications. A take whose rmw layer
+--     failed does not count, although upper layers may report it. Nor does a take of the middleware
+--     itself: it has no rcl layer, although rcl takes are traced, and its reader belongs to no rcl
+--     subscription and never had an rcl layer.
+-- grain: one row per successful take, or dequeue
+WITH middleware AS (
+    SELECT
+        coalesce(d.event_id, m.event_id) AS start_event_id,
+        coalesce(m.event_id, d.event_id) AS end_event_id,
+        coalesce(d.trace_index, m.trace_index) AS trace_index,
+        coalesce(d.thread_index, m.thread_index) AS thread_index,
+        coalesce(m.message, d.buffer) AS message,
+        m.taken,
+        m.ts_ns AS rmw_ns,
+        m.rmw_subscription_handle AS rmw_handle,
+        nullif(m.source_timestamp, 0) AS stamp
+    FROM staging.call('dds_read') AS d
+    FULL JOIN staging.call('ros2_rmw_take') AS m
+        ON d.event_id = m.previous_event_id AND d.buffer = m.message
+),
+rcl AS (
+    SELECT
+        coalesce(m.start_event_id, r.event_id) AS start_event_id,
+        coalesce(r.event_id, m.end_event_id) AS end_event_id,
+        coalesce(m.trace_index, r.trace_index) AS trace_index,
+        coalesce(m.thread_index, r.thread_index) AS thread_index,
+        coalesce(m.message, r.message) AS message,
+        m.taken, m.rmw_ns, r.ts_ns AS rcl_ns, m.rmw_handle, m.stamp
+    FROM middleware AS m
+    FULL JOIN staging.call('ros2_rcl_take') AS r
+        ON m.end_event_id = r.previous_event_id
+        AND m.message = r.message
+        AND m.rmw_ns IS NOT NULL
+),
+rclcpp AS (
+    SELECT
+        coalesce(r.start_event_id, u.event_id) AS start_event_id,
+        coalesce(u.event_id, r.end_event_id) AS end_event_id,
+        coalesce(r.trace_index, u.trace_index) AS trace_index,
+        coalesce(r.thread_index, u.thread_index) AS thread_index,
+        coalesce(r.message, u.message) AS message,
+        r.taken, r.rmw_ns, r.rcl_ns, r.rmw_handle, r.stamp
+    FROM rcl AS r
+    FULL JOIN staging.call('ros2_rclcpp_take') AS u
+        ON r.end_event_id = u.previous_event_id
+        AND r.message = u.message
+        AND coalesce(r.rcl_ns, r.rmw_ns) IS NOT NULL
+),
+chain AS (
+    SELECT
+        coalesce(r.start_event_id, c.event_id) AS start_event_id,
+        coalesce(c.event_id, r.end_event_id) AS end_event_id,
+        coalesce(r.trace_index, c.trace_index) AS trace_index,
+        coalesce(r.thread_index, c.thread_index) AS thread_index,
+        r.taken, r.rmw_ns, r.rcl_ns,
+        c.ts_ns AS caret_ns,
+        r.rmw_handle,
+        c.callback AS callback_handle,
+        coalesce(r.stamp, nullif(c.source_stamp, 0)::BIGINT) AS stamp
+    FROM rclcpp AS r
+    FULL JOIN staging.call('ros2_dispatch_subscription_callback') AS c
+        ON r.end_event_id = c.previous_event_id AND r.message = c.message
+),
+located AS (
+    SELECT
+        h.start_event_id, h.end_event_id, h.trace_index, c.thread_id, c.process_id, h.rmw_ns,
+        h.rcl_ns, h.caret_ns, h.rmw_handle, h.callback_handle, h.stamp
+    FROM chain AS h
+    JOIN staging.context AS c
+        ON h.thread_index = c.thread_index
+        AND h.start_event_id >= c.from_event_id
+        AND h.start_event_id < c.until_event_id
+    WHERE h.taken IS DISTINCT FROM 0
+),
+known_reader AS (
+    SELECT process_id, rmw_handle FROM staging.subscription_known
+    UNION
+    SELECT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL
+),
+rcl_traced AS (
+    SELECT DISTINCT process_id FROM located WHERE rcl_ns IS NOT NULL
+)
+SELECT
+    t.start_event_id,
+    t.end_event_id,
+    t.trace_index,
+    t.thread_id,
+    t.process_id,
+    coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
+    CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
+    t.rmw_handle,
+    t.callback_handle,
+    NULL::UBIGINT AS buffer_handle,
+    t.stamp AS source_timestamp_ns
+FROM located AS t
+LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
+LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND t.rmw_handle = k.rmw_handle
+WHERE t.rcl_ns IS NOT NULL
+    OR t.caret_ns IS NOT NULL
+    OR (
+        t.rmw_ns IS NOT NULL
+        AND t.stamp IS NOT NULL
+        AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
+    )
 UNION ALL
-FROM staging.take_rest
+SELECT
+    event_id, event_id, trace_index, thread_id, process_id, ts_ns, 'ring_buffer', NULL, NULL,
+    buffer, NULL
+FROM staging.located('ros2_rclcpp_ring_buffer_dequeue')

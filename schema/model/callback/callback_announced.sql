@@ -1,8 +1,7 @@
 -- name: staging.callback_announced
--- description: Callbacks without a known owner of which the executor said the same before every
---     instance, with the timer or subscription that the handle means, if the trace names it.
---     Without a handle (NULL) the executor named none. And which tracepoints were enabled
---     meanwhile.
+-- description: Callbacks without a known owner, if the executor said the same before each of their
+--     instances: the handle that it named (NULL if it named none), the timer or subscription of
+--     that handle if the trace has it, and which tracepoints were enabled meanwhile.
 -- grain: one row per such callback
 WITH enabled AS (
     SELECT

@@ -1,20 +1,21 @@
 -- name: staging.callback_event
--- description: Begins and ends of callbacks that are not whole, with what comes before them on
+-- description: Begins and ends of callbacks that are not plain, with what comes before them on
 --     their thread: directly, of callbacks, and of the executor (not across a gap). `segment`
 --     counts the gaps that their thread has seen.
 -- grain: one row per such callback_start or callback_end
--- after: staging.taken_apart
 WITH event AS (
     SELECT
-        event_id, ts_ns, trace_index, cpu_id, thread_index, callback AS callback_handle,
-        true AS is_start, coalesce(is_intra_process = 1, false) AS is_intra_process,
-        previous_call_event_id, previous_callback_event_id, previous_executor_event_id
-    FROM raw.ros2_callback_start_apart
+        s.event_id, s.ts_ns, s.trace_index, s.thread_index, s.callback AS callback_handle,
+        true AS is_start, coalesce(s.is_intra_process = 1, false) AS is_intra_process,
+        s.previous_call_event_id, s.previous_callback_event_id, s.previous_executor_event_id
+    FROM raw.ros2_callback_start AS s
+    ANTI JOIN staging.callback_plain AS p ON s.event_id = p.start_event_id
     UNION ALL
     SELECT
-        event_id, ts_ns, trace_index, cpu_id, thread_index, callback, false, false,
-        previous_call_event_id, previous_callback_event_id, NULL
-    FROM raw.ros2_callback_end_apart
+        e.event_id, e.ts_ns, e.trace_index, e.thread_index, e.callback, false, false,
+        e.previous_call_event_id, e.previous_callback_event_id, NULL
+    FROM raw.ros2_callback_end AS e
+    ANTI JOIN staging.callback_plain AS p ON e.event_id = p.end_event_id
 ),
 located AS (
     SELECT e.*, c.thread_id, c.process_id

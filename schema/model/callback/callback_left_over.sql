@@ -9,11 +9,6 @@ WITH RECURSIVE left_over AS (
         0 AS pass, c.event_id, c.thread_id, c.trace_index, c.callback_handle, c.segment,
         c.is_start, c.ts_ns, NULL::BIGINT AS partner_event_id, NULL::BIGINT AS partner_ns
     FROM staging.callback_event AS c
-    ANTI JOIN (
-        SELECT start_event_id AS event_id FROM staging.callback_plain
-        UNION ALL
-        SELECT end_event_id FROM staging.callback_plain
-    ) AS p ON c.event_id = p.event_id
     UNION ALL
     SELECT
         pass, event_id, thread_id, trace_index, callback_handle, segment, is_start, ts_ns,

@@ -1,9 +1,9 @@
 -- name: staging.callback_trigger
--- description: What the executor said directly before callback instances without a known owner:
---     their creation was not traced, and no message or request was ever seen to be for them. It
---     names the handle of what it executes, if that is a timer or a subscription; else it only
---     looks for what is ready. Where something else comes in between, it is neither.
--- grain: one row per such callback instance in the trace of which an executor event precedes it
+-- description: Executor events directly before callback instances without a known owner: the
+--     creation of the callback was not traced, and no message or request was ever seen to be for
+--     it. The executor names the handle that it executes, if that is a timer or a subscription;
+--     else it only looks for what is ready. Where another event comes in between, it is neither.
+-- grain: one row per such callback instance that an executor event precedes in the trace
 WITH unowned AS (
     SELECT start_event_id, process_id, callback_handle, callback_event_id, is_intra_process,
         take_event_id

@@ -1,6 +1,6 @@
 -- name: staging.executor_named
--- description: Executors that name themselves (CARET), and those of which only the address is
---     known, their construction not being traced.
+-- description: Executors that name themselves (CARET). Of some, only the address is known, since
+--     their construction was not traced.
 -- grain: one row per executor
 WITH constructed AS (
     SELECT event_id, process_id, executor_addr, executor_type_name AS kind

@@ -1,5 +1,5 @@
 -- name: staging.loss
--- description: What packets tell of lost ones. A packet counts what was lost since the one before
+-- description: Losses that packets show. A packet counts what was lost since the one before
 --     ended: behind its own last event until it ended, and, since the next packet is opened only
 --     when there is room, between the end of the one before and its begin (only there, if the
 --     packet takes no time); on its CPU only. Lost packets lie between the packets around them, in
@@ -27,8 +27,8 @@ lost_event AS (
     FROM lossy_packet
     WHERE NOT (is_instant AND is_opened_late)
     UNION ALL
-    -- How many of them were lost before the packet was opened, nobody counted, unless no time was
-    -- left for others.
+    -- The counter does not say how many of them were lost before the packet was opened, unless no
+    -- time was left for others.
     SELECT
         trace_id, cpu_id, 'loss', previous_end_ns, begin_ns,
         CASE WHEN is_instant THEN discarded_event_count END

@@ -2,8 +2,8 @@
 -- description: Packets that kernel traces saw being handed to a network device or coming from one.
 --     `key` is equal for the two ends of a packet's way and, as far as its headers allow, for no
 --     other packet: addresses, ports, the identification of the datagram; for TCP the sequence and
---     acknowledgement numbers, for UDP the length. A UDP datagram without identification is told by
---     its checksum. TCP segments count without their length, since a network card cuts or joins
+--     acknowledgement numbers, for UDP the length. The checksum identifies a UDP datagram without
+--     identification. TCP segments count without their length, since a network card cuts or joins
 --     them on the way, and without their checksum, which it fills in: the first of them still is
 --     not received before all were sent. NULL: a later fragment, or nothing tells the packet from
 --     others; what stays on its host (127.0.0.0/8, ::1) does not tell of others.

@@ -2,7 +2,7 @@
 -- description: Subscriptions of ring buffers whose initialisation was not traced: what is taken out
 --     of a buffer is for the callback that directly follows. One callback is one subscription,
 --     which may be known; else it is a placeholder by the first dequeue. Where several callbacks
---     follow on one buffer, or one on several, nobody can tell (NULL).
+--     follow on one buffer, or one on several, the owner is not known (NULL).
 -- grain: one row per process and ring buffer without a known subscription
 WITH dequeue AS (
     SELECT t.start_event_id, t.process_id, t.buffer_handle

@@ -19,4 +19,4 @@ client AS (
 SELECT
     event_id, ts_ns, thread_id, process_id, is_request, handle AS rmw_handle, sequence_number,
     source_timestamp_ns, object_event_id AS client_event_id, is_inferred
-FROM staging.of_endpoint('event', 'client')
+FROM staging.endpoint_event('event', 'client')

@@ -3,7 +3,7 @@
 --     service of the name may take it. Where a client came again with the same GID and numbers,
 --     the response tells which request it was, else the order, if as many were taken by a service
 --     as were sent.
--- grain: one row per request and service that took it, of which both ends were traced
+-- grain: one row per request whose two ends were traced, and service that took it
 WITH sent AS (
     SELECT e.event_id, g.gid, e.sequence_number
     FROM staging.client_event AS e

@@ -2,7 +2,7 @@
 -- description: Responses as they were sent and taken: by the client's GID, its number of the
 --     request, and the stamp; without a stamp on one of the sides, where only one comes into
 --     question. Of equal ones the k-th sent is the k-th taken.
--- grain: one row per response of which both ends were traced
+-- grain: one row per response whose two ends were traced
 WITH sent AS (
     SELECT
         event_id, gid, sequence_number, source_timestamp_ns,

@@ -20,5 +20,5 @@ service AS (
 SELECT
     e.event_id, e.ts_ns, e.thread_id, e.process_id, e.is_request, e.handle AS rmw_handle, g.gid,
     e.sequence_number, e.source_timestamp_ns, e.object_event_id AS service_event_id, e.is_inferred
-FROM staging.of_endpoint('event', 'service') AS e
+FROM staging.endpoint_event('event', 'service') AS e
 LEFT JOIN staging.requester_gid AS g ON e.client_gid = g.client_gid

@@ -1,5 +1,5 @@
--- name: reconcile.left_out_between
--- description: How much was left out of one trace since another one holds it as well.
+-- name: overlap.duplicate_count
+-- description: Counts of the events that are left out of a trace because another one has them.
 -- grain: one row per such pair of traces
 SELECT
     trace_index,
@@ -7,5 +7,5 @@ SELECT
     count(*) AS event_count,
     count(DISTINCT thread) AS thread_count,
     max(ts_ns) - min(ts_ns) AS length_ns
-FROM left_out
+FROM duplicate_event
 GROUP BY trace_index, used_index

@@ -8,15 +8,13 @@ import duckdb
 import pyarrow as pa
 import pytest
 
-from msgflow.db import objects
-from msgflow.ingest import calls, load, model, staging
+from msgflow.ingest import staging
+from msgflow.ingest.raw_tables import RawTables
 
 
 @pytest.fixture
-def con(monkeypatch: pytest.MonkeyPatch) -> duckdb.DuckDBPyConnection:
-    """Tables `a` to `d` of `raw`; 100 rows are enough, 150 are too many."""
-    monkeypatch.setattr(load, "_ROWS_PER_INSERT", 100)
-    monkeypatch.setattr(load, "_MOST_WAITING", 150)
+def con() -> duckdb.DuckDBPyConnection:
+    """Tables `a` to `d` of `raw`."""
     con = duckdb.connect()
     con.execute("ATTACH ':memory:' AS raw")
     for table in "abcd":
@@ -34,8 +32,13 @@ def rows(count: int) -> pa.RecordBatch:
     return pa.record_batch({"n": pa.array(range(count))})
 
 
+def raw_tables(con: duckdb.DuckDBPyConnection) -> RawTables:
+    """Return tables for which 100 rows are enough, and 150 are too many."""
+    return RawTables(con, may_hold=False, may_replace=False, rows_per_insert=100, most_waiting=150)
+
+
 def test_rows_wait_for_more(con: duckdb.DuckDBPyConnection) -> None:
-    tables = load._Tables(con, may_hold=False, may_replace=False)
+    tables = raw_tables(con)
     tables.add("a", rows(60))
     assert counts(con) == [0, 0, 0, 0]
     tables.add("b", rows(60))
@@ -49,7 +52,7 @@ def test_rows_wait_for_more(con: duckdb.DuckDBPyConnection) -> None:
 
 def test_not_too_many_wait(con: duckdb.DuckDBPyConnection) -> None:
     """Those of the table with most of them go first."""
-    tables = load._Tables(con, may_hold=False, may_replace=False)
+    tables = raw_tables(con)
     for table, count in (("a", 40), ("b", 70), ("c", 40), ("d", 1)):
         tables.add(table, rows(count))
     assert counts(con) == [0, 70, 0, 0]
@@ -66,14 +69,3 @@ def test_what_is_staged_is_in_files(tmp_path: Path) -> None:
         ).fetchall()
     assert dict(places)["raw"] == str(tmp_path / "raw.duckdb")
     assert dict(places)["staging"] == str(tmp_path / "staging.duckdb")
-
-
-def test_what_was_read_goes_once_nothing_needs_it() -> None:
-    """Only what is not evaluated before it is stored stays until then."""
-    headers = objects.load("model")
-    left = model._raw_tables() - model._finished(headers, len(headers) - 1)
-    states = ("get_next_ready", "wait_for_work", "execute")
-    assert left == {
-        *(f"raw.ros2_rclcpp_executor_{state}" for state in states),
-        *(f"raw.{call.table}" for call in calls.CALLS),
-    }

@@ -1,48 +1,17 @@
-"""What a run and its hosts are called."""
+"""Hostnames that the user gives to traces, by the paths above them."""
 
 from __future__ import annotations
 
-import itertools
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
-from msgflow.run.choice import is_run_name
-from msgflow.trace import archive
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import duckdb
-
     from msgflow.trace import TraceInfo
-
-
-def fallback_name(paths: Sequence[str | Path]) -> str:
-    """Return what a run is called for which no name is given: like the first of its paths."""
-    name = archive.stem(Path(os.path.realpath(paths[0])))
-    return name if is_run_name(name) else f"run-{name}".rstrip("-")
-
-
-def require_free_name(con: duckdb.DuckDBPyConnection, name: str) -> None:
-    """Raise a `UsageError` if a run of the database has that name."""
-    if name in _names(con):
-        raise UsageError(
-            f"the database has a run of that name already — {name}",
-            "give another --name, or --replace",
-        )
-
-
-def free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
-    """Return the name, with a number behind it if a run of the database has it."""
-    taken = _names(con)
-    candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
-    return next(candidate for candidate in candidates if candidate not in taken)
-
-
-def _names(con: duckdb.DuckDBPyConnection) -> set[str]:
-    return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
 
 
 def hostnames_of(

@@ -23,7 +23,7 @@ CREATE TABLE store.callback_instance (run_id BIGINT, callback_instance_id BIGINT
 def test_the_length_of_a_stretch_decides_nothing(seed: int, length: int) -> None:
     """Whatever it is, the callback that began last before the attempt counts."""
     chance = random.Random(seed)
-    with derived(STAGE, ("stretch", "vain_take")) as con:
+    with derived(STAGE, ("stretch", "empty_take")) as con:
         con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
         callbacks = [
             (thread, start, None if chance.random() < 0.3 else start + chance.randrange(5))
@@ -33,7 +33,7 @@ def test_the_length_of_a_stretch_decides_nothing(seed: int, length: int) -> None
         attempts = [(chance.choice([1, 2, 3]), at) for at in chance.sample(range(510), 50)]
         fill(con, callbacks, attempts)
         found = con.execute(
-            "SELECT thread_id, failed_ns FROM derive.vain_take ORDER BY ALL"
+            "SELECT thread_id, failed_ns FROM derive.empty_take ORDER BY ALL"
         ).fetchall()
     assert 15 < len(found) < 45
     assert found == sorted(each for each in attempts if is_outside(callbacks, *each))

@@ -1,4 +1,4 @@
-"""Refuses traces that cannot tell anything about a ROS 2 system, and says why."""
+"""Refusals of traces that say nothing about a ROS 2 system, with the reason."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SHOWN = 5
 def require_ros_traces(traces: Sequence[TraceInfo]) -> None:
     """Raise unless the traces declare ROS 2 events with the contexts that msgflow needs.
 
-    Judges what the metadata declares, before anything is read.
+    Only the metadata counts: no event has been read yet.
 
     Raises:
         TraceError: there are only kernel traces, no ROS 2 events, or no process context.
@@ -60,7 +60,7 @@ def require_ros_events(
     """Raise unless at least one event that msgflow knows was read.
 
     Raises:
-        TraceError: it says what occurred instead.
+        TraceError: the message lists the events that occurred instead.
     """
     total: Counter[str] = Counter()
     for (_, name), count in counts.items():

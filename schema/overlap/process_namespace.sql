@@ -1,6 +1,7 @@
--- name: reconcile.told_namespace
+-- name: overlap.process_namespace
 -- kind: inline
--- description: Processes whose PID namespace only some traces tell, and always the same one.
+-- description: PID namespaces of processes that some traces of a host know and others do not. The
+--     traces that know it agree.
 -- grain: one row per process
 SELECT s.host, r.vpid, any_value(r.pid_ns) AS pid_ns
 FROM raw.thread AS r

@@ -1,8 +1,8 @@
--- name: reconcile.left_out
+-- name: overlap.duplicate_event
 -- kind: inline
--- description: Of the sessions that recorded a tracepoint on a thread that with most events of the
---     thread is used, and of the others what it does not have. `thread_event` are the events of
---     threads.
+-- description: Events to leave out because another session recorded them as well. Of the sessions
+--     that recorded a tracepoint on a thread, the one with most events of the thread counts; the
+--     others keep what lies outside of its time. `thread_event` has the events of all threads.
 -- grain: one row per event that is left out
 WITH thread AS (
     SELECT
@@ -12,14 +12,14 @@ WITH thread AS (
         ) AS thread
     FROM raw.thread AS r
     JOIN session_trace AS s ON r.trace_index = s.trace_index
-    LEFT JOIN told_namespace AS n ON s.host = n.host AND r.vpid = n.vpid
+    LEFT JOIN process_namespace AS n ON s.host = n.host AND r.vpid = n.vpid
 ),
 placed AS (
     SELECT e.event_id, e.tracepoint, e.ts_ns, e.cpu_id, e.trace_index, s.session, t.thread
     FROM thread_event AS e
     JOIN session_trace AS s ON e.trace_index = s.trace_index
     JOIN thread AS t ON e.thread_index = t.thread_index
-    WHERE s.session IN (SELECT left_session FROM overlap)
+    WHERE s.session IN (SELECT left_session FROM overlap_window)
 ),
 recorded AS (
     SELECT
@@ -48,7 +48,7 @@ SELECT
 FROM placed AS p
 JOIN preferred AS f
     ON p.thread = f.thread AND p.tracepoint = f.tracepoint AND p.session = f.left_session
-JOIN overlap AS o
+JOIN overlap_window AS o
     ON f.left_session = o.left_session
     AND f.used_session = o.used_session
     AND p.cpu_id IS NOT DISTINCT FROM o.cpu_id

@@ -1,7 +1,8 @@
--- name: derive.vain_take
--- description: Attempts of readers that were told of a message and found none: it had expired. An
---     attempt says nothing if a callback takes by hand, only to look whether there is a message;
---     nor behind a callback that was never seen to end, as the attempt may be inside of it.
+-- name: derive.empty_take
+-- description: Attempts to take a message that had expired: the reader was woken for it and found
+--     none. Attempts inside of callbacks do not count, since a callback may take by hand to look
+--     whether there is a message. Nor do those behind a callback that was never seen to end, since
+--     they may be inside of it.
 -- grain: one row per attempt outside of callbacks
 WITH tried AS (
     SELECT DISTINCT thread_id, derive.stretch(failed_ns) AS stretch FROM store.failed_take

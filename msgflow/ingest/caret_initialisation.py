@@ -1,8 +1,8 @@
-"""Initialisation that CARET reports again when a recording starts late.
+"""Initialisation events that CARET reports again when a recording starts late.
 
-Such an event says what was initialised before; its own time is only that of the report. It takes
-the place of the event that was not recorded: before all others, in the order in which the objects
-were really initialised.
+Such an event tells of an object that was initialised before the recording. Its own time is only
+that of the report. It replaces the event that was not recorded: it comes before all recorded
+events, in the order in which the objects were initialised.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _FIRST = "ros2:"
 # A context that is reported again starts no new life of its process.
 _LEFT_OUT = {"ros2_caret:rcl_init"}
 
-# Event ids of what came before the recording: below all that readers give.
+# Ids of events from before the recording: below all ids that readers give.
 _BEFORE = -(1 << 61)
 
 _LEADING = ("ts_ns", "trace_index", "cpu_id", "thread_index")
 
 
 def restore(con: duckdb.DuckDBPyConnection) -> None:
-    """Add what was reported again to `raw`, except what was recorded when it happened."""
+    """Add the events that were reported again to `raw`, unless the originals were recorded."""
     reported = _reported()
     if not any(con.execute(f"SELECT 1 FROM raw.{r.table} LIMIT 1").fetchall() for r, _ in reported):
         return

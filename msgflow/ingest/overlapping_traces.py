@@ -1,10 +1,9 @@
-"""What the traces of one host tell twice, or differently, and how that is put right.
+"""Overlapping traces: corrections of events that two traces of a host hold.
 
-Two sessions that record the same events at the same time each write every event, with time stamps
-of their own. Which events are in the record twice shows only when all of them have been read: the
-traces are read again then, without the copies, so that what precedes an event on its thread is
-what happened before it. So it is where only some traces of a host say in which PID namespace a
-process is.
+Two sessions may record one process at the same time. Which events are there twice shows only when
+all have been read. The traces are then read again, without the copies, so that the predecessor of
+an event on its thread is what really happened before it. The same is done where only some traces of
+a host know the PID namespace of a process.
 """
 
 from __future__ import annotations
@@ -30,41 +29,41 @@ if TYPE_CHECKING:
 # By how much the two records of one event may be apart [ns], at the ends of a recording.
 _SLACK_NS = 100_000
 
-# Tables that are made of each other, in this order, and gone in the end.
-_TABLES = ("session_trace", "told_namespace")
-_TABLES_OF_OVERLAP = ("coverage", "overlap")
+# Temporary tables, each made from those before it.
+_TABLES = ("session_trace", "process_namespace")
+_OVERLAP_TABLES = ("coverage", "overlap_window")
 
 
 @dataclass(frozen=True)
 class Corrections:
-    """What to change of the events of a reader.
+    """Corrections of the events of a reader.
 
     Attributes:
-        left_out: ids of events that another trace holds as well, in order.
+        duplicates: ids of events that another trace holds as well, in order.
         processes: (host, pid) of the processes whose PID namespace is filled in where it is
             missing, as one number each, in order.
         namespaces: the PID namespace of each.
         hosts: trace index -> a number that traces of the same host share.
     """
 
-    left_out: NDArray[np.int64]
+    duplicates: NDArray[np.int64]
     processes: NDArray[np.int64]
     namespaces: NDArray[np.int64]
     hosts: NDArray[np.int64]
 
     def __bool__(self) -> bool:
-        return bool(self.left_out.size or self.processes.size)
+        return bool(self.duplicates.size or self.processes.size)
 
     def applied(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        """Return the events of a batch as they should be; there may be none left."""
-        if self.left_out.size:
+        """Return the corrected events of a batch, perhaps none."""
+        if self.duplicates.size:
             batch = self._without_copies(batch)
         if self.processes.size and batch["pid_ns"].null_count:
             batch = self._with_namespaces(batch)
         return batch
 
     def _without_copies(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        is_copy = _are_among(to_numpy(batch["event_id"]), self.left_out)[0]
+        is_copy = _are_among(to_numpy(batch["event_id"]), self.duplicates)[0]
         return batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
 
     def _with_namespaces(self, batch: pa.RecordBatch) -> pa.RecordBatch:
@@ -76,52 +75,56 @@ class Corrections:
         return batch.set_column(batch.schema.get_field_index("pid_ns"), "pid_ns", column)
 
 
-def find(con: duckdb.DuckDBPyConnection) -> Corrections:
-    """Look for what has to be put right in what was read into `raw`.
+def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
+    """Return how the events in `raw` have to be corrected, and fill `staging.left_out`.
 
     Args:
-        con: connection with `raw` and `staging` attached and filled; `staging.left_out` is filled.
+        con: connection with `raw` and `staging` attached and filled.
     """
     for table in _TABLES:
         _make(con, table)
-    told = con.execute("SELECT host, vpid, pid_ns FROM told_namespace").fetchnumpy()
+    known = con.execute("SELECT host, vpid, pid_ns FROM process_namespace").fetchnumpy()
     traces = con.execute(
         "SELECT host, session FROM session_trace ORDER BY trace_index"
     ).fetchnumpy()
-    # What is in the record twice, two sessions have recorded.
-    left_out = _left_out(con) if distinct(traces["session"]).size > 1 else np.empty(0, np.int64)
+    # One session records no event twice.
+    has_sessions = distinct(traces["session"]).size > 1
+    duplicates = _duplicates(con) if has_sessions else np.empty(0, np.int64)
     for table in _TABLES:
         con.execute(f"DROP TABLE {table}")
-    processes = _process(told["host"], told["vpid"])
+    processes = _process(known["host"], known["vpid"])
     order = np.argsort(processes)
     return Corrections(
-        left_out,
+        duplicates,
         processes[order],
-        np.asarray(told["pid_ns"], np.int64)[order],
+        np.asarray(known["pid_ns"], np.int64)[order],
         np.asarray(traces["host"], np.int64),
     )
 
 
-def _left_out(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
-    """Return the ids of events that another trace holds as well, in order, and say where."""
+def _duplicates(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
+    """Return the ids of events that another trace holds as well, in order.
+
+    Their counts go to `staging.left_out`.
+    """
     event_ids = np.empty(0, np.int64)
-    for table in _TABLES_OF_OVERLAP:
+    for table in _OVERLAP_TABLES:
         _make(con, table)
-    if con.execute("SELECT 1 FROM overlap LIMIT 1").fetchall():
+    if con.execute("SELECT 1 FROM overlap_window LIMIT 1").fetchall():
         con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
-        _make(con, "left_out")
+        _make(con, "duplicate_event")
         con.execute("DROP VIEW thread_event")
-        con.execute("INSERT INTO staging.left_out\n" + statements().header("left_out_between").body)
-        found = con.execute("SELECT event_id FROM left_out ORDER BY ALL").fetchnumpy()
+        con.execute("INSERT INTO staging.left_out\n" + statements().header("duplicate_count").body)
+        found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
         event_ids = np.asarray(found["event_id"], np.int64)
-        con.execute("DROP TABLE left_out")
-    for table in _TABLES_OF_OVERLAP:
+        con.execute("DROP TABLE duplicate_event")
+    for table in _OVERLAP_TABLES:
         con.execute(f"DROP TABLE {table}")
     return event_ids
 
 
 def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:
-    """Make a temporary table as `schema/reconcile` has it."""
+    """Make a temporary table as `schema/overlap` has it."""
     header = statements().header(table)
     values = {"slack_ns": _SLACK_NS} if header.params else {}
     con.execute(f"CREATE OR REPLACE TEMP TABLE {table} AS\n{header.body}", values)
@@ -129,8 +132,8 @@ def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:
 
 @cache
 def statements() -> Statements:
-    """Return what is asked about what traces tell twice."""
-    return Statements(resource_directory("schema") / "reconcile")
+    """Return the statements about overlapping traces."""
+    return Statements(resource_directory("schema") / "overlap")
 
 
 def _events() -> str:
@@ -150,6 +153,6 @@ def _process(
 def _are_among(
     values: NDArray[np.int64], known: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
-    """Return which values are among the known ones, which are in order, and where."""
+    """Return which values are among the sorted `known` ones, and their places there."""
     places = np.minimum(np.searchsorted(known, values), known.size - 1)
     return known[places] == values, places

@@ -1,7 +1,6 @@
--- name: reconcile.session_trace
+-- name: overlap.session_trace
 -- kind: inline
--- description: Which host each trace is of, and which session of that host. A session is all traces
---     of one uuid.
+-- description: Host of each trace, and session on that host. A session is all traces of one uuid.
 -- grain: one row per trace
 SELECT
     trace_index,

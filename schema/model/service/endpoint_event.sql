@@ -1,11 +1,11 @@
--- name: staging.of_endpoint
+-- name: staging.endpoint_event
 -- kind: macro
 -- description: What clients, or services, sent and took, each with its client or service: the one
 --     of that handle initialised last before, else a placeholder by the first use of the handle.
 --     Both are the names of tables: events as recorded, with the rmw `handle` they are of, and the
 --     initialised objects.
 -- grain: one row per event
-CREATE OR REPLACE MACRO staging.of_endpoint(events, objects) AS TABLE
+CREATE OR REPLACE MACRO staging.endpoint_event(events, objects) AS TABLE
 WITH located AS NOT MATERIALIZED (
     SELECT e.*, c.thread_id, c.process_id
     FROM query_table(events) AS e

@@ -1,6 +1,6 @@
--- name: reconcile.coverage
+-- name: overlap.coverage
 -- kind: inline
--- description: From when to when a session recorded on each CPU.
+-- description: The time in which a session recorded each CPU.
 -- grain: one row per session and CPU
 SELECT
     s.host,

@@ -1,8 +1,8 @@
--- name: reconcile.overlap
+-- name: overlap.overlap_window
 -- kind: inline
--- description: When a session recorded what another one recorded, too.
+-- description: Times in which two sessions recorded the same CPU.
 -- grain: one row per pair of sessions and CPU
--- param: slack_ns BIGINT  By how much the two records of one event may be apart
+-- param: slack_ns BIGINT  Most time between the two records of one event
 SELECT
     a.session AS left_session,
     b.session AS used_session,

@@ -1,0 +1,120 @@
+"""Tables of `raw`: rows wait here until there are enough of them to insert."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.ingest.catalogue import load
+from msgflow.sql.statement import program
+from msgflow.trace import PACKET
+
+if TYPE_CHECKING:
+    import duckdb
+    import pyarrow as pa
+
+    from msgflow.ingest.sequences import Placed
+
+# Rows that wait for a commit take memory that nothing limits.
+_ROWS_PER_TRANSACTION = 2_000_000
+# A row group of DuckDB: fewer rows at once cost more each.
+ROWS_PER_INSERT = 122_880
+# Rows of all tables that wait for an insert.
+MOST_WAITING = 500_000
+
+
+class RawTables:
+    """The tables of `raw`, filled inside a transaction that is committed now and then.
+
+    Rows wait until there are enough of them, or `flush` is called.
+
+    Attributes:
+        replaced: ids of the runs that hold some of the packets added already.
+    """
+
+    def __init__(
+        self,
+        con: duckdb.DuckDBPyConnection,
+        *,
+        may_hold: bool,
+        may_replace: bool,
+        rows_per_insert: int = ROWS_PER_INSERT,
+        most_waiting: int = MOST_WAITING,
+    ) -> None:
+        """Start with nothing waiting, inside an open transaction.
+
+        Args:
+            con: connection with `raw` attached.
+            may_hold: the current database may hold some of these packets already.
+            may_replace: packets that the database holds already are no error.
+            rows_per_insert: rows of a table that are inserted at once.
+            most_waiting: rows of all tables that may wait.
+        """
+        self._con = con
+        self._rows_per_insert = rows_per_insert
+        self._most_waiting = most_waiting
+        self._may_hold = may_hold
+        self._may_replace = may_replace
+        self._waiting: dict[str, list[pa.RecordBatch]] = {}
+        self._counts: dict[str, int] = {}
+        self._uncommitted = 0
+        self.replaced: set[int] = set()
+
+    def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:
+        """Add the events of a round, or (table, rows).
+
+        Raises:
+            UsageError: the database holds these packets already, and must not replace them.
+        """
+        if isinstance(item, tuple):
+            self.add(*item)
+            return
+        self.add("thread", item.threads)
+        self.add("thread_name", item.thread_names)
+        tracepoints = load().tracepoints
+        for name, rows in item.batches:
+            self.add(tracepoints[name].table, rows)
+
+    def add(self, table: str, rows: pa.RecordBatch) -> None:
+        """Add rows to a table.
+
+        Raises:
+            UsageError: the database holds these packets already, and must not replace them.
+        """
+        if table == PACKET and self._may_hold:
+            self.replaced |= self._same_packets(rows)
+        self._waiting.setdefault(table, []).append(rows)
+        self._counts[table] = self._counts.get(table, 0) + rows.num_rows
+        if self._counts[table] >= self._rows_per_insert:
+            self._insert(table)
+        elif sum(self._counts.values()) > self._most_waiting:
+            self._insert(max(self._counts, key=self._counts.__getitem__))
+
+    def flush(self) -> None:
+        """Insert what waits."""
+        for table in list(self._waiting):
+            self._insert(table)
+
+    def _insert(self, table: str) -> None:
+        import pyarrow as pa
+
+        rows = pa.Table.from_batches(self._waiting.pop(table))
+        self._con.from_arrow(rows).insert_into(f"raw.main.{table}")
+        self._uncommitted += self._counts.pop(table)
+        if self._uncommitted >= _ROWS_PER_TRANSACTION:
+            self._con.commit()
+            self._con.begin()
+            self._uncommitted = 0
+
+    def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
+        self._con.register("packet_batch", rows)
+        try:
+            runs = self._con.execute(program().text("known_packet")).fetchall()
+        finally:
+            self._con.unregister("packet_batch")
+        if runs and not self._may_replace:
+            raise UsageError(
+                f"these packets are in the database already — run {runs[0][1]} ({runs[0][0]})",
+                "give --replace to read them again in place of that run",
+            )
+        return {run_id for run_id, _ in runs}

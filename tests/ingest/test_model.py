@@ -1,0 +1,125 @@
+"""The model of a run: objects that need not be planned, and failures while it is built."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pytest
+
+from msgflow import trace
+from msgflow.db import objects
+from msgflow.errors import DatabaseError
+from msgflow.ingest import ingest, model, staging
+from msgflow.ingest.load import load_traces
+from msgflow.sim import Recording, simulate
+from msgflow.sql.interrupt import Interrupts
+
+SOMETIMES_EMPTY = [header for header in objects.load("model") if header.when]
+S = 1_000_000_000
+
+
+@pytest.fixture(scope="module")
+def lossy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A trace with lost events and a pause."""
+    recording = Recording(lost_event_share=0.2, pauses=((S // 4, S // 2),))
+    return simulate(
+        "pipeline", tmp_path_factory.mktemp("trace") / "trace", factor=0.1, recording=recording
+    ).directory
+
+
+def read(con: duckdb.DuckDBPyConnection, path: Path) -> None:
+    """Read a trace into `raw` and `staging`."""
+    staging.attach(con, None)
+    with trace.open([path]) as traces:
+        load_traces(
+            con, traces, hostnames={}, ignore=(), may_hold=False, replace=False,
+            interrupts=Interrupts(), progress=None,
+        )  # fmt: skip
+
+
+def built(path: Path, emptied: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Build the whole model, nothing skipped, and return (columns, count) of each `when` object.
+
+    Tables of `emptied` lose their rows before anything reads them.
+    """
+    with duckdb.connect() as con:
+        read(con, path)
+        staging.narrow(con, staging.empty_tables(con))
+        for name in emptied:
+            if name.startswith("raw."):
+                con.execute(f"DELETE FROM {name}")
+        for header in objects.load("model"):
+            model.create(con, header, set())
+            if header.name in emptied:
+                con.execute(f"DELETE FROM {header.name}")
+        return {
+            header.name: (
+                con.execute(
+                    f"SELECT column_name, column_type FROM (DESCRIBE {header.name})"
+                ).fetchall(),
+                con.execute(f"SELECT count(*) FROM {header.name}").fetchall()[0][0],
+            )
+            for header in SOMETIMES_EMPTY
+        }
+
+
+@pytest.fixture(scope="module")
+def planned(lossy: Path) -> dict[str, Any]:
+    return built(lossy)
+
+
+def test_objects_have_no_row_without_the_tables_of_their_when(
+    lossy: Path, planned: dict[str, Any]
+) -> None:
+    assert len(SOMETIMES_EMPTY) >= 3
+    for header in SOMETIMES_EMPTY:
+        columns, count = planned[header.name]
+        assert count > 0, header.name
+        assert built(lossy, header.when)[header.name] == (columns, 0)
+
+
+def test_an_object_without_a_row_has_its_columns_all_the_same(planned: dict[str, Any]) -> None:
+    with duckdb.connect() as con:
+        con.execute("ATTACH ':memory:' AS staging")
+        for header in SOMETIMES_EMPTY:
+            empty = set(header.when)
+            model.create(con, header, empty)
+            assert header.name in empty
+            columns = con.execute(
+                f"SELECT column_name, column_type FROM (DESCRIBE {header.name})"
+            ).fetchall()
+            assert columns == planned[header.name][0], header.name
+
+
+def test_what_was_read_is_dropped_once_nothing_needs_it(lossy: Path) -> None:
+    """Only what is not evaluated before it is stored stays until then."""
+    with duckdb.connect() as con:
+        read(con, lossy)
+        before = tables_with_rows(con)
+        model.build(con)
+        after = tables_with_rows(con)
+    assert len(before) > 20
+    states = ("get_next_ready", "wait_for_work", "execute")
+    assert after == {"packet", "thread", "thread_name"} | {
+        f"ros2_rclcpp_executor_{state}" for state in states
+    }
+
+
+def tables_with_rows(con: duckdb.DuckDBPyConnection) -> set[str]:
+    rows = con.execute(
+        "SELECT table_name FROM duckdb_tables() WHERE database_name = 'raw' AND estimated_size > 0"
+    ).fetchall()
+    return {name for (name,) in rows}
+
+
+def test_a_full_disk_is_said_at_once(
+    lossy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill(*args: Any) -> None:
+        raise duckdb.OutOfMemoryException("failed to offload data block (max_temp_directory_size)")
+
+    monkeypatch.setattr(model, "create", fill)
+    with pytest.raises(DatabaseError, match="no space left"):
+        ingest([lossy], tmp_path / "new.duckdb")
