@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msgflow.cli.completion import complete, is_completing
+from msgflow.cli.completion import complete
 from msgflow.query.names import PLACE_PARAMETERS
 
 if TYPE_CHECKING:
@@ -75,8 +75,6 @@ def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
 
 def escape(text: str) -> str:
     """Return a text that Rich prints as it is."""
-    if is_completing():
-        return text
     from rich import markup
 
     return markup.escape(text)

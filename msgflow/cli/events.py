@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from msgflow.cli.ingest import Reader
-from msgflow.cli.options import OUTPUT, SELECTION
+from msgflow.cli.options import OUTPUT, SELECTION, path_of
 from msgflow.errors import UsageError
 from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
 from msgflow.export.formats import Format
@@ -79,6 +79,7 @@ def command(
             "-o",
             "--output",
             metavar="PATH",
+            parser=path_of,
             help="File to write or replace; or, for CSV and Parquet, a new directory (a name"
             " without suffix) that gets one file per event name, with a column per field",
             show_default="stdout",

@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     SELECTION,
     DatabaseOption,
     MemoryLimitOption,
+    path_of,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
@@ -124,6 +125,7 @@ def perfetto(
             "-o",
             "--output",
             metavar="FILE",
+            parser=path_of,
             help="File to write or replace",
             rich_help_panel=OUTPUT,
         ),

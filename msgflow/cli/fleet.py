@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,6 +83,7 @@ def ingest(
         typer.Option(
             "--scratch",
             metavar="DIR",
+            parser=os.path.expanduser,
             help="Folder of each worker for what it needs meanwhile",
             show_default="that of the system",
         ),

@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     LakeWhereOption,
     OutputOption,
     WideOption,
+    path_of,
 )
 from msgflow.cli.sql import (
     DEFAULT_LIMIT,
@@ -205,6 +206,7 @@ def open_(
             "-o",
             "--output",
             metavar="FILE",
+            parser=path_of,
             help="New database file; one that exists is not replaced",
             show_default="RUN.duckdb",
         ),

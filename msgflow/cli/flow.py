@@ -18,6 +18,7 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     OutputOption,
     RunOption,
+    path_of,
 )
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
@@ -145,6 +146,7 @@ def command(
         typer.Option(
             "--html",
             metavar="FILE.html",
+            parser=path_of,
             help="Write its timeline to one file for any browser, and print nothing",
             rich_help_panel=OUTPUT,
         ),
@@ -159,7 +161,6 @@ def command(
 
     Times count from the first line. NA means that the trace does not show it.
     """
-    from msgflow.cli.meanwhile import ARROW, import_meanwhile
     from msgflow.cli.output import print_note, print_runs, print_status, print_text
     from msgflow.database import Database
     from msgflow.export.formats import by_suffix
@@ -174,7 +175,6 @@ def command(
         raise UsageError("--from and --to choose among the slowest flows", "--slowest 1")
     if slowest is not None and slowest > 1 and (html is not None or form is FlowFormat.JSON):
         raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
-    import_meanwhile(ARROW)
     with Database(database, memory_limit=memory_limit) as opened:
         starts: dict[str, Any] = {
             "topic": topic,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption
+from msgflow.cli.options import DatabaseOption, path_of
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.sql.interrupt import noted_interrupts
@@ -53,18 +54,24 @@ def command(
     keep_staging: Annotated[
         Path | None,
         typer.Option(
-            "--keep-staging", metavar="DIR", help="Keep the raw events, as Parquet files in DIR"
+            "--keep-staging",
+            metavar="DIR",
+            parser=path_of,
+            help="Keep the raw events, as Parquet files in DIR",
         ),
     ] = None,
     links: Annotated[
         Path | None,
-        typer.Option("--links", metavar="FILE", help="Indirect links to declare, as YAML"),
+        typer.Option(
+            "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
+        ),
     ] = None,
     clock_sync: Annotated[
         str,
         typer.Option(
             "--clock-sync",
             metavar="none|messages|FILE",
+            parser=os.path.expanduser,
             help="Synchronise the clocks of several hosts: by their messages (and the network"
             " packets of kernel traces), or by offsets in a file",
         ),
@@ -149,5 +156,5 @@ def _hosts(texts: list[str]) -> dict[str, list[str]]:
         name, separator, path = text.partition("=")
         if not (name and separator and path):
             raise UsageError(f"--host takes NAME=PATH — {text}", "--host robot=traces/robot")
-        hosts.setdefault(name, []).append(path)
+        hosts.setdefault(name, []).append(os.path.expanduser(path))
     return hosts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -14,9 +15,15 @@ from msgflow.query.times import Times
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
 
+
+def path_of(text: str | Path) -> Path:
+    """Return the path of an option; no shell replaces the `~` of `--db=~/x`."""
+    return Path(os.path.expanduser(text))
+
+
 DatabaseOption = Annotated[
     Path,
-    typer.Option("--db", envvar="MSGFLOW_DB", metavar="FILE", help="Database file"),
+    typer.Option("--db", envvar="MSGFLOW_DB", metavar="FILE", parser=path_of, help="Database file"),
 ]
 MemoryLimitOption = Annotated[
     str | None,
@@ -91,6 +98,7 @@ OutputOption = Annotated[
         "-o",
         "--output",
         metavar="FILE",
+        parser=path_of,
         help="File to write or replace",
         show_default="stdout",
         rich_help_panel=OUTPUT,
@@ -102,6 +110,7 @@ LakeOption = Annotated[
         "--lake",
         envvar="MSGFLOW_LAKE",
         metavar="PATH|s3://BUCKET/PREFIX",
+        parser=os.path.expanduser,
         help="The lake: a folder or a bucket",
     ),
 ]
@@ -122,6 +131,7 @@ LakePageOption = Annotated[
     typer.Option(
         "--lake",
         metavar="PATH|s3://BUCKET/PREFIX",
+        parser=os.path.expanduser,
         help="A lake, in place of a database: paths of its runs by label over time",
     ),
 ]

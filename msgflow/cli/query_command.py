@@ -131,7 +131,6 @@ def build_command(header: Header) -> Any:
 
 
 def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
-    from msgflow.cli.meanwhile import ARROW, import_meanwhile
     from msgflow.cli.output import print_result
     from msgflow.database import Database
     from msgflow.export.formats import Format, format_of
@@ -143,7 +142,6 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
             "tables for people have times with their units — --times",
             "--format csv, json, jsonl or parquet, or a file with such a suffix",
         )
-    import_meanwhile(ARROW)
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:
         result = database.query(
             header.name,

