@@ -106,7 +106,7 @@ def _imported(name: str) -> Any:
     around = typer.Typer(add_completion=False)
     around.callback()(lambda: None)
     if hasattr(module, "app"):
-        around.add_typer(module.app, name=name)
+        around.add_typer(module.app, name=name, help=COMMANDS[name])
     else:
         around.command(name)(module.command)
     return typer.main.get_group(around).commands[name]

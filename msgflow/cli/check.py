@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import OUTPUT, DatabaseOption, MemoryLimitOption, RunOption
+from msgflow.cli.options import DatabaseOption, MemoryLimitOption, RunOption, format_option
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
@@ -34,9 +34,7 @@ class CheckFormat(StrEnum):
 
 def command(
     run: RunOption = None,
-    form: Annotated[
-        CheckFormat, typer.Option("--format", help="How to write it", rich_help_panel=OUTPUT)
-    ] = CheckFormat.TABLE,
+    form: Annotated[CheckFormat, format_option("How to write it")] = CheckFormat.TABLE,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:

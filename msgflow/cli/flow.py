@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.declared import declared
+from msgflow.cli.header_options import header_option
 from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
@@ -18,6 +18,7 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     OutputOption,
     RunOption,
+    format_option,
     path_of,
 )
 from msgflow.default_files import DEFAULT_DATABASE
@@ -119,9 +120,9 @@ def command(
         ),
     ] = None,
     run: RunOption = None,
-    direction: Annotated[str | None, declared(_DECLARED["direction"], SELECTION)] = None,
-    depth: Annotated[str | None, declared(_DECLARED["depth"], SELECTION)] = None,
-    limit: Annotated[str | None, declared(_DECLARED["limit"], SELECTION)] = None,
+    direction: Annotated[str | None, header_option(_DECLARED["direction"], SELECTION)] = None,
+    depth: Annotated[str | None, header_option(_DECLARED["depth"], SELECTION)] = None,
+    limit: Annotated[str | None, header_option(_DECLARED["limit"], SELECTION)] = None,
     internal: InternalOption = False,
     absolute: Annotated[
         bool,
@@ -133,11 +134,8 @@ def command(
     ] = False,
     form: Annotated[
         FlowFormat | None,
-        typer.Option(
-            "--format",
-            help="A tree, or nodes and edges",
-            show_default="by the suffix of FILE, else table",
-            rich_help_panel=OUTPUT,
+        format_option(
+            "A tree, or nodes and edges", show_default="by the suffix of FILE, else table"
         ),
     ] = None,
     output: OutputOption = None,

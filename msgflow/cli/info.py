@@ -6,9 +6,7 @@ import json
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from msgflow.cli.options import OUTPUT, DatabaseOption, InternalOption, RunOption, WideOption
+from msgflow.cli.options import DatabaseOption, InternalOption, RunOption, WideOption, format_option
 from msgflow.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
@@ -31,9 +29,7 @@ class InfoFormat(StrEnum):
 def command(
     run: RunOption = None,
     internal: InternalOption = False,
-    form: Annotated[
-        InfoFormat, typer.Option("--format", help="Output format", rich_help_panel=OUTPUT)
-    ] = InfoFormat.TABLE,
+    form: Annotated[InfoFormat, format_option("Output format")] = InfoFormat.TABLE,
     wide: WideOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import os
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, path_of
+from msgflow.cli.options import (
+    DatabaseOption,
+    Reader,
+    ReaderOption,
+    memory_limit_option,
+    path_of,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.sql.interrupt import noted_interrupts
 
 if TYPE_CHECKING:
     from msgflow.ingest import IngestReport
-
-
-class Reader(StrEnum):
-    """What decodes the traces."""
-
-    AUTO = "auto"
-    MSGFLOW = "msgflow"
-    BT2 = "bt2"
 
 
 def command(
@@ -76,9 +73,7 @@ def command(
             " packets of kernel traces), or by offsets in a file",
         ),
     ] = "none",
-    reader: Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")] = (
-        Reader.AUTO
-    ),
+    reader: ReaderOption = Reader.AUTO,
     strict: Annotated[
         bool,
         typer.Option("--strict", help="Refuse damaged traces instead of keeping what can be read"),
@@ -93,12 +88,8 @@ def command(
     ] = None,
     memory_limit: Annotated[
         str | None,
-        typer.Option(
-            "--memory-limit",
-            envvar="MSGFLOW_MEMORY_LIMIT",
-            metavar="SIZE",
-            help="Maximum memory for the database, such as 2GB; more makes large traces faster",
-            show_default="a quarter of the machine's, 500MB to 4GB",
+        memory_limit_option(
+            "Maximum memory for the database, such as 2GB; more makes large traces faster"
         ),
     ] = None,
     quiet: Annotated[

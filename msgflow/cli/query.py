@@ -35,11 +35,7 @@ class QueryGroup(TyperGroup):
         return name, title and build_command(load_query(str(name))), rest
 
 
-app = typer.Typer(
-    cls=QueryGroup,
-    subcommand_metavar="[NAME] [OPTIONS]",
-    help="Run a named query; `msgflow query NAME --help` explains it.",
-)
+app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
 
 
 @app.callback(invoke_without_command=True)

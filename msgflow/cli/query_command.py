@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from msgflow.cli.declared import escape, given_of, parameter
+from msgflow.cli.header_options import escape, given_of, header_parameter
 from msgflow.cli.options import (
     OUTPUT,
     ColumnsOption,
@@ -20,7 +20,7 @@ from msgflow.cli.options import (
     TimesOption,
     WideOption,
 )
-from msgflow.cli.selecting import selecting_options
+from msgflow.cli.row_options import row_options
 from msgflow.cli.show.layout import MOST_ROWS
 from msgflow.cli.slice_options import SLICE_OPTIONS
 from msgflow.default_files import DEFAULT_DATABASE
@@ -97,11 +97,11 @@ def build_command(header: Header) -> Any:
         _run(header, own, given)
 
     own_names = {param.name for param in header.params}
-    parameters = [parameter(param) for param in header.params]
+    parameters = [header_parameter(param) for param in header.params]
     for name, annotation, default in (
         *(
             (name, annotation, None)
-            for name, annotation in selecting_options(header).items()
+            for name, annotation in row_options(header).items()
             if name not in own_names
         ),
         *((name, annotation, None) for name, annotation in SLICE_OPTIONS.items()),

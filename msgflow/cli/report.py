@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,8 @@ from msgflow.cli.options import (
     LakeWhereOption,
     MemoryLimitOption,
     RunOption,
-    path_of,
+    bytes_of,
+    output_option,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
@@ -24,25 +24,13 @@ from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 
-_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(B|kB|KB|MB|GB)?")
-_UNITS = {None: 1, "B": 1, "kB": 1_000, "KB": 1_000, "MB": 1_000_000, "GB": 1_000_000_000}
 # Browsers take longer to unpack than anybody waits.
 _MOST = 1_000_000_000
 
 
 @with_slice("start", "end")
 def command(
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.html",
-            parser=path_of,
-            help="File to write or replace",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = Path("msgflow.html"),
+    output: Annotated[Path, output_option("FILE.html")] = Path("msgflow.html"),
     run: RunOption = None,
     compare: Annotated[
         str | None,
@@ -123,8 +111,7 @@ def read_size(text: str) -> int:
     Raises:
         UsageError: it cannot be read, or is none or too much.
     """
-    match = _SIZE.fullmatch(text.strip())
-    size = round(float(match[1]) * _UNITS[match[2]]) if match else 0
+    size = bytes_of(text)
     if not 0 < size <= _MOST:
         raise UsageError(f"cannot read the size — {text}", "--max-size 20MB, at most 1GB")
     return size

@@ -12,18 +12,11 @@ from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, Wide
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode, UsageError
 
-app = typer.Typer(
-    cls=with_default("list"), help="List, rename, label and remove runs; without a command: list."
-)
+app = typer.Typer(cls=with_default("list"))
 _RunArgument = Annotated[
     str,
     typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
 ]
-
-
-@app.callback()
-def group() -> None:
-    """List, rename, label and remove runs; without a command: list."""
 
 
 @app.command("list")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption
+from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption, memory_limit_option
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 
@@ -26,16 +26,7 @@ def command(
             show_default="8642, else any free one",
         ),
     ] = None,
-    memory_limit: Annotated[
-        str | None,
-        typer.Option(
-            "--memory-limit",
-            envvar="MSGFLOW_MEMORY_LIMIT",
-            metavar="SIZE",
-            help="Maximum memory for queries",
-            show_default="a quarter of the machine's, 500MB to 4GB",
-        ),
-    ] = None,
+    memory_limit: Annotated[str | None, memory_limit_option("Maximum memory for queries")] = None,
     lake: LakePageOption = None,
     where: LakeWhereOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,

@@ -11,10 +11,10 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.options import (
-    OUTPUT,
     DatabaseOption,
     OutputOption,
     WideOption,
+    format_option,
     path_of,
 )
 from msgflow.cli.slice_options import with_slice
@@ -66,12 +66,7 @@ def command(
     ] = False,
     form: Annotated[
         VerifyFormat | None,
-        typer.Option(
-            "--format",
-            help="Output format",
-            show_default="junit into FILE.xml, else table",
-            rich_help_panel=OUTPUT,
-        ),
+        format_option("Output format", show_default="junit into FILE.xml, else table"),
     ] = None,
     output: OutputOption = None,
     wide: WideOption = False,

@@ -19,7 +19,7 @@ PARAMETERS = "Parameters"
 OWN = "own_"
 
 
-def declared(param: Param, panel: str = PARAMETERS) -> Any:
+def header_option(param: Param, panel: str = PARAMETERS) -> Any:
     """Return the option for a parameter; without a value the header has the default."""
     flag = f"--{param.name.replace('_', '-')}"
     return typer.Option(
@@ -32,7 +32,7 @@ def declared(param: Param, panel: str = PARAMETERS) -> Any:
     )
 
 
-def parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
+def header_parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
     """Return the parameter of a command for a parameter of a header; its name begins with OWN."""
     kind: Any = bool if param.type == "BOOLEAN" else str
     if param.name in PLACE_PARAMETERS:
@@ -41,7 +41,9 @@ def parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
         f"{OWN}{param.name}",
         Parameter.KEYWORD_ONLY,
         default=None if param.has_default else Parameter.empty,
-        annotation=Annotated[kind | None if param.has_default else kind, declared(param, panel)],
+        annotation=Annotated[
+            kind | None if param.has_default else kind, header_option(param, panel)
+        ],
     )
 
 
