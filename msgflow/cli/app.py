@@ -61,7 +61,7 @@ class RootGroup(TyperGroup):
         }
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return name, command and the words behind it; the command is imported here."""
+        """Return the name, the imported command, and the words behind it."""
         from msgflow.query.catalogue import query_names
 
         if args[0] not in COMMANDS and args[0] in query_names():

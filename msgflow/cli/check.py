@@ -26,7 +26,7 @@ _PLACES_SHOWN = 10
 
 
 class CheckFormat(StrEnum):
-    """How findings are written."""
+    """Formats of findings."""
 
     TABLE = "table"
     JSON = "json"
@@ -88,7 +88,7 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
     from msgflow.text.wrapping import wrap
 
     def fitting(text: str, room: int) -> list[str]:
-        # In a pipe what people search for stays in one line.
+        # In a pipe each text stays in one line, so that grep finds it.
         return wrap(text, room) if is_screen() else [text]
 
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)

@@ -1,4 +1,4 @@
-"""`msgflow compare`: how one run differs from another, and whether it is worse than allowed."""
+"""`msgflow compare`: differences of two runs, and conditions under which they fail."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from msgflow.fleet.compare import FleetComparison
     from msgflow.query.compare import Comparison
 
-# On a terminal: paths are long.
+# Rows on a terminal, where long paths take several lines.
 _MOST_ROWS = 10
-# Those that mean the same everywhere, and the two runs, are no options of its own.
+# Parameters of the statement that the command passes by itself.
 _COMMON = ("run_a", "run_b", "internal")
 _RunA = Annotated[
     str,
@@ -48,7 +48,7 @@ _RunB = Annotated[
 
 
 def fail_on_option(side: str) -> Any:
-    """Return the option for conditions under which a comparison of two such sides fails."""
+    """Return the option for the conditions that fail a comparison of sides A and B."""
     return typer.Option(
         "--fail-on",
         metavar="CONDITION",
@@ -58,7 +58,7 @@ def fail_on_option(side: str) -> Any:
 
 
 def only_different_option(subject: str, **more: Any) -> Any:
-    """Return the option for rows of a comparison, each of one such subject."""
+    """Return the option for the rows of a comparison: one for each subject, or all."""
     return typer.Option(
         "--only-different/--all",
         help=f"One row for each {subject}: those that differ, or all",
@@ -129,7 +129,7 @@ def print_comparison(
 
 
 def _signature() -> Signature:
-    """Return the options: those of the statement, and those of the command."""
+    """Return the signature of the command: parameters of the statement, then its own options."""
     positional, keyword = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
     declared = (p for p in program().header("comparison").params if p.name not in _COMMON)
     return Signature(

@@ -1,4 +1,4 @@
-"""`msgflow events`: what stands in a trace, without a database."""
+"""`msgflow events`: the events of a trace, without a database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow fleet query`, `sql`, `worst` and `open`: questions to the runs of a lake."""
+"""`msgflow fleet query`, `sql`, `worst` and `open`: queries on the runs of a lake."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ def open_(
 
 
 def require_lake(lake: str) -> None:
-    """Raise where an option of a command that does something without a lake, too, is missing.
+    """Raise an error if no lake is named; some commands do something without one, too.
 
     Raises:
         UsageError: no lake is named.

@@ -1,4 +1,4 @@
-"""`msgflow flow`: where one message came from and where it went, as a tree."""
+"""`msgflow flow`: the way of one message as a tree: where it came from, and where it went."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _START = "Which message"
 
 
 class FlowFormat(StrEnum):
-    """How a flow is written: a tree for people, nodes and edges for programs."""
+    """Formats of a flow: a tree for people, nodes and edges for programs."""
 
     TABLE = "table"
     JSON = "json"
@@ -224,7 +224,7 @@ def _slowest_takes(
     run: str | None,
     internal: bool,
 ) -> list[int]:
-    """Return with which takes the slowest flows end, the slowest first."""
+    """Return the take_id at the end of each of the slowest flows, the slowest first."""
     words: dict[str, Any] = {
         "from_": ",".join(from_ or []) or None,
         "to": ",".join(to or []) or None,

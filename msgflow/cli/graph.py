@@ -1,4 +1,4 @@
-"""`msgflow graph`: who sends what to whom, for other programs to draw, or as a picture."""
+"""`msgflow graph`: the graph of nodes and topics, as a picture or for other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow info`: what a database holds, as a handful of named queries."""
+"""`msgflow info`: the content of a database, by named queries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "diagnost
 
 
 class InfoFormat(StrEnum):
-    """How several tables are written; the queries `info-…` give each alone in any format."""
+    """Formats of all tables together; the queries `info-…` write each table in any format."""
 
     TABLE = "table"
     JSON = "json"

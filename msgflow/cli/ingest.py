@@ -99,7 +99,7 @@ def command(
 ) -> None:
     """Read LTTng traces of a ROS 2 system into a database, as one run."""
     hosts = _hosts(host or [])
-    # From before the imports, which may lose Ctrl-C, until the last word about a stored run.
+    # From before the imports, which may lose Ctrl-C, until the stored run is reported.
     with noted_interrupts():
         from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress

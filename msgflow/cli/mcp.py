@@ -16,6 +16,6 @@ def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
     from msgflow.mcp_server import make_server
 
     server = make_server(database)
-    # It only reads, and waits for the next line in a thread that nothing else could end.
+    # The server only reads. It waits for the next line in a thread that no exception ends.
     restore_default_actions()
     server.run("stdio")

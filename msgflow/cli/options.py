@@ -163,7 +163,7 @@ LakeWhereOption = Annotated[
         rich_help_panel=SELECTION,
     ),
 ]
-# MSGFLOW_LAKE does not count here: these commands are of a database first.
+# Not from MSGFLOW_LAKE: without this option these commands read a database.
 LakePageOption = Annotated[
     str | None,
     typer.Option(

@@ -18,7 +18,7 @@ def _view_names() -> tuple[str, ...]:
 
 
 class QueryGroup(TyperGroup):
-    """The named queries as commands, each built when it is asked for."""
+    """The named queries as commands; a command gets its options when it runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all queries."""
@@ -30,7 +30,7 @@ class QueryGroup(TyperGroup):
         return TyperCommand(header.name, short_help=header.title)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return name, command and the words behind it; the options of the query are made here."""
+        """Return the name, the command with the options of the query, and the words behind it."""
         name, title, rest = super().resolve_command(ctx, args)
         return name, title and build_command(load_query(str(name))), rest
 

@@ -30,8 +30,8 @@ from msgflow.query.selection import KINDS
 if TYPE_CHECKING:
     from msgflow.sql.header import Header
 
-# Names that the command line gives to every query, so that no query may use them for itself. Via,
-# without and slowest it may: then it chooses by them before it adds up.
+# Options of every query, whose names no parameter of a query may have. Via, without and slowest are
+# missing: a query with such a parameter chooses its rows before it adds them up.
 COMMON_OPTIONS = frozenset(
     (
         *KINDS,
@@ -54,7 +54,7 @@ COMMON_OPTIONS = frozenset(
         "wide",
     )
 )
-# Of `Database.query`, by their options.
+# Options that `Database.query` takes under the same names.
 _SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
 _ShowOption = Annotated[
     bool,

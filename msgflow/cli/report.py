@@ -1,4 +1,4 @@
-"""`msgflow report`: the pictures of a run in one file, to keep or to mail."""
+"""`msgflow report`: the pages of a run in one file, to keep or to mail."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 
-# Browsers take longer to unpack than anybody waits.
+# Browsers unpack larger pages too slowly.
 _MOST = 1_000_000_000
 
 
@@ -109,7 +109,7 @@ def read_size(text: str) -> int:
     """Return the bytes that '20MB' means.
 
     Raises:
-        UsageError: it cannot be read, or is none or too much.
+        UsageError: the text is no size, or the size is zero or above 1 GB.
     """
     size = bytes_of(text)
     if not 0 < size <= _MOST:

@@ -1,4 +1,4 @@
-"""The options that choose the rows of a query, by what its columns name."""
+"""Options that choose the rows of a query: by name, path, condition and number."""
 
 from __future__ import annotations
 

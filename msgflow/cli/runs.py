@@ -34,7 +34,7 @@ def list_runs(
 
     with Database(database) as opened:
         result = opened.query("info-runs", run="all")
-    # They are what is listed.
+    # The rows name the runs already.
     print_result(replace(result, runs=()), form, output, wide=wide)
 
 
@@ -117,7 +117,7 @@ def remove(
     with Database(database) as opened:
         if not yes and is_asked():
             runs = choose_runs(opened.runs(), run)
-            # While somebody thinks, others can use the database.
+            # Other programs can use the database until the user answers.
             opened.close()
             if not confirm(f"remove {', '.join(one.title for one in runs)}?"):
                 print_status("nothing was removed")

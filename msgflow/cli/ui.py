@@ -1,4 +1,4 @@
-"""`msgflow ui`: the pictures of a database, in the browser."""
+"""`msgflow ui`: the pages of a database in the browser."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def command(
     from msgflow.fleet.lake_page import lake_page
 
     opened = Lake.open(lake)
-    # Once before anybody looks: what cannot be shown is said here.
+    # Made once before the browser asks, so that errors are printed here.
     first = [lake_page(opened, where=where).content]
     serve_single(
         lambda: first.pop() if first else lake_page(opened, where=where).content,
@@ -66,10 +66,10 @@ def command(
 
 
 def require_no_where(where: str | None) -> None:
-    """Raise where runs of a lake are chosen, and there is no lake.
+    """Raise an error if --where is given without --lake.
 
     Raises:
-        UsageError: they are.
+        UsageError: `where` is given.
     """
     if where is not None:
         raise UsageError("--where chooses runs of a lake", "--lake PATH")

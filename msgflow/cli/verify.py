@@ -1,4 +1,4 @@
-"""`msgflow verify`: whether a run meets the requirements of a file."""
+"""`msgflow verify`: requirements of a file, checked in a run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from msgflow.run.slice import LATEST, Slice
 
 
 class VerifyFormat(StrEnum):
-    """How verdicts are written."""
+    """Formats of verdicts."""
 
     TABLE = "table"
     JSON = "json"

@@ -45,7 +45,7 @@ for variables in given:
 def ask(
     words: list[str], directory: Path, *, shell: str = "fish", database: Path | None = None
 ) -> list[str]:
-    """Return what a shell is told for the last of these words."""
+    """Return the completions of the last of these words."""
     (answer,) = ask_each([words], directory, shell=shell, database=database)
     return answer
 
@@ -53,7 +53,7 @@ def ask(
 def ask_each(
     lines: list[list[str]], directory: Path, *, shell: str = "fish", database: Path | None = None
 ) -> list[list[str]]:
-    """Return what a shell is told for the last word of each line."""
+    """Return the completions of the last word of each line."""
     environment = {name: value for name, value in os.environ.items() if name != "MSGFLOW_DB"}
     environment |= {
         "_MSGFLOW_COMPLETE": f"complete_{shell}",
@@ -253,7 +253,7 @@ eval "printf '%s\\n' ${{COMPREPLY[*]}}"
 
 
 def test_the_script_can_be_shown_and_installed(tmp_path: Path) -> None:
-    # Typer asks which process is the shell: here it is told.
+    # Typer does not look for the process of the shell then.
     environment = os.environ | {
         "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
         "HOME": str(tmp_path),
