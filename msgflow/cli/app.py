@@ -1,13 +1,116 @@
-"""The program `msgflow`: its commands are imported when they are asked for."""
+"""The program `msgflow`: a group of commands, each imported when it is run."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from msgflow.cli.root import RootGroup
+from msgflow.cli.completion import is_completing
+from msgflow.cli.errors import print_exception
+from msgflow.cli.output import discard_stdout, print_error
+from msgflow.cli.signals import HANDLER
+from msgflow.errors import ExitCode, UsageError
+from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
+
+COMMANDS = {
+    "ingest": "Read LTTng traces of a ROS 2 system into a database, as one run.",
+    "query": "Run a named query; `msgflow query NAME --help` explains it.",
+    "flow": "Print the flow of one message: what caused it, and what it caused.",
+    "graph": "Write the graph of nodes, topics and services, with rates and latencies.",
+    "ui": "Show the database in the browser: timeline, paths, graph, executors, comparison.",
+    "report": "Write the pages of a run to one file that any browser opens, without a server.",
+    "compare": (
+        "Compare run B with run A: medians, means, percentiles, and whether it may be chance."
+    ),
+    "verify": "Check a run against the requirements of a file: passed, failed, or not measured.",
+    "sql": "Run SQL on the public views, read-only and without access to other files.",
+    "info": (
+        "Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality."
+    ),
+    "check": "Show what is wrong with a recording, with cause and cure; exit code 1 on errors.",
+    "events": "List the events of any CTF traces in order of time.",
+    "targets": "Write requirements for verify.",
+    "runs": "List, rename, label and remove runs; without a command: list.",
+    "links": "Declare indirect links: how nodes use messages that they keep.",
+    "paths": "Give paths names, for --path.",
+    "clocks": "Synchronise the clocks of several hosts; without a command: show.",
+    "export": "Write the content of a database to files.",
+    "db": "Check, upgrade and describe a database file.",
+    "fleet": "Many recordings, on one machine or many, into one lake of Parquet files.",
+    "mcp": "Serve the database to an agent, over stdin and stdout (Model Context Protocol).",
+    "simulate": "Write the trace of a simulated ROS 2 system, and the links that really happened.",
+}
+"""The commands in the order in which a user needs them, with their summaries in the help.
+
+Each is a module of `msgflow.cli` with a function `command`, or a group `app`.
+"""
+
+
+class RootGroup(TyperGroup):
+    """The group of all commands: it imports a command when it runs, and lets no exception out."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands = {
+            name: TyperCommand(name, help=summary) for name, summary in COMMANDS.items()
+        }
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name, the imported command, and the words behind it."""
+        from msgflow.query.catalogue import query_names
+
+        if args[0] not in COMMANDS and args[0] in query_names():
+            raise UsageError(f"there is no such command — {args[0]}", f"msgflow query {args[0]}")
+        name, summary, rest = super().resolve_command(ctx, args)
+        return name, summary and _imported(str(name)), rest
+
+    def main(self, *args: Any, **options: Any) -> None:
+        """Run a command line; an exception becomes a message and an exit code."""
+        options["standalone_mode"] = False
+        try:
+            code = ExitCode(super().main(*args, **options) or 0)
+        except typer.Abort:
+            code = ExitCode.INTERRUPTED
+        except Exception as error:
+            # After a signal the failure is only its consequence. A shell would show a message amid
+            # the line that the user types.
+            is_silent = HANDLER.came or is_completing()
+            code = ExitCode.OK if is_silent else print_exception(error)
+        code = HANDLER.came or code
+        if code in (ExitCode.INTERRUPTED, ExitCode.TERMINATED):
+            print_error(code.name.lower())
+        sys.exit(int(code))
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; a reader that goes away (`… | head`) ends it quietly."""
+        try:
+            value = super().invoke(ctx)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except BrokenPipeError:
+            discard_stdout()
+            raise typer.Exit(ExitCode.OK) from None
+        except Terminated:
+            # Typer ends every KeyboardInterrupt with the exit code of Ctrl-C.
+            raise typer.Exit(ExitCode.TERMINATED) from None
+        return value
+
+
+def _imported(name: str) -> Any:
+    module = import_module(f"msgflow.cli.{name}")
+    around = typer.Typer(add_completion=False)
+    around.callback()(lambda: None)
+    if hasattr(module, "app"):
+        around.add_typer(module.app, name=name, help=COMMANDS[name])
+    else:
+        around.command(name)(module.command)
+    return typer.main.get_group(around).commands[name]
+
 
 app = typer.Typer(
     name="msgflow",

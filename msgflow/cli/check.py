@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import OUTPUT, DatabaseOption, MemoryLimitOption, RunOption
+from msgflow.cli.options import DatabaseOption, MemoryLimitOption, RunOption, format_option
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
@@ -26,7 +26,7 @@ _PLACES_SHOWN = 10
 
 
 class CheckFormat(StrEnum):
-    """How findings are written."""
+    """Formats of findings."""
 
     TABLE = "table"
     JSON = "json"
@@ -34,9 +34,7 @@ class CheckFormat(StrEnum):
 
 def command(
     run: RunOption = None,
-    form: Annotated[
-        CheckFormat, typer.Option("--format", help="How to write it", rich_help_panel=OUTPUT)
-    ] = CheckFormat.TABLE,
+    form: Annotated[CheckFormat, format_option("How to write it")] = CheckFormat.TABLE,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
@@ -90,7 +88,7 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
     from msgflow.text.wrapping import wrap
 
     def fitting(text: str, room: int) -> list[str]:
-        # In a pipe what people search for stays in one line.
+        # In a pipe each text stays in one line, so that grep finds it.
         return wrap(text, room) if is_screen() else [text]
 
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)

@@ -10,15 +10,7 @@ from msgflow.cli.default_command import with_default
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, RunOption, WideOption
 from msgflow.default_files import DEFAULT_DATABASE
 
-app = typer.Typer(
-    cls=with_default("show"),
-    help="Synchronise the clocks of several hosts; without a command: show.",
-)
-
-
-@app.callback()
-def group() -> None:
-    """Synchronise the clocks of several hosts; without a command: show."""
+app = typer.Typer(cls=with_default("show"))
 
 
 @app.command("apply")

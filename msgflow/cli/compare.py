@@ -1,16 +1,16 @@
-"""`msgflow compare`: how one run differs from another, and whether it is worse than allowed."""
+"""`msgflow compare`: differences of two runs, and conditions under which they fail."""
 
 from __future__ import annotations
 
 from inspect import Parameter, Signature
 from keyword import iskeyword
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.declared import given_of, parameter
+from msgflow.cli.header_options import given_of, header_parameter
 from msgflow.cli.options import (
     OUTPUT,
     DatabaseOption,
@@ -25,9 +25,15 @@ from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 from msgflow.sql.statement import program
 
-# On a terminal: paths are long.
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from msgflow.fleet.compare import FleetComparison
+    from msgflow.query.compare import Comparison
+
+# Rows on a terminal, where long paths take several lines.
 _MOST_ROWS = 10
-# Those that mean the same everywhere, and the two runs, are no options of its own.
+# Parameters of the statement that the command passes by itself.
 _COMMON = ("run_a", "run_b", "internal")
 _RunA = Annotated[
     str,
@@ -39,23 +45,31 @@ _RunB = Annotated[
     str,
     typer.Argument(metavar="RUN_B", help="Run to compare with it", autocompletion=complete("run")),
 ]
-_FailOnOption = Annotated[
-    list[str] | None,
-    typer.Option(
+
+
+def fail_on_option(side: str) -> Any:
+    """Return the option for the conditions that fail a comparison of sides A and B."""
+    return typer.Option(
         "--fail-on",
         metavar="CONDITION",
-        help="Exit with 1 if run B exceeds run A by more than that: 'p95>5%', 'median>2ms'"
+        help=f"Exit with 1 if {side} B exceeds {side} A by more than that: 'p95>5%', 'median>2ms'"
         " (median, mean, p95, p99 or max), or if less arrives: 'share<-1%'; may be repeated",
-    ),
-]
-_OnlyDifferentOption = Annotated[
-    bool | None,
-    typer.Option(
+    )
+
+
+def only_different_option(subject: str, **more: Any) -> Any:
+    """Return the option for the rows of a comparison: one for each subject, or all."""
+    return typer.Option(
         "--only-different/--all",
-        help="One row for each path, callback or topic: those that differ, or all",
+        help=f"One row for each {subject}: those that differ, or all",
         show_default="on a terminal those that differ; else every statistic",
-        rich_help_panel=OUTPUT,
-    ),
+        **more,
+    )
+
+
+_FailOnOption = Annotated[list[str] | None, fail_on_option("run")]
+_OnlyDifferentOption = Annotated[
+    bool | None, only_different_option("path, callback or topic", rich_help_panel=OUTPUT)
 ]
 
 
@@ -80,7 +94,6 @@ def command(
     chance within these two recordings only: it does not say how much the same
     system differs when it is started again.
     """
-    from msgflow.cli.output import is_screen, print_error, print_result
     from msgflow.database import Database
     from msgflow.query.compare import parse_conditions
 
@@ -88,12 +101,27 @@ def command(
     with Database(database, memory_limit=memory_limit) as opened:
         given = {name + "_" * iskeyword(name): value for name, value in given_of(own).items()}
         comparison = opened.compare(run_a, run_b, internal=internal, **given)
+    print_comparison(comparison, fail_on or [], only_different, form=form, wide=wide, output=output)
+
+
+def print_comparison(
+    comparison: Comparison | FleetComparison,
+    fail_on: Sequence[str],
+    only_different: bool | None,
+    *,
+    form: Format | None,
+    wide: bool,
+    output: Path | None,
+) -> None:
+    """Print a comparison, and exit with 1 where a condition of `fail_on` holds."""
+    from msgflow.cli.output import is_screen, print_error, print_result
+
     result = comparison.result
     is_table = form in (None, Format.TABLE) and output is None
     if only_different is not None or (is_table and not wide and is_screen()):
         result = comparison.changes(only_different=only_different is not False)
     print_result(result, form, output, wide=wide, most_rows=_MOST_ROWS)
-    failures = comparison.failures(fail_on or [])
+    failures = comparison.failures(fail_on)
     for failure in failures:
         print_error(f"{failure.condition}: {failure.reason} — {failure.subject}")
     if failures:
@@ -101,14 +129,14 @@ def command(
 
 
 def _signature() -> Signature:
-    """Return the options: those of the statement, and those of the command."""
+    """Return the signature of the command: parameters of the statement, then its own options."""
     positional, keyword = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
     declared = (p for p in program().header("comparison").params if p.name not in _COMMON)
     return Signature(
         [
             Parameter("run_a", positional, annotation=_RunA),
             Parameter("run_b", positional, annotation=_RunB),
-            *(parameter(param) for param in declared),
+            *(header_parameter(param) for param in declared),
             *(
                 Parameter(name, keyword, default=default, annotation=annotation)
                 for name, annotation, default in (

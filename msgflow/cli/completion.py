@@ -1,7 +1,8 @@
-"""Completion in the shell: what Typer asks for while somebody presses Tab.
+"""Completion in the shell: the names that Typer offers when the user presses Tab.
 
-Nothing here prints, fails or imports more than it needs. A name comes from a recording, and what a
-shell completes is part of the next command: names that could be more than a word are left out.
+Nothing here prints, fails or imports more than it needs. Names come from a recording, and a
+completed name becomes part of the next command. So names that could be more than a word are left
+out.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
 VARIABLE = "_MSGFLOW_COMPLETE"
-# Letters and digits of any language besides. Quotes, $, `, \\ and globs are never completed.
+# Besides letters and digits of any language. Quotes, $, `, \\ and globs are never completed.
 _SAFE = frozenset("_/.-+@%,:() =<>&#{}")
 _QUOTED_IN_BASH = re.compile(r"([^\w/.\-+@%,])")
 
 
 class _Word(str):
-    """A name as bash has to read it; Typer compares it with what was typed, without quotes."""
+    """A name with the escapes that bash needs; Typer compares the name without them."""
 
     __slots__ = ("name",)
     name: str
 
     def startswith(self, *prefix: Any) -> bool:
-        """Tell whether the name itself begins so."""
+        """Tell whether the name without escapes begins so."""
         return self.name.startswith(*prefix)
 
 
@@ -45,7 +46,7 @@ def complete(kind: str, *more: str) -> Callable[[typer.Context, str], list[str]]
 
     Args:
         kind: of `msgflow.db.known_names`.
-        more: other words that may stand there.
+        more: other words that are valid there.
     """
 
     def completed(ctx: typer.Context, incomplete: str) -> list[str]:
@@ -70,10 +71,10 @@ def complete_path(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def words(names: Iterable[str], incomplete: str) -> list[str]:
-    """Return the names that begin so and that are one word of the shell that asks.
+    """Return the names that begin with `incomplete` and are one word in the shell.
 
-    Those with other characters than letters, digits and a few signs are left out; so are those
-    that a command would take for an option, or a shell for a home directory.
+    A name is left out if it has other characters than letters, digits and a few signs, if a command
+    would take it for an option, or if a shell would take it for a home directory.
     """
     found = [
         name
@@ -95,5 +96,5 @@ def _in_bash(name: str) -> str:
 
 
 def _path(given: object) -> Path:
-    # A shell replaces neither in what it completes.
+    # A shell replaces neither `~` nor variables in a word that it completes.
     return Path(os.path.expanduser(os.path.expandvars(str(given))))

@@ -8,12 +8,7 @@ from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, Wide
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
-app = typer.Typer(help="Check, upgrade and describe a database file.")
-
-
-@app.callback()
-def group() -> None:
-    """Check, upgrade and describe a database file."""
+app = typer.Typer()
 
 
 @app.command("upgrade")

@@ -1,4 +1,4 @@
-"""`msgflow events`: what stands in a trace, without a database."""
+"""`msgflow events`: the events of a trace, without a database."""
 
 from __future__ import annotations
 
@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.ingest import Reader
-from msgflow.cli.options import OUTPUT, SELECTION
+from msgflow.cli.options import (
+    OUTPUT,
+    SELECTION,
+    Reader,
+    ReaderOption,
+    format_option,
+    output_option,
+)
 from msgflow.errors import UsageError
 from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
 from msgflow.export.formats import Format
@@ -66,28 +72,21 @@ def command(
     ] = False,
     form: Annotated[
         EventFormat | None,
-        typer.Option(
-            "--format",
-            help="Output format",
+        format_option(
+            "Output format",
             show_default="by the suffix of PATH, else text, parquet for a directory",
-            rich_help_panel=OUTPUT,
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="PATH",
-            help="File to write or replace; or, for CSV and Parquet, a new directory (a name"
+        output_option(
+            "PATH",
+            "File to write or replace; or, for CSV and Parquet, a new directory (a name"
             " without suffix) that gets one file per event name, with a column per field",
             show_default="stdout",
-            rich_help_panel=OUTPUT,
         ),
     ] = None,
-    reader: Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")] = (
-        Reader.AUTO
-    ),
+    reader: ReaderOption = Reader.AUTO,
     strict: Annotated[bool, typer.Option("--strict", help="Stop at the first damage")] = False,
 ) -> None:
     """List the events of any CTF traces in order of time.

@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     SELECTION,
     DatabaseOption,
     MemoryLimitOption,
+    output_option,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from msgflow.export.views import ExportedView
 
-app = typer.Typer(help="Write the content of a database to files.")
+app = typer.Typer()
 
 _DirectoryArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Created if missing")]
 _ViewsArgument = Annotated[
@@ -49,11 +50,6 @@ _RunOption = Annotated[
     ),
 ]
 _ForceOption = Annotated[bool, typer.Option("--force", help="Replace an earlier export")]
-
-
-@app.callback()
-def group() -> None:
-    """Write the content of a database to files."""
 
 
 @app.command("parquet")
@@ -118,16 +114,7 @@ def csv(
 @app.command("perfetto")
 @with_slice()
 def perfetto(
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="File to write or replace",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = Path("msgflow.pftrace"),
+    output: Annotated[Path, output_option()] = Path("msgflow.pftrace"),
     part: Slice = LATEST,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
+import os
 import re
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msgflow.cli import fleet_asking
-from msgflow.cli.ingest import Reader
-from msgflow.cli.options import FormatOption, LakeOption, OutputOption, WideOption
+from msgflow.cli import fleet_queries
+from msgflow.cli.compare import fail_on_option, only_different_option, print_comparison
+from msgflow.cli.options import (
+    FormatOption,
+    LakeOption,
+    OutputOption,
+    Reader,
+    ReaderOption,
+    WideOption,
+    bytes_of,
+)
 from msgflow.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
     from msgflow.fleet.ingest import FleetProgress
 
-app = typer.Typer(help="Many recordings, on one machine or many, into one lake of Parquet files.")
+app = typer.Typer()
 
-_SIZE = re.compile(r"(\d+(?:\.\d+)?) ?(B|[kK]B|MB|GB|TB)?")
-_UNITS = {None: 1, "B": 1, "KB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 _TIME = re.compile(r"(\d+(?:\.\d+)?) ?(s|min|h|d)?")
 _SECONDS = {None: 1.0, "s": 1.0, "min": 60.0, "h": 3_600.0, "d": 86_400.0}
 _MOST_FAILURES = 20
-# On a terminal: paths are long.
-_MOST_PATHS = 10
-
-
-@app.callback()
-def group() -> None:
-    """Many recordings, on one machine or many, into one lake of Parquet files."""
 
 
 @app.command("ingest")
@@ -82,6 +82,7 @@ def ingest(
         typer.Option(
             "--scratch",
             metavar="DIR",
+            parser=os.path.expanduser,
             help="Folder of each worker for what it needs meanwhile",
             show_default="that of the system",
         ),
@@ -98,9 +99,7 @@ def ingest(
             "--clock-sync", metavar="none|messages", help="As msgflow ingest has it, for each"
         ),
     ] = "none",
-    reader: Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")] = (
-        Reader.AUTO
-    ),
+    reader: ReaderOption = Reader.AUTO,
     strict: Annotated[
         bool, typer.Option("--strict", help="Refuse damaged traces, as msgflow ingest does")
     ] = False,
@@ -212,10 +211,10 @@ def failures(
     print_result(list_failures(Lake.open(lake)), form, output, wide=wide)
 
 
-app.command("query")(fleet_asking.query)
-app.command("sql")(fleet_asking.sql)
-app.command("worst")(fleet_asking.worst)
-app.command("open")(fleet_asking.open_)
+app.command("query")(fleet_queries.query)
+app.command("sql")(fleet_queries.sql)
+app.command("worst")(fleet_queries.worst)
+app.command("open")(fleet_queries.open_)
 
 
 @app.command("remove")
@@ -305,20 +304,11 @@ def compare(
     ] = 0.95,
     fail_on: Annotated[
         list[str] | None,
-        typer.Option(
-            "--fail-on",
-            metavar="CONDITION",
-            help="Exit with 1 if side B exceeds side A by more than that: 'p95>5%', 'median>2ms'"
-            " (median, mean, p95, p99 or max), or if less arrives: 'share<-1%'; may be repeated",
-        ),
+        fail_on_option("side"),
     ] = None,
     only_different: Annotated[
         bool | None,
-        typer.Option(
-            "--only-different/--all",
-            help="One row for each path: those that differ, or all",
-            show_default="on a terminal those that differ; else every statistic",
-        ),
+        only_different_option("path"),
     ] = None,
     form: FormatOption = None,
     output: OutputOption = None,
@@ -329,8 +319,6 @@ def compare(
     The run is the unit: how much runs of one side differ from each other tells
     whether the two sides differ.
     """
-    from msgflow.cli.output import is_screen, print_error, print_result
-    from msgflow.export.formats import Format
     from msgflow.fleet.compare import compare as compared
     from msgflow.fleet.lake import Lake
     from msgflow.query.compare import parse_conditions
@@ -346,16 +334,7 @@ def compare(
         case=case,
         confidence=confidence,
     )
-    result = comparison.result
-    is_table = form in (None, Format.TABLE) and output is None
-    if only_different is not None or (is_table and not wide and is_screen()):
-        result = comparison.changes(only_different=only_different is not False)
-    print_result(result, form, output, wide=wide, most_rows=_MOST_PATHS)
-    failures = comparison.failures(fail_on or [])
-    for failure in failures:
-        print_error(f"{failure.condition}: {failure.reason} — {failure.subject}")
-    if failures:
-        raise typer.Exit(ExitCode.FAILED)
+    print_comparison(comparison, fail_on or [], only_different, form=form, wide=wide, output=output)
 
 
 def _labels(texts: list[str]) -> dict[str, str]:
@@ -377,8 +356,7 @@ def _labels(texts: list[str]) -> dict[str, str]:
 def _size(text: str | None) -> int | None:
     if text is None:
         return None
-    match = _SIZE.fullmatch(text.strip())
-    size = int(float(match[1]) * _UNITS[match[2] and match[2].upper()]) if match else 0
+    size = bytes_of(text)
     if not size:
         raise UsageError(f"--memory takes a size — {text}", "--memory 4GB")
     return size

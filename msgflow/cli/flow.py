@@ -1,4 +1,4 @@
-"""`msgflow flow`: where one message came from and where it went, as a tree."""
+"""`msgflow flow`: the way of one message as a tree: where it came from, and where it went."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.declared import declared
+from msgflow.cli.header_options import header_option
 from msgflow.cli.options import (
     OUTPUT,
     SELECTION,
@@ -18,6 +18,8 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     OutputOption,
     RunOption,
+    format_option,
+    path_of,
 )
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
@@ -30,7 +32,7 @@ _START = "Which message"
 
 
 class FlowFormat(StrEnum):
-    """How a flow is written: a tree for people, nodes and edges for programs."""
+    """Formats of a flow: a tree for people, nodes and edges for programs."""
 
     TABLE = "table"
     JSON = "json"
@@ -118,9 +120,9 @@ def command(
         ),
     ] = None,
     run: RunOption = None,
-    direction: Annotated[str | None, declared(_DECLARED["direction"], SELECTION)] = None,
-    depth: Annotated[str | None, declared(_DECLARED["depth"], SELECTION)] = None,
-    limit: Annotated[str | None, declared(_DECLARED["limit"], SELECTION)] = None,
+    direction: Annotated[str | None, header_option(_DECLARED["direction"], SELECTION)] = None,
+    depth: Annotated[str | None, header_option(_DECLARED["depth"], SELECTION)] = None,
+    limit: Annotated[str | None, header_option(_DECLARED["limit"], SELECTION)] = None,
     internal: InternalOption = False,
     absolute: Annotated[
         bool,
@@ -132,11 +134,8 @@ def command(
     ] = False,
     form: Annotated[
         FlowFormat | None,
-        typer.Option(
-            "--format",
-            help="A tree, or nodes and edges",
-            show_default="by the suffix of FILE, else table",
-            rich_help_panel=OUTPUT,
+        format_option(
+            "A tree, or nodes and edges", show_default="by the suffix of FILE, else table"
         ),
     ] = None,
     output: OutputOption = None,
@@ -145,6 +144,7 @@ def command(
         typer.Option(
             "--html",
             metavar="FILE.html",
+            parser=path_of,
             help="Write its timeline to one file for any browser, and print nothing",
             rich_help_panel=OUTPUT,
         ),
@@ -159,7 +159,6 @@ def command(
 
     Times count from the first line. NA means that the trace does not show it.
     """
-    from msgflow.cli.meanwhile import ARROW, import_meanwhile
     from msgflow.cli.output import print_note, print_runs, print_status, print_text
     from msgflow.database import Database
     from msgflow.export.formats import by_suffix
@@ -174,7 +173,6 @@ def command(
         raise UsageError("--from and --to choose among the slowest flows", "--slowest 1")
     if slowest is not None and slowest > 1 and (html is not None or form is FlowFormat.JSON):
         raise UsageError(f"a file has one flow — --slowest {slowest}", "--slowest 1, or a tree")
-    import_meanwhile(ARROW)
     with Database(database, memory_limit=memory_limit) as opened:
         starts: dict[str, Any] = {
             "topic": topic,
@@ -226,7 +224,7 @@ def _slowest_takes(
     run: str | None,
     internal: bool,
 ) -> list[int]:
-    """Return with which takes the slowest flows end, the slowest first."""
+    """Return the take_id at the end of each of the slowest flows, the slowest first."""
     words: dict[str, Any] = {
         "from_": ",".join(from_ or []) or None,
         "to": ",".join(to or []) or None,

@@ -1,17 +1,15 @@
-"""`msgflow graph`: who sends what to whom, for other programs to draw, or as a picture."""
+"""`msgflow graph`: the graph of nodes and topics, as a picture or for other programs."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 from typing import Annotated
 
-import typer
-
 from msgflow.cli.options import (
-    OUTPUT,
     DatabaseOption,
     InternalOption,
     OutputOption,
+    format_option,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
@@ -25,11 +23,8 @@ def command(
     internal: InternalOption = False,
     form: Annotated[
         GraphFormat | None,
-        typer.Option(
-            "--format",
-            help="A graph language, or a picture (svg)",
-            show_default="by the suffix of FILE, else dot",
-            rich_help_panel=OUTPUT,
+        format_option(
+            "A graph language, or a picture (svg)", show_default="by the suffix of FILE, else dot"
         ),
     ] = None,
     output: OutputOption = None,

@@ -1,4 +1,4 @@
-"""`msgflow info`: what a database holds, as a handful of named queries."""
+"""`msgflow info`: the content of a database, by named queries."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import json
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from msgflow.cli.options import OUTPUT, DatabaseOption, InternalOption, RunOption, WideOption
+from msgflow.cli.options import DatabaseOption, InternalOption, RunOption, WideOption, format_option
 from msgflow.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
@@ -21,7 +19,7 @@ SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "diagnost
 
 
 class InfoFormat(StrEnum):
-    """How several tables are written; the queries `info-…` give each alone in any format."""
+    """Formats of all tables together; the queries `info-…` write each table in any format."""
 
     TABLE = "table"
     JSON = "json"
@@ -31,9 +29,7 @@ class InfoFormat(StrEnum):
 def command(
     run: RunOption = None,
     internal: InternalOption = False,
-    form: Annotated[
-        InfoFormat, typer.Option("--format", help="Output format", rich_help_panel=OUTPUT)
-    ] = InfoFormat.TABLE,
+    form: Annotated[InfoFormat, format_option("Output format")] = InfoFormat.TABLE,
     wide: WideOption = False,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption
+from msgflow.cli.options import (
+    DatabaseOption,
+    Reader,
+    ReaderOption,
+    memory_limit_option,
+    path_of,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.sql.interrupt import noted_interrupts
 
 if TYPE_CHECKING:
     from msgflow.ingest import IngestReport
-
-
-class Reader(StrEnum):
-    """What decodes the traces."""
-
-    AUTO = "auto"
-    MSGFLOW = "msgflow"
-    BT2 = "bt2"
 
 
 def command(
@@ -53,25 +51,29 @@ def command(
     keep_staging: Annotated[
         Path | None,
         typer.Option(
-            "--keep-staging", metavar="DIR", help="Keep the raw events, as Parquet files in DIR"
+            "--keep-staging",
+            metavar="DIR",
+            parser=path_of,
+            help="Keep the raw events, as Parquet files in DIR",
         ),
     ] = None,
     links: Annotated[
         Path | None,
-        typer.Option("--links", metavar="FILE", help="Indirect links to declare, as YAML"),
+        typer.Option(
+            "--links", metavar="FILE", parser=path_of, help="Indirect links to declare, as YAML"
+        ),
     ] = None,
     clock_sync: Annotated[
         str,
         typer.Option(
             "--clock-sync",
             metavar="none|messages|FILE",
+            parser=os.path.expanduser,
             help="Synchronise the clocks of several hosts: by their messages (and the network"
             " packets of kernel traces), or by offsets in a file",
         ),
     ] = "none",
-    reader: Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")] = (
-        Reader.AUTO
-    ),
+    reader: ReaderOption = Reader.AUTO,
     strict: Annotated[
         bool,
         typer.Option("--strict", help="Refuse damaged traces instead of keeping what can be read"),
@@ -86,12 +88,8 @@ def command(
     ] = None,
     memory_limit: Annotated[
         str | None,
-        typer.Option(
-            "--memory-limit",
-            envvar="MSGFLOW_MEMORY_LIMIT",
-            metavar="SIZE",
-            help="Maximum memory for the database, such as 2GB; more makes large traces faster",
-            show_default="a quarter of the machine's, 500MB to 4GB",
+        memory_limit_option(
+            "Maximum memory for the database, such as 2GB; more makes large traces faster"
         ),
     ] = None,
     quiet: Annotated[
@@ -101,7 +99,7 @@ def command(
 ) -> None:
     """Read LTTng traces of a ROS 2 system into a database, as one run."""
     hosts = _hosts(host or [])
-    # From before the imports, which may lose Ctrl-C, until the last word about a stored run.
+    # From before the imports, which may lose Ctrl-C, until the stored run is reported.
     with noted_interrupts():
         from msgflow.cli.output import print_note
         from msgflow.cli.progress import ingest_progress
@@ -149,5 +147,5 @@ def _hosts(texts: list[str]) -> dict[str, list[str]]:
         name, separator, path = text.partition("=")
         if not (name and separator and path):
             raise UsageError(f"--host takes NAME=PATH — {text}", "--host robot=traces/robot")
-        hosts.setdefault(name, []).append(path)
+        hosts.setdefault(name, []).append(os.path.expanduser(path))
     return hosts

@@ -12,12 +12,7 @@ from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, RunO
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 
-app = typer.Typer(help="Declare indirect links: how nodes use messages that they keep.")
-
-
-@app.callback()
-def group() -> None:
-    """Declare indirect links: how nodes use messages that they keep."""
+app = typer.Typer()
 
 
 @app.command("apply")

@@ -12,10 +12,10 @@ def command(database: DatabaseOption = DEFAULT_DATABASE) -> None:
     It only reads, and reaches no other file. It needs the extra mcp; in a checkout:
     pip install '.\\[mcp]'. The agent's program starts it, not you.
     """
-    from msgflow.cli.stop import STOP
+    from msgflow.cli.signals import restore_default_actions
     from msgflow.mcp_server import make_server
 
     server = make_server(database)
-    # It only reads: a signal ends it at once, also while it waits for the next line.
-    STOP.cease()
+    # The server only reads. It waits for the next line in a thread that no exception ends.
+    restore_default_actions()
     server.run("stdio")

@@ -1,9 +1,15 @@
-"""Options that mean the same on every command that has them."""
+"""Options that mean the same on every command that has them.
+
+A command whose help words one of them differently makes it with the function of that option.
+"""
 
 from __future__ import annotations
 
+import os
+import re
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,18 +20,71 @@ from msgflow.query.times import Times
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
 
-DatabaseOption = Annotated[
-    Path,
-    typer.Option("--db", envvar="MSGFLOW_DB", metavar="FILE", help="Database file"),
-]
-MemoryLimitOption = Annotated[
-    str | None,
-    typer.Option(
+
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(?:([kKMGT]?)B)?")
+_UNITS = {"": 1, "K": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
+
+
+def bytes_of(size: str) -> int:
+    """Return the bytes of a size such as '20MB'; 0 where the text is no size."""
+    match = _SIZE.fullmatch(size.strip())
+    return round(float(match[1]) * _UNITS[(match[2] or "").upper()]) if match else 0
+
+
+def path_of(text: str | Path) -> Path:
+    """Return the path of an option; no shell replaces the `~` of `--db=~/x`."""
+    return Path(os.path.expanduser(text))
+
+
+class Reader(StrEnum):
+    """Decoders of traces."""
+
+    AUTO = "auto"
+    MSGFLOW = "msgflow"
+    BT2 = "bt2"
+
+
+def memory_limit_option(
+    help: str, default: str = "a quarter of the machine's, 500MB to 4GB"
+) -> Any:
+    """Return the option for the memory of the database."""
+    return typer.Option(
         "--memory-limit",
         envvar="MSGFLOW_MEMORY_LIMIT",
         metavar="SIZE",
-        help="Maximum memory for the database, such as 2GB; what does not fit goes to disk",
-        show_default="four fifths of the machine",
+        help=help,
+        show_default=default,
+    )
+
+
+def format_option(help: str, **more: Any) -> Any:
+    """Return the option for the format of what is written."""
+    return typer.Option("--format", help=help, rich_help_panel=OUTPUT, **more)
+
+
+def output_option(
+    metavar: str = "FILE", help: str = "File to write or replace", **more: Any
+) -> Any:
+    """Return the option for the file to write."""
+    return typer.Option(
+        "-o",
+        "--output",
+        metavar=metavar,
+        parser=path_of,
+        help=help,
+        **({"rich_help_panel": OUTPUT} | more),
+    )
+
+
+DatabaseOption = Annotated[
+    Path,
+    typer.Option("--db", envvar="MSGFLOW_DB", metavar="FILE", parser=path_of, help="Database file"),
+]
+MemoryLimitOption = Annotated[
+    str | None,
+    memory_limit_option(
+        "Maximum memory for the database, such as 2GB; what does not fit goes to disk",
+        "four fifths of the machine",
     ),
 ]
 RunOption = Annotated[
@@ -49,12 +108,8 @@ InternalOption = Annotated[
 ]
 FormatOption = Annotated[
     Format | None,
-    typer.Option(
-        "--format",
-        metavar="FORMAT",
-        help=", ".join(Format),
-        show_default="by the suffix of FILE, else table",
-        rich_help_panel=OUTPUT,
+    format_option(
+        ", ".join(Format), metavar="FORMAT", show_default="by the suffix of FILE, else table"
     ),
 ]
 TimesOption = Annotated[
@@ -85,23 +140,15 @@ ColumnsOption = Annotated[
         rich_help_panel=OUTPUT,
     ),
 ]
-OutputOption = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="File to write or replace",
-        show_default="stdout",
-        rich_help_panel=OUTPUT,
-    ),
-]
+OutputOption = Annotated[Path | None, output_option(show_default="stdout")]
+ReaderOption = Annotated[Reader, typer.Option("--reader", help="Decoder of the traces")]
 LakeOption = Annotated[
     str,
     typer.Option(
         "--lake",
         envvar="MSGFLOW_LAKE",
         metavar="PATH|s3://BUCKET/PREFIX",
+        parser=os.path.expanduser,
         help="The lake: a folder or a bucket",
     ),
 ]
@@ -116,12 +163,13 @@ LakeWhereOption = Annotated[
         rich_help_panel=SELECTION,
     ),
 ]
-# MSGFLOW_LAKE does not count here: these commands are of a database first.
+# Not from MSGFLOW_LAKE: without this option these commands read a database.
 LakePageOption = Annotated[
     str | None,
     typer.Option(
         "--lake",
         metavar="PATH|s3://BUCKET/PREFIX",
+        parser=os.path.expanduser,
         help="A lake, in place of a database: paths of its runs by label over time",
     ),
 ]

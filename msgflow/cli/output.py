@@ -1,4 +1,4 @@
-"""The only writer of stdout and of messages: data to stdout, everything said about it to stderr."""
+"""Output of the command line: data to stdout, messages about it to stderr; nothing else writes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 
-# Narrower than this, text is not wrapped beside a name.
+# The narrowest column in which text wraps beside a name.
 _LEAST_ROOM = 20
 
 
@@ -46,12 +46,12 @@ def print_status(text: str) -> None:
 
 
 def is_asked() -> bool:
-    """Tell whether there is somebody to ask: stdin and stderr are a terminal."""
+    """Tell whether a user can answer: stdin and stderr are a terminal."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
 
 
 def confirm(question: str) -> bool:
-    """Ask on the terminal whether to go on; without an answer it is a no."""
+    """Ask on the terminal whether to go on; no answer means no."""
     return typer.confirm(_shown(question), err=True)
 
 
@@ -165,12 +165,12 @@ def print_lines(lines: Iterable[str]) -> None:
         stream = terminal(stream)
     for line in lines:
         stream.write(f"{line}\n".encode())
-    # What is said about them comes after them.
+    # Messages on stderr follow the data.
     stream.flush()
 
 
 def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None = None) -> None:
-    """Write names and what they are, side by side; on a terminal what they are may wrap.
+    """Write names and their descriptions side by side; a terminal wraps the descriptions.
 
     Raises:
         UsageError: stdout is closed.
@@ -198,7 +198,7 @@ def count(number: int, thing: str) -> str:
 
 
 def discard_stdout() -> None:
-    """Let stdout lead nowhere, also what is still to be written to it."""
+    """Discard stdout, with what is not written yet: Python would fail once more when it exits."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -208,7 +208,7 @@ def data_stream() -> IO[bytes]:
     Raises:
         UsageError: stdout is closed.
     """
-    if sys.stdout is None:  # closed by whoever started this process
+    if sys.stdout is None:  # the parent process closed it
         raise UsageError(
             "cannot write to stdout: it is closed", "write to a file, for instance with -o FILE"
         )
@@ -217,7 +217,7 @@ def data_stream() -> IO[bytes]:
 
 
 class _Terminal:
-    """A terminal as a binary stream for data, in which control characters are made visible."""
+    """A terminal as a binary stream; it shows control characters instead of obeying them."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -240,7 +240,7 @@ class _Terminal:
 
 
 def terminal(stream: IO[bytes]) -> IO[bytes]:
-    """Return a terminal as a stream for data from traces: it shows control characters."""
+    """Return a terminal as a binary stream for data from traces, without control characters."""
     return cast("IO[bytes]", _Terminal(stream))
 
 
@@ -253,7 +253,7 @@ def _shown(text: str) -> str:
 
 
 def _width_of_stderr() -> int:
-    """Return how wide the terminal is that stderr goes to, whatever stdout is."""
+    """Return the width of the terminal of stderr; stdout may go elsewhere."""
     if os.environ.get("COLUMNS", "").isdigit():
         return screen_width()
     try:
@@ -263,7 +263,7 @@ def _width_of_stderr() -> int:
 
 
 def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
-    """Return the lines of a text that goes to stderr: on a terminal none is wider than it."""
+    """Return the lines of a text for stderr, wrapped to the width of its terminal."""
     if sys.stderr is None or not sys.stderr.isatty() or "\n" in text:
         return [text]
     from msgflow.text.wrapping import wrap

@@ -7,12 +7,7 @@ import typer
 from msgflow.cli.options import DatabaseOption, OutputOption, RunOption
 from msgflow.default_files import DEFAULT_DATABASE
 
-app = typer.Typer(help="Give paths names, for --path.")
-
-
-@app.callback()
-def group() -> None:
-    """Give paths names, for --path."""
+app = typer.Typer()
 
 
 @app.command("suggest")

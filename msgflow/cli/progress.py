@@ -1,4 +1,4 @@
-"""Progress on stderr, for people who watch: never in a pipe, never with --quiet."""
+"""Progress bars on stderr: only on a terminal, and never with --quiet."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Bar(Protocol):
 
 @contextmanager
 def ingest_progress(quiet: bool) -> Iterator[Callable[[IngestProgress], None] | None]:
-    """Yield the function that shows the progress of an ingest, or None where nobody looks."""
+    """Yield the function that shows the progress of an ingest; None without a terminal."""
     with _bar(quiet) as bar:
         if bar is None:
             yield None
@@ -37,7 +37,7 @@ def ingest_progress(quiet: bool) -> Iterator[Callable[[IngestProgress], None] | 
 
 @contextmanager
 def reading_progress() -> Iterator[Callable[[ReadingProgress], None] | None]:
-    """Yield the function that shows the progress of reading, or None where nobody looks."""
+    """Yield the function that shows the progress of reading; None without a terminal."""
     begin = time.monotonic()
     with _bar(quiet=False) as bar:
         if bar is None:
@@ -54,9 +54,9 @@ def reading_progress() -> Iterator[Callable[[ReadingProgress], None] | None]:
 
 @contextmanager
 def fleet_progress(quiet: bool) -> Iterator[Callable[[FleetProgress], None] | None]:
-    """Yield the function that shows how many recordings are done, or None where nobody looks.
+    """Yield the function that shows how many recordings are done; None with `quiet`.
 
-    Who does not look at a terminal gets a line every now and then: it goes on for hours.
+    Without a terminal it prints a line every half minute, since a fleet takes hours.
     """
     if quiet or sys.stderr is None:
         yield None

@@ -18,33 +18,24 @@ def _view_names() -> tuple[str, ...]:
 
 
 class QueryGroup(TyperGroup):
-    """The named queries as commands, each built when it is asked for."""
+    """The named queries as commands; a command gets its options when it runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all queries."""
         return list(query_names())
 
-    _is_completed = False
-
-    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
-        """Return the queries that begin so, with their titles."""
-        # A shell needs none of their options, and nobody runs them afterwards.
-        self._is_completed = True
-        return super().shell_complete(ctx, incomplete)
-
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of a query; an unknown name is a UsageError with a suggestion."""
+        """Return the title of a query; an unknown name is a UsageError with a suggestion."""
         header = load_query(cmd_name, _view_names)
-        if self._is_completed:
-            return TyperCommand(header.name, short_help=header.title)
-        return build_command(header)
+        return TyperCommand(header.name, short_help=header.title)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name, the command with the options of the query, and the words behind it."""
+        name, title, rest = super().resolve_command(ctx, args)
+        return name, title and build_command(load_query(str(name))), rest
 
 
-app = typer.Typer(
-    cls=QueryGroup,
-    subcommand_metavar="[NAME] [OPTIONS]",
-    help="Run a named query; `msgflow query NAME --help` explains it.",
-)
+app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
 
 
 @app.callback(invoke_without_command=True)

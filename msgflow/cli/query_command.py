@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from msgflow.cli.declared import escape, given_of, parameter
+from msgflow.cli.header_options import escape, given_of, header_parameter
 from msgflow.cli.options import (
     OUTPUT,
     ColumnsOption,
@@ -20,7 +20,7 @@ from msgflow.cli.options import (
     TimesOption,
     WideOption,
 )
-from msgflow.cli.selecting import selecting_options
+from msgflow.cli.row_options import row_options
 from msgflow.cli.show.layout import MOST_ROWS
 from msgflow.cli.slice_options import SLICE_OPTIONS
 from msgflow.default_files import DEFAULT_DATABASE
@@ -30,8 +30,8 @@ from msgflow.query.selection import KINDS
 if TYPE_CHECKING:
     from msgflow.sql.header import Header
 
-# Names that the command line gives to every query, so that no query may use them for itself. Via,
-# without and slowest it may: then it chooses by them before it adds up.
+# Options of every query, whose names no parameter of a query may have. Via, without and slowest are
+# missing: a query with such a parameter chooses its rows before it adds them up.
 COMMON_OPTIONS = frozenset(
     (
         *KINDS,
@@ -54,7 +54,7 @@ COMMON_OPTIONS = frozenset(
         "wide",
     )
 )
-# Of `Database.query`, by their options.
+# Options that `Database.query` takes under the same names.
 _SELECTING = (*KINDS, "via", "without", "path", "paths", "where", "sort", "limit", "slowest")
 _ShowOption = Annotated[
     bool,
@@ -97,11 +97,11 @@ def build_command(header: Header) -> Any:
         _run(header, own, given)
 
     own_names = {param.name for param in header.params}
-    parameters = [parameter(param) for param in header.params]
+    parameters = [header_parameter(param) for param in header.params]
     for name, annotation, default in (
         *(
             (name, annotation, None)
-            for name, annotation in selecting_options(header).items()
+            for name, annotation in row_options(header).items()
             if name not in own_names
         ),
         *((name, annotation, None) for name, annotation in SLICE_OPTIONS.items()),
@@ -131,7 +131,6 @@ def build_command(header: Header) -> Any:
 
 
 def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
-    from msgflow.cli.meanwhile import ARROW, import_meanwhile
     from msgflow.cli.output import print_result
     from msgflow.database import Database
     from msgflow.export.formats import Format, format_of
@@ -143,7 +142,6 @@ def _run(header: Header, own: dict[str, Any], given: dict[str, Any]) -> None:
             "tables for people have times with their units — --times",
             "--format csv, json, jsonl or parquet, or a file with such a suffix",
         )
-    import_meanwhile(ARROW)
     with Database(given["database"], memory_limit=given["memory_limit"]) as database:
         result = database.query(
             header.name,

@@ -1,8 +1,7 @@
-"""`msgflow report`: the pictures of a run in one file, to keep or to mail."""
+"""`msgflow report`: the pages of a run in one file, to keep or to mail."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,8 @@ from msgflow.cli.options import (
     LakeWhereOption,
     MemoryLimitOption,
     RunOption,
+    bytes_of,
+    output_option,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.cli.ui import require_no_where
@@ -23,24 +24,13 @@ from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 
-_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(B|kB|KB|MB|GB)?")
-_UNITS = {None: 1, "B": 1, "kB": 1_000, "KB": 1_000, "MB": 1_000_000, "GB": 1_000_000_000}
-# Browsers take longer to unpack than anybody waits.
+# Browsers unpack larger pages too slowly.
 _MOST = 1_000_000_000
 
 
 @with_slice("start", "end")
 def command(
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.html",
-            help="File to write or replace",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = Path("msgflow.html"),
+    output: Annotated[Path, output_option("FILE.html")] = Path("msgflow.html"),
     run: RunOption = None,
     compare: Annotated[
         str | None,
@@ -119,10 +109,9 @@ def read_size(text: str) -> int:
     """Return the bytes that '20MB' means.
 
     Raises:
-        UsageError: it cannot be read, or is none or too much.
+        UsageError: the text is no size, or the size is zero or above 1 GB.
     """
-    match = _SIZE.fullmatch(text.strip())
-    size = round(float(match[1]) * _UNITS[match[2]]) if match else 0
+    size = bytes_of(text)
     if not 0 < size <= _MOST:
         raise UsageError(f"cannot read the size — {text}", "--max-size 20MB, at most 1GB")
     return size

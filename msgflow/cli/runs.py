@@ -12,18 +12,11 @@ from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, Wide
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode, UsageError
 
-app = typer.Typer(
-    cls=with_default("list"), help="List, rename, label and remove runs; without a command: list."
-)
+app = typer.Typer(cls=with_default("list"))
 _RunArgument = Annotated[
     str,
     typer.Argument(metavar="RUN", help="Name or id of the run", autocompletion=complete("run")),
 ]
-
-
-@app.callback()
-def group() -> None:
-    """List, rename, label and remove runs; without a command: list."""
 
 
 @app.command("list")
@@ -41,7 +34,7 @@ def list_runs(
 
     with Database(database) as opened:
         result = opened.query("info-runs", run="all")
-    # They are what is listed.
+    # The rows name the runs already.
     print_result(replace(result, runs=()), form, output, wide=wide)
 
 
@@ -124,7 +117,7 @@ def remove(
     with Database(database) as opened:
         if not yes and is_asked():
             runs = choose_runs(opened.runs(), run)
-            # While somebody thinks, others can use the database.
+            # Other programs can use the database until the user answers.
             opened.close()
             if not confirm(f"remove {', '.join(one.title for one in runs)}?"):
                 print_status("nothing was removed")

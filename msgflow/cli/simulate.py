@@ -1,4 +1,4 @@
-"""`msgflow simulate`: a trace of a ROS 2 system that never ran."""
+"""`msgflow simulate`: the trace of a simulated ROS 2 system."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SECOND = 1_000_000_000
 
 
 def _list(is_asked: bool) -> None:
-    """Print each system and what it is, then end."""
+    """Print each system with its description, then end."""
     if not is_asked:
         return
     from msgflow.cli.output import print_list

@@ -14,6 +14,7 @@ from msgflow.cli.options import (
     MemoryLimitOption,
     OutputOption,
     WideOption,
+    path_of,
 )
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
@@ -25,7 +26,7 @@ SqlArgument = Annotated[
 ]
 SqlFileOption = Annotated[
     Path | None,
-    typer.Option("-f", "--file", metavar="FILE", help="Read the query from FILE"),
+    typer.Option("-f", "--file", metavar="FILE", parser=path_of, help="Read the query from FILE"),
 ]
 PrintedRowsOption = Annotated[
     int,
@@ -49,12 +50,10 @@ def command(
 
     `msgflow db schema` lists the views.
     """
-    from msgflow.cli.meanwhile import ARROW, import_meanwhile
     from msgflow.cli.output import print_result
     from msgflow.database import Database
 
     query = sql_of(text, file, 'msgflow sql "SELECT * FROM run"')
-    import_meanwhile(ARROW)
     with Database(database, memory_limit=memory_limit) as opened:
         result = opened.sql(query, limit=limit or None)
     print_result(result, form, output, wide=wide)

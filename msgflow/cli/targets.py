@@ -11,12 +11,7 @@ from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.run.slice import LATEST, Slice
 
-app = typer.Typer(help="Write requirements for verify.")
-
-
-@app.callback()
-def group() -> None:
-    """Write requirements for verify."""
+app = typer.Typer()
 
 
 @app.command("suggest")

@@ -1,4 +1,4 @@
-"""`msgflow ui`: the pictures of a database, in the browser."""
+"""`msgflow ui`: the pages of a database in the browser."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption
+from msgflow.cli.options import DatabaseOption, LakePageOption, LakeWhereOption, memory_limit_option
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 
@@ -26,16 +26,7 @@ def command(
             show_default="8642, else any free one",
         ),
     ] = None,
-    memory_limit: Annotated[
-        str | None,
-        typer.Option(
-            "--memory-limit",
-            envvar="MSGFLOW_MEMORY_LIMIT",
-            metavar="SIZE",
-            help="Maximum memory for queries",
-            show_default="a quarter of the machine's, 500MB to 4GB",
-        ),
-    ] = None,
+    memory_limit: Annotated[str | None, memory_limit_option("Maximum memory for queries")] = None,
     lake: LakePageOption = None,
     where: LakeWhereOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
@@ -65,7 +56,7 @@ def command(
     from msgflow.fleet.lake_page import lake_page
 
     opened = Lake.open(lake)
-    # Once before anybody looks: what cannot be shown is said here.
+    # Made once before the browser asks, so that errors are printed here.
     first = [lake_page(opened, where=where).content]
     serve_single(
         lambda: first.pop() if first else lake_page(opened, where=where).content,
@@ -75,10 +66,10 @@ def command(
 
 
 def require_no_where(where: str | None) -> None:
-    """Raise where runs of a lake are chosen, and there is no lake.
+    """Raise an error if --where is given without --lake.
 
     Raises:
-        UsageError: they are.
+        UsageError: `where` is given.
     """
     if where is not None:
         raise UsageError("--where chooses runs of a lake", "--lake PATH")

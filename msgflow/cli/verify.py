@@ -1,4 +1,4 @@
-"""`msgflow verify`: whether a run meets the requirements of a file."""
+"""`msgflow verify`: requirements of a file, checked in a run."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import typer
 
 from msgflow.cli.completion import complete
 from msgflow.cli.options import (
-    OUTPUT,
     DatabaseOption,
     OutputOption,
     WideOption,
+    format_option,
+    path_of,
 )
 from msgflow.cli.slice_options import with_slice
 from msgflow.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
@@ -23,7 +24,7 @@ from msgflow.run.slice import LATEST, Slice
 
 
 class VerifyFormat(StrEnum):
-    """How verdicts are written."""
+    """Formats of verdicts."""
 
     TABLE = "table"
     JSON = "json"
@@ -49,7 +50,12 @@ def command(
     part: Slice = LATEST,
     paths: Annotated[
         Path,
-        typer.Option("--paths", metavar="FILE", help="The file with the paths that have names"),
+        typer.Option(
+            "--paths",
+            metavar="FILE",
+            parser=path_of,
+            help="The file with the paths that have names",
+        ),
     ] = Path(DEFAULT_PATHS),
     allow_not_measured: Annotated[
         bool,
@@ -60,12 +66,7 @@ def command(
     ] = False,
     form: Annotated[
         VerifyFormat | None,
-        typer.Option(
-            "--format",
-            help="Output format",
-            show_default="junit into FILE.xml, else table",
-            rich_help_panel=OUTPUT,
-        ),
+        format_option("Output format", show_default="junit into FILE.xml, else table"),
     ] = None,
     output: OutputOption = None,
     wide: WideOption = False,

@@ -72,7 +72,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def _may_be_replaced(handler: object) -> bool:
-    # Python's own handler, and that of the command line (msgflow.cli.stop).
+    # Python's own handler, and that of the command line (msgflow.cli.signals).
     return handler is signal.default_int_handler or getattr(handler, "raises_interrupts", False)
 
 

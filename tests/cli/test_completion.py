@@ -19,7 +19,7 @@ from thorough import few
 from msgflow.db.known_names import known_names
 
 PROGRAM = [sys.executable, "-c", "import sys; sys.argv = ['msgflow']; "
-           "from msgflow.__main__ import program; program()"]  # fmt: skip
+           "from msgflow.__main__ import main; main()"]  # fmt: skip
 EVIL = (
     "/plain", "/two words", "$(touch hacked)", "`touch hacked`", "'; touch hacked; '", '"/quoted"',
     "/line\nbreak", "\x1b[31m/red", "--help", "~root", "*", "/a\\b", "x;touch hacked", "", "/ünï",
@@ -45,7 +45,7 @@ for variables in given:
 def ask(
     words: list[str], directory: Path, *, shell: str = "fish", database: Path | None = None
 ) -> list[str]:
-    """Return what a shell is told for the last of these words."""
+    """Return the completions of the last of these words."""
     (answer,) = ask_each([words], directory, shell=shell, database=database)
     return answer
 
@@ -53,7 +53,7 @@ def ask(
 def ask_each(
     lines: list[list[str]], directory: Path, *, shell: str = "fish", database: Path | None = None
 ) -> list[list[str]]:
-    """Return what a shell is told for the last word of each line."""
+    """Return the completions of the last word of each line."""
     environment = {name: value for name, value in os.environ.items() if name != "MSGFLOW_DB"}
     environment |= {
         "_MSGFLOW_COMPLETE": f"complete_{shell}",
@@ -231,7 +231,7 @@ def test_bash_itself_has_words_that_are_names(named: Path, tmp_path: Path, typed
     )
     (tmp_path / "bin").mkdir()
     program = tmp_path / "bin" / "msgflow"
-    program.write_text(f"#!{sys.executable}\nfrom msgflow.__main__ import program\nprogram()\n")
+    program.write_text(f"#!{sys.executable}\nfrom msgflow.__main__ import main\nmain()\n")
     program.chmod(0o755)
     text = f"""{script}
 COMP_WORDS=(msgflow runs rename '{typed}') COMP_CWORD=3
@@ -253,7 +253,7 @@ eval "printf '%s\\n' ${{COMPREPLY[*]}}"
 
 
 def test_the_script_can_be_shown_and_installed(tmp_path: Path) -> None:
-    # Typer asks which process is the shell: here it is told.
+    # Typer does not look for the process of the shell then.
     environment = os.environ | {
         "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
         "HOME": str(tmp_path),
@@ -293,7 +293,7 @@ def test_completion_imports_no_more_than_it_needs(small_database: Path, tmp_path
     )
     assert done.stdout.split() == ["/chatter"]
     heavy = {
-        "pyarrow", "numpy", "sqlalchemy", "alembic", "pydantic", "rich.markdown",
+        "pyarrow", "numpy", "sqlalchemy", "alembic",
         "msgflow.database", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
     }  # fmt: skip
     assert heavy & set(done.stderr.split()) == set()

@@ -21,7 +21,6 @@ from thorough import few, thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
-from msgflow.errors import ExitCode
 from msgflow.ingest import ingest
 from msgflow.sim import Recording, simulate
 
@@ -70,50 +69,6 @@ def test_numpy_starts_no_threads() -> None:
     assert done.stdout.split()[-1] == "1"
 
 
-_ENDING = """
-import atexit, sys, threading, time
-
-def late():
-    time.sleep(0.3)
-    print("thread")
-
-def looking(*arguments):
-    pass
-
-atexit.register(print, "at exit")
-threading.Thread(target=late).start()
-from msgflow.__main__ import program
-if sys.argv.pop(1) == "profiled":
-    sys.setprofile(looking)
-try:
-    program()
-finally:
-    print("still there")
-"""
-
-
-def ended(how: str, *arguments: str) -> tuple[int, list[str]]:
-    done = subprocess.run(
-        [sys.executable, "-c", _ENDING, how, *arguments],
-        stdout=subprocess.PIPE,
-        text=True,
-        check=False,
-        env={key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"},
-    )
-    return done.returncode, done.stdout.splitlines()[-3:]
-
-
-def test_the_process_ends_with_the_program() -> None:
-    """Nothing is freed; but threads are waited for, and what is registered for the end is done."""
-    code, lines = ended("plain", "--version")
-    assert (code, lines[-2:]) == (0, ["thread", "at exit"])
-    assert ended("plain", "nonsense") == (ExitCode.USAGE, ["thread", "at exit"])
-
-
-def test_a_profiler_lives_to_write_what_it_found() -> None:
-    assert ended("profiled", "--version") == (0, ["still there", "thread", "at exit"])
-
-
 HELP = (
     ("--help",),
     ("--version",),
@@ -133,8 +88,8 @@ HELP = (
 )
 
 
-def test_help_imports_neither_the_database_stack_nor_what_prints_other_help() -> None:
-    assert not imported(*HELP) & {*HEAVY, "markdown_it", "pygments"}
+def test_help_imports_nothing_of_the_database_stack() -> None:
+    assert not imported(*HELP) & set(HEAVY)
 
 
 def test_a_query_imports_what_it_needs_and_no_more(small_database: Path) -> None:

@@ -1,17 +1,180 @@
-"""A fixed slice of benchmarks/signals.py: commands that write, ended at random moments."""
+"""Ctrl-C and SIGTERM at any moment of the program: its exit code, one line, no traceback."""
 
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+from msgflow.errors import ExitCode
+
+# Counts the calls of Python functions from the first line of the program. At a given one the
+# process sends itself a signal.
+_COUNTING = """
+import os, signal, sys
+from msgflow.__main__ import main
+from msgflow.cli import signals
+
+number, at = int(sys.argv[1]), int(sys.argv[2])
+sys.argv[1:] = sys.argv[3:]
+count = 0
+
+def called(frame, event, argument):
+    global count
+    if event != "call" or frame.f_code.co_filename == signals.__file__:
+        return
+    count += 1
+    if count == at:
+        signal.raise_signal(number)
+
+class Counting(signals.SignalHandler):
+    def run(self, program):
+        def counted():
+            sys.setprofile(called)
+            program()
+        super().run(counted)
+
+signals.HANDLER.__class__ = Counting
+try:
+    main()
+finally:
+    sys.setprofile(None)
+    if not at:
+        os.write(2, str(count).encode())
+"""
+_ENDINGS = {
+    signal.SIGINT: (ExitCode.INTERRUPTED, "error: interrupted\n"),
+    signal.SIGTERM: (ExitCode.TERMINATED, "error: terminated\n"),
+}
+
+
+def python(program: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-c", program, *map(str, arguments)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_at_any_moment_a_signal_ends_the_program_cleanly(
+    small_database: Path, number: signal.Signals
+) -> None:
+    arguments = ("query", "info-runs", "--db", small_database)
+    whole = python(_COUNTING, int(number), 0, *arguments)
+    assert whole.returncode == 0
+    calls = int(whole.stderr.rsplit("\n", 1)[-1])
+    ended = set()
+    for part in range(5):
+        done = python(_COUNTING, int(number), 1 + calls * part // 5, *arguments)
+        ended.add((done.returncode, done.stderr.removeprefix("runs: morning (1), noon (2)\n")))
+    assert ended == {_ENDINGS[number]}
+
+
+_IMPORTING = """
+import signal, sys
+from msgflow.__main__ import main
+
+def called(frame, event, argument):
+    if event == "call" and "_create_" in frame.f_code.co_name and "_duckdb" in sys.modules:
+        sys.setprofile(None)
+        signal.raise_signal(number)
+
+sys.setprofile(called)
+number, sys.argv[1:] = int(sys.argv[1]), ["sql", "FROM run", "--db", sys.argv[2]]
+main()
+"""
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_a_signal_while_duckdb_is_loaded(small_database: Path, number: signal.Signals) -> None:
+    """Its C++ code would abort the process at an exception."""
+    done = python(_IMPORTING, int(number), small_database)
+    assert (done.returncode, done.stderr) == (-number, "")
+
+
+_FAILING = """
+import signal, sys
+from msgflow.__main__ import main
+from msgflow.cli import app, info
+from msgflow.errors import DatabaseError
+
+def failing():
+    {body}
+
+info.command = failing
+sys.argv[1:] = ["info"]
+main()
+"""
+
+
+def failing(number: signal.Signals, body: str) -> tuple[int, str]:
+    done = python(_FAILING.replace("{body}", body.replace("{0}", str(int(number)))))
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize(
+    "body",
+    [
+        # Libraries turn it into an exception of their own.
+        "try: signal.raise_signal({0})\n    except KeyboardInterrupt: raise DatabaseError('x')",
+        # A library ignores it.
+        "try: signal.raise_signal({0})\n    except KeyboardInterrupt: pass",
+    ],
+)
+def test_no_signal_is_lost_or_taken_for_an_error(number: signal.Signals, body: str) -> None:
+    assert failing(number, body) == _ENDINGS[number]
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_a_signal_while_an_error_is_printed(number: signal.Signals) -> None:
+    broken = "app.print_exception = lambda error: signal.raise_signal({0})\n    raise ValueError"
+    assert failing(number, broken) == _ENDINGS[number]
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+@pytest.mark.parametrize(
+    "body",
+    [
+        # A second one while the command tidies up.
+        "try: signal.raise_signal({0})\n    finally: signal.raise_signal({0})",
+        # In a finalizer Python would print it, and go on.
+        "import weakref\n    thing = set()\n"
+        "    reference = weakref.ref(thing, lambda _: signal.raise_signal({0}))\n    del thing",
+    ],
+)
+def test_the_process_ends_at_once(number: signal.Signals, body: str) -> None:
+    assert failing(number, body) == (-number, "")
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_after_its_end_a_signal_changes_nothing(number: signal.Signals) -> None:
+    program = (
+        "import atexit, signal, sys\n"
+        "from msgflow.__main__ import main\n"
+        f"atexit.register(signal.raise_signal, {int(number)})\n"
+        "sys.argv[1:] = ['--version']\n"
+        "main()\n"
+    )
+    done = python(program)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_what_the_caller_wants_ignored_is(number: signal.Signals) -> None:
+    ignored = f"import signal; signal.signal({int(number)}, signal.SIG_IGN)\n"
+    program = (
+        "from msgflow.cli.signals import HANDLER\n"
+        f"HANDLER.run(lambda: signal.raise_signal({int(number)}))\n"
+    )
+    assert python(ignored + program).returncode == 0
+
+
+_BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 # In a process of its own, as some commands are forked from it.
-SLICE = """
+_SLICE = """
 import json, signal
 import signals
 both = signal.SIGINT, signal.SIGKILL
@@ -21,9 +184,10 @@ print(json.dumps([signals.NAMES, list(ends)]))
 
 
 @pytest.mark.thorough
-def test_a_slice_of_the_campaign() -> None:
+def test_commands_that_write_ended_at_random_moments() -> None:
+    """A fixed slice of benchmarks/signals.py."""
     done = subprocess.run(
-        [sys.executable, "-c", SLICE], cwd=BENCHMARKS, capture_output=True, text=True, check=False
+        [sys.executable, "-c", _SLICE], cwd=_BENCHMARKS, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr[-2000:]
     names, ends = json.loads(done.stdout.splitlines()[-1])

@@ -1,22 +1,22 @@
-"""What the help says of the commands without importing them."""
+"""The commands of the program: what the help says of them, and what it imports."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
+from inspect import getdoc
 
 import pytest
-import typer
 
-from msgflow.cli.app import app
-from msgflow.cli.outline import OUTLINES
+from msgflow.cli.app import COMMANDS
 
 
-@pytest.mark.parametrize("name", OUTLINES)
-def test_a_command_says_the_same_of_itself(name: str) -> None:
-    command = typer.main.get_command(app).commands[name]
-    assert command.get_short_help_str(1_000) == OUTLINES[name].get_short_help_str(1_000)
-    assert not command.hidden
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_begins_with_its_summary(name: str) -> None:
+    module = import_module(f"msgflow.cli.{name}")
+    if not hasattr(module, "app"):
+        assert (getdoc(module.command) or "").startswith(COMMANDS[name])
 
 
 def test_the_help_lists_all_and_imports_none() -> None:
@@ -30,6 +30,6 @@ def test_the_help_lists_all_and_imports_none() -> None:
     )
     *lines, modules = run.stdout.splitlines()
     listed = [line.split()[1] for line in lines if line.startswith("│ ")]
-    assert [name for name in listed if name in OUTLINES] == list(OUTLINES)
+    assert [name for name in listed if name in COMMANDS] == list(COMMANDS)
     imported = {module.removeprefix("msgflow.cli.") for module in modules.split()}
-    assert not imported & set(OUTLINES)
+    assert not imported & set(COMMANDS)

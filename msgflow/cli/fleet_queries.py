@@ -1,4 +1,4 @@
-"""`msgflow fleet query`, `sql`, `worst` and `open`: questions to the runs of a lake."""
+"""`msgflow fleet query`, `sql`, `worst` and `open`: queries on the runs of a lake."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from msgflow.cli.options import (
     LakeWhereOption,
     OutputOption,
     WideOption,
+    output_option,
 )
+from msgflow.cli.row_options import LimitOption, SortOption, row_option
 from msgflow.cli.sql import (
     DEFAULT_LIMIT,
     PrintedRowsOption,
@@ -25,7 +27,6 @@ from msgflow.cli.sql import (
 )
 from msgflow.errors import UsageError
 
-_CHOICE = "Which rows"
 _MOST_WORST = 1_000
 
 
@@ -53,55 +54,19 @@ def query(
             show_default="first",
         ),
     ] = None,
-    node: Annotated[
-        list[str] | None,
-        typer.Option("--node", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
-    ] = None,
-    topic: Annotated[
-        list[str] | None,
-        typer.Option("--topic", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
-    ] = None,
-    callback: Annotated[
-        list[str] | None,
-        typer.Option("--callback", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
-    ] = None,
-    host: Annotated[
-        list[str] | None,
-        typer.Option("--host", metavar="NAME", help="Name or glob", rich_help_panel=_CHOICE),
-    ] = None,
+    node: Annotated[list[str] | None, row_option("node", "NAME", "Name or glob")] = None,
+    topic: Annotated[list[str] | None, row_option("topic", "NAME", "Name or glob")] = None,
+    callback: Annotated[list[str] | None, row_option("callback", "NAME", "Name or glob")] = None,
+    host: Annotated[list[str] | None, row_option("host", "NAME", "Name or glob")] = None,
     via: Annotated[
         list[str] | None,
-        typer.Option(
-            "--via",
-            metavar="NAME",
-            help="Paths through all of these topics and nodes",
-            rich_help_panel=_CHOICE,
-        ),
+        row_option("via", "NAME", "Paths through all of these topics and nodes"),
     ] = None,
     without: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--without",
-            metavar="NAME",
-            help="Paths through none of these",
-            rich_help_panel=_CHOICE,
-        ),
+        list[str] | None, row_option("without", "NAME", "Paths through none of these")
     ] = None,
-    sort: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--sort",
-            metavar="COLUMN[:desc]",
-            help="Column to sort by, or several",
-            rich_help_panel=_CHOICE,
-        ),
-    ] = None,
-    limit: Annotated[
-        int | None,
-        typer.Option(
-            "--limit", metavar="N", min=1, help="Maximum number of rows", rich_help_panel=_CHOICE
-        ),
-    ] = None,
+    sort: SortOption = None,
+    limit: LimitOption = None,
     internal: InternalOption = False,
     form: FormatOption = None,
     columns: ColumnsOption = None,
@@ -201,12 +166,10 @@ def open_(
     lake: LakeOption,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
+        output_option(
             help="New database file; one that exists is not replaced",
             show_default="RUN.duckdb",
+            rich_help_panel=None,
         ),
     ] = None,
 ) -> None:
@@ -221,7 +184,7 @@ def open_(
 
 
 def require_lake(lake: str) -> None:
-    """Raise where an option of a command that does something without a lake, too, is missing.
+    """Raise an error if no lake is named; some commands do something without one, too.
 
     Raises:
         UsageError: no lake is named.

@@ -1,4 +1,4 @@
-"""Options from the parameters that the header of an SQL file declares."""
+"""Options of the command line for the parameters in the header of an SQL file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from msgflow.cli.completion import complete, is_completing
+from msgflow.cli.completion import complete
 from msgflow.query.names import PLACE_PARAMETERS
 
 if TYPE_CHECKING:
@@ -19,8 +19,8 @@ PARAMETERS = "Parameters"
 OWN = "own_"
 
 
-def declared(param: Param, panel: str = PARAMETERS) -> Any:
-    """Return the option for a parameter; without a value the header has the default."""
+def header_option(param: Param, panel: str = PARAMETERS) -> Any:
+    """Return the option for a parameter; the default stands in the header."""
     flag = f"--{param.name.replace('_', '-')}"
     return typer.Option(
         f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
@@ -32,8 +32,8 @@ def declared(param: Param, panel: str = PARAMETERS) -> Any:
     )
 
 
-def parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
-    """Return the parameter of a command for a parameter of a header; its name begins with OWN."""
+def header_parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
+    """Return the parameter of a command for a parameter of a header, with OWN before its name."""
     kind: Any = bool if param.type == "BOOLEAN" else str
     if param.name in PLACE_PARAMETERS:
         kind = list[str]
@@ -41,7 +41,9 @@ def parameter(param: Param, panel: str = PARAMETERS) -> Parameter:
         f"{OWN}{param.name}",
         Parameter.KEYWORD_ONLY,
         default=None if param.has_default else Parameter.empty,
-        annotation=Annotated[kind | None if param.has_default else kind, declared(param, panel)],
+        annotation=Annotated[
+            kind | None if param.has_default else kind, header_option(param, panel)
+        ],
     )
 
 
@@ -64,7 +66,7 @@ def _describe(param: Param) -> str:
 
 
 def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters that have a value, by the names that the header has."""
+    """Return the values of those parameters of a header that were given."""
     own = {name.removeprefix(OWN): value for name, value in words.items() if name.startswith(OWN)}
     return {
         name: ",".join(value) if isinstance(value, list) else value
@@ -74,9 +76,7 @@ def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def escape(text: str) -> str:
-    """Return a text that Rich prints as it is."""
-    if is_completing():
-        return text
+    """Return a text without markup: Rich prints it as it is."""
     from rich import markup
 
     return markup.escape(text)

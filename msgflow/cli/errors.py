@@ -1,0 +1,71 @@
+"""Error messages of the command line, and the exit codes that belong to them."""
+
+from __future__ import annotations
+
+import errno
+import os
+import traceback
+
+import typer
+
+from msgflow.cli.output import discard_stdout, print_error
+from msgflow.errors import ExitCode, MsgflowError
+from msgflow.version import __version__
+
+_CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+# Phrases of Typer and Pydantic, and ours for them.
+_PHRASES = (
+    ("Value error, ", ""),
+    ("Input should be a valid integer, unable to parse string as an integer", "no whole number"),
+    ("Input should be a valid number, unable to parse string as a number", "no number"),
+    ("Input should be ", "it has to be "),
+)
+
+
+def print_exception(error: Exception) -> ExitCode:
+    """Print what went wrong, without a traceback, and return the exit code."""
+    if isinstance(error, MsgflowError):
+        print_error(error.message, error.hint)
+        return error.exit_code
+    if isinstance(error, typer.TyperException):
+        print_error(*_usage(error))
+        return ExitCode(error.exit_code)
+    if isinstance(error, OSError) and _is_of_stdout(error):
+        return _unwritable(error)
+    return _unexpected(error)
+
+
+def _is_of_stdout(error: OSError) -> bool:
+    # An error of opening a file names it, and those of writing to one are caught where we write.
+    return error.filename is None and error.errno in _CANNOT_WRITE
+
+
+def _unwritable(error: OSError) -> ExitCode:
+    discard_stdout()
+    reason = (error.strerror or str(error)).lower()
+    print_error(
+        f"cannot write to stdout: {reason}", "write to another place, for instance with -o FILE"
+    )
+    return ExitCode.USAGE
+
+
+def _usage(error: typer.TyperException) -> tuple[str, str | None]:
+    message, _, suggestion = error.format_message().strip().partition(". Did you mean ")
+    for phrase, ours in _PHRASES:
+        message = message.replace(phrase, ours)
+    context = getattr(error, "ctx", None)
+    hint = None if context is None else f"{context.command_path} --help"
+    if suggestion:
+        hint = f"did you mean {suggestion}"
+    return message[:1].lower() + message[1:].rstrip("."), hint
+
+
+def _unexpected(error: Exception) -> ExitCode:
+    summary = (str(error).strip().splitlines() or [""])[0]
+    if os.environ.get("MSGFLOW_DEBUG") == "1":
+        traceback.print_exception(error)
+        hint = f"this is a mistake of msgflow {__version__}; report it with the lines above"
+    else:
+        hint = "this is a mistake of msgflow; MSGFLOW_DEBUG=1 in the environment shows where"
+    print_error(f"unexpected {type(error).__name__}: {summary}", hint)
+    return ExitCode.FAILED

@@ -1,0 +1,102 @@
+"""Signal handling of the program: SIGINT (Ctrl-C) and SIGTERM end a command cleanly.
+
+The first signal raises KeyboardInterrupt, so that the command can tidy up. Then both signals have
+their default action again: a second one ends the process at once, as SIGKILL does. No database
+minds that.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import TYPE_CHECKING
+
+from msgflow.errors import ExitCode
+from msgflow.sql.interrupt import Terminated
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class SignalHandler:
+    """The handler of both signals.
+
+    Attributes:
+        came: exit code of the signal that came while the program ran; None without one.
+    """
+
+    # msgflow.sql.interrupt replaces such a handler while a statement runs.
+    raises_interrupts = True
+
+    def __init__(self) -> None:
+        self.came: ExitCode | None = None
+
+    def run(self, program: Callable[[], None]) -> None:
+        """Run the program, and turn a signal into its exit code.
+
+        A signal that the parent process ignores stays ignored.
+
+        Raises:
+            SystemExit: of the program, or with the exit code of the signal.
+        """
+        self.came = None
+        for number in _SIGNALS:
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                signal.signal(number, self)
+        sys.unraisablehook = _end_after_lost_signal
+        try:
+            program()
+        except KeyboardInterrupt as error:
+            from msgflow.cli.output import print_error
+
+            code = exit_code(error)
+            print_error(code.name.lower())
+            raise SystemExit(int(code)) from None
+        finally:
+            # The command is over and has said so: a signal cannot change its exit code any more.
+            for number in _SIGNALS:
+                if signal.getsignal(number) is self:
+                    signal.signal(number, signal.SIG_IGN)
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Raise KeyboardInterrupt, or Terminated for SIGTERM."""
+        restore_default_actions()
+        if _is_loading_duckdb():
+            # Its C++ code would abort the process at an exception. Nothing has begun yet.
+            signal.raise_signal(number)
+        error = (Terminated if number == signal.SIGTERM else KeyboardInterrupt)()
+        self.came = exit_code(error)
+        raise error
+
+
+def restore_default_actions() -> None:
+    """Let each signal end the process at once from now on, unless it is ignored."""
+    for number in _SIGNALS:
+        if signal.getsignal(number) is HANDLER:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def exit_code(error: KeyboardInterrupt) -> ExitCode:
+    """Return the exit code of a command that a signal ended."""
+    return ExitCode.TERMINATED if isinstance(error, Terminated) else ExitCode.INTERRUPTED
+
+
+def _is_loading_duckdb() -> bool:
+    # Its first import is that of its C++ code.
+    module = sys.modules.get("duckdb")
+    return module is not None and not hasattr(module, "DuckDBPyConnection")
+
+
+def _end_after_lost_signal(unraisable: sys.UnraisableHookArgs) -> None:
+    # Python prints an exception of a finalizer and goes on. Where it is that of a signal, the
+    # default action of the signal follows.
+    error = unraisable.exc_value
+    if isinstance(error, KeyboardInterrupt):
+        signal.raise_signal(signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT)
+    sys.__unraisablehook__(unraisable)
+
+
+HANDLER = SignalHandler()
