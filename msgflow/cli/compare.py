@@ -23,7 +23,7 @@ from msgflow.cli.options import (
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 # On a terminal: paths are long.
 _MOST_ROWS = 10
@@ -103,7 +103,7 @@ def command(
 def _signature() -> Signature:
     """Return the options: those of the statement, and those of the command."""
     positional, keyword = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
-    declared = (p for p in program().header("comparison").params if p.name not in _COMMON)
+    declared = (p for p in internal_sql().header("comparison").params if p.name not in _COMMON)
     return Signature(
         [
             Parameter("run_a", positional, annotation=_RunA),

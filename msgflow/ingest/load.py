@@ -17,7 +17,7 @@ from msgflow.ingest.ignored import is_ignored, matches
 from msgflow.ingest.implausible import Implausible
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.sequences import Placed, Sequences
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 
 if TYPE_CHECKING:
@@ -258,7 +258,7 @@ class _Tables:
     def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
         self._con.register("packet_batch", rows)
         try:
-            runs = self._con.execute(program().text("known_packet")).fetchall()
+            runs = self._con.execute(internal_sql().text("known_packet")).fetchall()
         finally:
             self._con.unregister("packet_batch")
         if runs and not self._may_replace:
