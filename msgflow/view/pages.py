@@ -253,13 +253,10 @@ class Pages:
             units=result.units,
         )
 
-    def recorded(
-        self, connection: duckdb.DuckDBPyConnection, extent: Extent, window: Window
-    ) -> Params:
-        """Return the parameters that all queries of a window need."""
-        values = extent.frame(window)
-        recorded: Params = run_page_query(connection, "recorded_window", values).to_pylist()[0]
-        return values | recorded
+    def links(self, connection: duckdb.DuckDBPyConnection, values: Params, limit: int) -> pa.Table:
+        """Return the arrows of a window, at most `limit`; its values are those of `frame`."""
+        (ids,) = run_page_query(connection, "window_ids", values).to_pylist()
+        return run_page_query(connection, "links", values | ids | {"limit": limit})
 
     def _segments(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
@@ -267,7 +264,7 @@ class Pages:
         width = max(window.end_ns - window.start_ns, 1)
         bin_ns = -(-width // MOST_BINS)
         level_ns = extent.length_ns // LEVEL_BINS + 1
-        values = self.recorded(connection, extent, window)
+        values = extent.frame(window)
         # Whether a window is drawn one by one does not depend on what is known of the run already.
         (count,) = run_page_query(connection, "segment_count", values)["count"].to_pylist()
         meta: dict[str, Any] = {"start": window.start_ns - extent.origin_ns, "count": count}
@@ -293,20 +290,20 @@ class Pages:
             lambda: run_page_query(
                 connection,
                 "segments",
-                self.recorded(connection, extent, whole) | {"bin_ns": level_ns},
+                extent.frame(whole) | {"bin_ns": level_ns},
             ),
         )
 
     def _links(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        values = self.recorded(connection, extent, self.window(extent, params))
-        table = run_page_query(connection, "links", values | {"limit": MOST_LINKS + 1})
+        values = extent.frame(self.window(extent, params))
+        table = self.links(connection, values, MOST_LINKS + 1)
         is_cut = table.num_rows > MOST_LINKS
         return encode(table.slice(0, MOST_LINKS), meta={"is_cut": is_cut}, units=_units("links"))
 
     def _edge(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        values = self.recorded(connection, extent, self.window(extent, params))
+        values = extent.frame(self.window(extent, params))
         return encode(run_page_query(connection, "edge", values), units=_units("edge"))
 
     def _flow(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:

@@ -253,10 +253,10 @@ class _Maker:
             "stretches": [],
             "count": 0,
         }
-        values = self.pages.recorded(self.connection, self.extent, window)
+        values = self.extent.frame(window)
         if not self.extent.length_ns:
             self.stretch(0, window, None)
-            self.edges(window)
+            self.parts.add("edge?", encode(self.edges(window)))
             head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
             head["notes"] = self.notes
             return head
@@ -272,7 +272,7 @@ class _Maker:
             )
         if count * _BYTES_PER_BAR <= room or rows is not None:
             self.stretch(0, window, rows)
-            self.edges(window)
+            self.parts.add("edge?", encode(self.edges(window)))
             head["stretches"] = [{"start": head["start"], "end": head["end"], "whole": True}]
         else:
             self.thinned(head, window, room, count)
@@ -280,9 +280,9 @@ class _Maker:
         return head
 
     def stretch(self, place: int, window: Window, rows: list[int] | None) -> int:
-        values = self.pages.recorded(self.connection, self.extent, window)
+        values = self.extent.frame(window)
         table = run_page_query(self.connection, "segments", values)
-        links = run_page_query(self.connection, "links", values | {"limit": 2**40})
+        links = self.pages.links(self.connection, values, 2**40)
         if rows is not None:
             known = pa.array(rows, pa.int64())
             table = table.filter(compute.is_in(table["row_key"], known))
@@ -296,9 +296,8 @@ class _Maker:
         self.parts.add(f"links?place={place}", encode(links))
         return int(table.num_rows)
 
-    def edges(self, window: Window) -> None:
-        values = self.pages.recorded(self.connection, self.extent, window)
-        self.parts.add("edge?", encode(run_page_query(self.connection, "edge", values)))
+    def edges(self, window: Window) -> pa.Table:
+        return run_page_query(self.connection, "edge", self.extent.frame(window))
 
     def rows_on(self, paths: list[int]) -> list[int]:
         """Return the rows of the timeline on some paths: their objects, timers and executors."""
@@ -321,7 +320,7 @@ class _Maker:
     def thinned(self, head: dict[str, Any], window: Window, room: int, count: int) -> None:
         """Keep the run in bins, and single bars around the slowest flows."""
         origin = self.extent.origin_ns
-        values = self.pages.recorded(self.connection, self.extent, window)
+        values = self.extent.frame(window)
         bins = LEVEL_BINS
         while True:
             bin_ns = (window.end_ns - window.start_ns) // bins + 1
@@ -348,8 +347,7 @@ class _Maker:
             else:
                 stretches.append(Window(low, high))
         held = sum(self.stretch(place, stretch, None) for place, stretch in enumerate(stretches))
-        tables = [self._edge_table(stretch) for stretch in stretches]
-        edges = pa.concat_tables(tables)
+        edges = pa.concat_tables(map(self.edges, stretches))
         distinct = edges.group_by(edges.column_names).aggregate([])
         order = [
             (name, "ascending")
@@ -367,10 +365,6 @@ class _Maker:
             f" ({held:,} bars), the rest in bins of {bin_ns / 1e6:.3f} ms. A larger --max-size, or"
             " --start and --end, keep more; msgflow ui has everything."
         )
-
-    def _edge_table(self, window: Window) -> pa.Table:
-        values = self.pages.recorded(self.connection, self.extent, window)
-        return run_page_query(self.connection, "edge", values)
 
     def slow_moments(self) -> list[int]:
         """Return when the slowest flow of each path began, the slowest first."""

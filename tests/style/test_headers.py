@@ -19,7 +19,9 @@ from msgflow.db import objects
 from msgflow.ingest.calls import TAKEN_APART
 from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
+from msgflow.sql.header import Header
 from msgflow.sql.statement import internal_sql
+from msgflow.view.page_query import DIRECTORY, page_query
 
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
@@ -35,6 +37,7 @@ TABLES = {
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
 INTERNAL = [file for file in FILES if file.layer == "internal"]
+PAGE_QUERIES = [page_query(path.stem) for path in sorted(DIRECTORY.glob("*.sql"))]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 LAYER_OF |= {
     header.name: layer for layer in ("model", "stat", "public") for header in objects.load(layer)
@@ -103,8 +106,11 @@ def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
         stored_of = LAYER_OF.get(name.replace("store.", "derive.", 1), "store")
         layer = stored_of if name.startswith("store.") else LAYER_OF.get(name, "model")
         assert LAYERS.index(layer) <= position, f"{file} reads {name}"
-    if file.layer == "queries":
-        assert {name.partition(".")[0] for name in file.references} <= {"main"}
+
+
+@each([*(file.header for file in QUERIES), *PAGE_QUERIES], name=lambda header: header.name)
+def test_queries_of_users_and_pages_read_public_views_alone(header: Header) -> None:
+    assert {name.partition(".")[0] for name in header.needs} <= {"main"}
 
 
 @each(FILES)

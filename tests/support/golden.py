@@ -439,8 +439,9 @@ def _page_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     values = _FRAME | given
-    (recorded,) = run_page_query(connection, "recorded_window", values).to_pylist()
-    values = recorded | values
+    if name == "links":
+        (ids,) = run_page_query(connection, "window_ids", values).to_pylist()
+        values |= ids
     if not case.scratch:
         return run_page_query(connection, name, values)
     scratch = Scratch()
