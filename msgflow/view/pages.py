@@ -19,9 +19,9 @@ from msgflow.query.compare import compare
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
-from msgflow.view.columns import encode
 from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import page_query, run_page_query
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -113,7 +113,7 @@ class Scratch:
 
 
 class Pages:
-    """Answers to what pages ask, each as bytes (see `columns`).
+    """Answers to what pages ask, each as bytes (see `table_encoding`).
 
     A pages object may be used by several threads, each with a connection of its own.
 

@@ -17,10 +17,10 @@ from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import WHOLE, Window
-from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
 from msgflow.view.single_page import Parts, single_page
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -40,7 +40,7 @@ def single_page(parts: Parts, head: dict[str, Any]) -> str:
 
     Args:
         parts: its data.
-        head: what embedded.js has to know of them.
+        head: what report_data.js has to know of them.
     """
     packed = base64.b64encode(parts.pack(head)).decode()
     scripts = [*(assets.vendored(name) for name in assets.SCRIPTS), assets.joined()]

@@ -1,6 +1,6 @@
 // The data of a report: in the file itself, compressed; what a database answers otherwise.
 
-import { decode } from "./columns.js";
+import { decode } from "./table_decoding.js";
 
 export async function embedded() {
   const element = document.getElementById("msgflow-data");

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tables import decoded
 
-from msgflow.view.columns import LARGEST_EXACT, encode
+from msgflow.view.table_encoding import LARGEST_EXACT, encode
 
 WHOLE = st.integers(-LARGEST_EXACT, LARGEST_EXACT)
 
@@ -58,7 +58,7 @@ def test_pandas_is_not_imported_where_it_is_installed() -> None:
     """The server would hold it for nothing."""
     # Not pa.array: that one does import it.
     program = (
-        "import sys, duckdb; from msgflow.view.columns import encode;"
+        "import sys, duckdb; from msgflow.view.table_encoding import encode;"
         "rows = duckdb.sql('SELECT unnest([1, NULL]) AS a, a::DOUBLE, a = 1, a::TEXT');"
         "encode(rows.to_arrow_table()); print('pandas' in sys.modules)"
     )
