@@ -29,7 +29,7 @@ def critical_path(
 ) -> bytes:
     """Return the pieces of the critical path as bytes, with the command that prints them.
 
-    It is that of the longest flow that ends where the picked one does, see critical_end.sql.
+    It belongs to the longest flow that ends where the picked one does, see critical_end.sql.
 
     Args:
         connection: to a database with the public views.

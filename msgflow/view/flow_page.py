@@ -1,4 +1,4 @@
-"""`msgflow flow --html`: the timeline of one message in one file."""
+"""The page of one flow: the timeline of one message in one file (`msgflow flow --html`)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 _BAR = ["row_key", "kind", "id", "start_at", "length", "flags"]
-# How much there is, whatever the limits.
+# Vertices of the whole flow, without limits.
 _COUNTS = {
     direction: f"SELECT count(*) FROM main.flow_{direction}(?, ?)"
     for direction in ("forward", "backward", "both")

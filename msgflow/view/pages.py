@@ -1,4 +1,4 @@
-"""Answers to the pages from a database: for the server, and for a report in advance."""
+"""Data of the pages, read from a database: by the server on request, by a report in advance."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ NAMED = (
     "executor-wait", "interference", "publication-rate", "transport-latency", "service-latency",
     "indirect-links", "delivery", "info-hosts", "info-processes", "info-topics", "clocks",
 )  # fmt: skip
-# Bars that a window may have to be drawn one by one, and bins where it has more.
+# A window with more bars than this is drawn in bins, in so many at the most.
 MOST_BARS = 40_000
 MOST_BINS = 2_000
-# Bins of the whole run that wider ones are put together from.
+# Bins of the whole run; wider bins are sums of these.
 LEVEL_BINS = 8_192
 MOST_LINKS = 20_000
 _KEPT_BYTES = 32 * 2**20
@@ -68,7 +68,7 @@ class Extent:
 
 
 class Scratch:
-    """What is computed once per run and asked often: tables in memory, beside the database."""
+    """Tables in memory, beside the database: what is computed once per run and asked often."""
 
     def __init__(self) -> None:
         self._connection = duckdb.connect(":memory:")
@@ -223,14 +223,14 @@ class Pages:
         fields = ("name", "severity", "title", "subject", "count", "detail", "description",
                   "cause", "cure")  # fmt: skip
         table = pa.table({field: [found[field] for found in findings] for field in fields})
-        # What a finding says is not said once more below it.
+        # A note does not repeat what a finding says.
         is_said = any(found["name"] in _OF_CLOCKS for found in findings)
         notes = [] if is_said else clock_notes(connection, [extent.run])
         return encode(table, meta={"notes": notes, "command": "msgflow check"})
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        # Intervals take longest: the page shows what was measured before it asks for them.
+        # Intervals take longest: the page first shows what was measured, then asks for them.
         is_quick = bool(params.get("quick"))
         comparison = compare(
             connection, str(_whole(params, "other")), str(extent.run.run_id),
@@ -265,7 +265,7 @@ class Pages:
         bin_ns = -(-width // MOST_BINS)
         level_ns = extent.length_ns // LEVEL_BINS + 1
         values = extent.frame(window)
-        # Whether a window is drawn one by one does not depend on what is known of the run already.
+        # The number of bars decides alone, whatever the page asked for before.
         (count,) = run_page_query(connection, "segment_count", values)["count"].to_pylist()
         meta: dict[str, Any] = {"start": window.start_ns - extent.origin_ns, "count": count}
         meta["end"] = window.end_ns - extent.origin_ns
@@ -324,7 +324,7 @@ class Pages:
         )
 
     def ask(self, name: str, values: Params) -> pa.Table:
-        """Return the rows of a page query over what was filled."""
+        """Return the rows of a page query over the tables in memory."""
         return self._scratch.ask(name, values)
 
     def _plain(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
@@ -368,7 +368,7 @@ def _kind(params: Params) -> str:
 
 
 def _own(name: str, params: Params, given: Mapping[str, Any]) -> Params:
-    # What the page says of the parameters of the query that are not the page's frame.
+    # Parameters of the query that the page gives, besides those of `frame`.
     own: Params = {}
     for param in page_query(name).params:
         if param.name in params and param.name not in given:

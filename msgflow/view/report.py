@@ -1,4 +1,4 @@
-"""`msgflow report`: the pages in one file, with their data inside.
+"""The report: all pages in one file, with their data inside (`msgflow report`).
 
 What does not fit is left out by rules that the pages state: first single bars of the timeline, kept
 around the slowest flows of each path, with the whole run in bins beside them.
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
     from msgflow.run.choice import Run
 
-# Of these the pages show every path's pictures; of more those with the slowest flows.
+# Pictures of at most so many paths: of those with the slowest flows.
 MOST_PATHS = 200
-# Flows that the report tells the critical path of.
+# The report has the critical paths of so many flows, the slowest ones.
 MOST_CRITICAL = 6
-# Estimate of what a bar with its links takes in a file, once compressed.
+# Estimate: bytes of a bar with its links in the file, compressed.
 _BYTES_PER_BAR = 16
 _LEVEL_SHARE = 0.25
 _STRETCHES = 12
@@ -209,7 +209,7 @@ class _Maker:
         return numbers
 
     def critical(self, slowest: pa.Table, paths: pa.Table) -> None:
-        """Keep what the slowest flows waited for: of few, as each takes as long as a query."""
+        """Keep the critical paths of the slowest flows: of few, as each takes a query."""
         topics = zip(paths["path_id"].to_pylist(), paths["topics"].to_pylist(), strict=True)
         first = {path: names[0] for path, names in topics}
         order = [("latency", "descending"), ("path_id", "ascending")]
@@ -238,7 +238,7 @@ class _Maker:
                 f"path_share?path={number}@{other.run_id}",
                 self.pages.answer(self.connection, "path_share", params | {"path": number}),
             )
-        # Whatever path is looked at, its distribution is there of both runs.
+        # The page of the comparison shows the distributions of both runs for any path.
         own = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
         for number in own["path_id"].to_pylist()[:MOST_PATHS]:
             if number not in chosen:

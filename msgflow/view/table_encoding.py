@@ -1,4 +1,4 @@
-"""Tables as bytes that a page unpacks quickly: one form for the server and for files.
+"""Encoding of tables as bytes that a page unpacks quickly, for the server and for files.
 
 Layout: length of the head (4 bytes, little endian), head (JSON), buffers of the columns one after
 the other. Whole numbers are differences from row to row, folded to be positive, in as many bytes as
@@ -71,10 +71,10 @@ def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
     return {"type": "json"}, texts.encode()
 
 
-# Arrow's to_numpy, and whatever it is given values of Python for, import pandas where that is
-# installed: 30 MB, and half a second.
+# Arrow's to_numpy imports pandas if that is installed, and so does an array made of Python values:
+# 30 MB, and half a second.
 def _values(column: pa.Array, kind: pa.DataType) -> np.ndarray[Any, Any]:
-    """Return the values as `kind`; where there is none, anything."""
+    """Return the values as `kind`; a NULL becomes any value."""
     column = compute.cast(column, kind)
     values = np.frombuffer(column.buffers()[1] or b"", dtype=kind.to_pandas_dtype())
     return values[column.offset : column.offset + len(column)]
@@ -89,7 +89,7 @@ def _integers(
 ) -> tuple[dict[str, Any], bytes]:
     has_nulls = bool(is_null.any())
     if has_nulls:
-        # What is missing repeats what was before it: the difference is nothing.
+        # A NULL repeats the value before it, so that the difference is 0.
         latest = np.maximum.accumulate(np.where(is_null, -1, np.arange(len(values))))
         values = np.where(latest >= 0, values[np.maximum(latest, 0)], 0)
     differences = np.diff(values, prepend=np.int64(0))
@@ -107,7 +107,7 @@ def _integers(
 def _text(column: pa.Array) -> tuple[dict[str, Any], bytes]:
     encoded = column.dictionary_encode()
     words = json.dumps(encoded.dictionary.to_pylist(), ensure_ascii=False).encode()
-    # 0: none.
+    # 0 means NULL.
     codes = np.where(_nulls(column), 0, _values(encoded.indices, pa.int64()) + 1)
     head, body = _integers(codes, np.zeros(len(codes), np.bool_))
     return {"type": "text", "width": head["width"], "words": len(words)}, words + body

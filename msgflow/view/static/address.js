@@ -1,4 +1,4 @@
-// The address of what is on the page: everything that leads back to it stands behind the #.
+// Addresses of pages: everything that leads back to what is shown stands behind the #.
 
 const listeners = new Set();
 

@@ -1,4 +1,4 @@
-// Starts the page: chooses where data come from, and shows the page that the address names.
+// The application: it chooses where data come from, and shows the page of the address.
 
 import { h, clear, color } from "./dom.js";
 import { address, current, go, onChange } from "./address.js";

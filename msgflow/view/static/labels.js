@@ -1,4 +1,4 @@
-// What pages call things, in one place: columns of queries keep their names, people read these.
+// Labels: names that people read, for columns of queries, statistics and kinds.
 
 export const KINDS = [
   "callback instance", "publication", "take", "request", "response", "wait", "process", "execute",

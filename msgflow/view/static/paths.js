@@ -1,4 +1,4 @@
-// Paths: latency of each, and of the chosen one how it is distributed, over time, and made up.
+// Paths: the latency of each; distribution, course over time and parts of the chosen one.
 
 import { h, clear, color, breakable } from "./dom.js";
 import { address, current, replace } from "./address.js";

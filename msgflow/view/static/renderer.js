@@ -1,4 +1,4 @@
-// Draws the timeline on a canvas: bars, what is several bars, arrows, gaps, the picked flow.
+// Drawing of the timeline on a canvas: bars, bins of bars, arrows, gaps, the picked flow.
 
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";

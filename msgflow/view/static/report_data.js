@@ -1,4 +1,4 @@
-// The data of a report: in the file itself, compressed; what a database answers otherwise.
+// Data of a report: compressed in the file itself; it answers what a database answers otherwise.
 
 import { decode } from "./table_decoding.js";
 

@@ -1,4 +1,4 @@
-// Tables as the server and reports send them; msgflow/view/table_encoding.py says how they are written.
+// Tables that pages receive; msgflow/view/table_encoding.py describes their bytes.
 
 export function decode(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);

@@ -1,4 +1,4 @@
-// The page with the timeline: what the window shows, what is picked, and how one moves about.
+// The page with the timeline: its window, what is picked, and how one moves about.
 
 import { h, clear } from "./dom.js";
 import { current, go, replace } from "./address.js";
