@@ -1,6 +1,6 @@
 -- name: derive.unseen_creation
 -- description: Processes with objects that were used, but were not seen to be created: how many,
---     of which kinds, and whether events of the time when the process was created may have been
+--     their kinds, and whether events of the time when the process was created may have been
 --     lost. Objects of ROS itself do not count: /rosout is published on handles never
 --     initialised.
 -- grain: one row per such process

@@ -68,7 +68,7 @@ def version(name: str, values: Sequence[float]) -> list[tuple[dict[str, str], di
 
 @pytest.fixture(scope="module")
 def slower(tmp_path_factory: pytest.TempPathFactory) -> Lake:
-    """A lake with 30 runs of each of two versions, of which 2.10 is slower by 5 %."""
+    """A lake with 30 runs of each of two versions; 2.10 is slower by 5 %."""
     runs = version("2.9", spread(1.0, 30)) + version("2.10", spread(1.05, 30))
     return fill(tmp_path_factory.mktemp("slower"), [*runs, ({"robot": "r9"}, {PATH: 9.0})])
 

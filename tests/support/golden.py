@@ -23,7 +23,7 @@ and a window of 4000 ns where the parameters say nothing else; a view (its full 
 `main.node`), a finding, an audit or a diagnostic of run 1 (`finding.NAME`, `check.NAME`,
 `diagnostic.NAME`) is read whole, a table macro called with its arguments, all sorted by all
 columns. An empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables
-of BASE of which a case says nothing have one row, of key 1.
+of BASE that a case leaves out have one row, of key 1.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 -- name: flow
 -- title: The flow of what was picked
--- description: Everything that the picked thing caused and was caused by (main.flow_both), or one of
---     the two, as bars, and the links between them.
+-- description: Everything that the picked thing caused, or was caused by, or both
+--     (main.flow_both), as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
--- param: steps BIGINT = NULL  Most steps each way, of which a message is three; any number when NULL
+-- param: steps BIGINT = NULL  Most steps each way, three per message; any number when NULL
 -- param: limit BIGINT = 20000  Most vertices, those nearest in time
 -- column: kind UTINYINT  As in bar.sql
 -- column: id BIGINT  Identity of the vertex

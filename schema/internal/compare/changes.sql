@@ -3,9 +3,9 @@
 -- description: A comparison (`compared`: rows of `main.comparison`) with a row for each subject,
 --     the greatest change of a median first.
 -- grain: one row per path, callback or topic
--- param: only_different BOOLEAN  Leave out those of which no difference is shown
+-- param: only_different BOOLEAN  Leave out rows without a shown difference
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics),
---     'only in A', 'only in B', 'none shown' (the intervals contain 0), or why there is none:
+--     'only in A', 'only in B', 'none shown' (the intervals contain 0), or why it is not known:
 --     'too few values', 'too few independent values', 'too few resamples'
 -- column: of VARCHAR                Statistics that are longer or shorter
 -- column: a_median_ns BIGINT [ns]   Median in run A

@@ -84,7 +84,7 @@ link AS (
     FROM main.response
     WHERE run_id = $run_id AND sent_ns IS NOT NULL AND taken_ns IS NOT NULL
 ),
--- Arrows of which both ends are drawn.
+-- Arrows with both ends drawn.
 arrow AS MATERIALIZED (
     SELECT l.from_code, l.from_id, l.to_code, l.to_id,
         hash(l.from_code, l.from_id, l.to_code, l.to_id, l.link_kind) AS arrow_id
