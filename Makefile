@@ -26,7 +26,7 @@ help:
 	@echo 'make test    style, types, import contracts, tests: minutes'
 	@echo 'make test-all the same with thorough tests: what others show on one input, on all of them'
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
-	@echo 'make truth   precision and recall on systems of which everything is known, minutes'
+	@echo 'make truth   precision and recall on systems with known truth, minutes'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
 	@echo 'make clean   remove what these made'

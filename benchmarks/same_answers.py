@@ -149,10 +149,10 @@ def run(checkout: Path, arguments: Sequence[str]) -> str:
 
 
 def require_checkout(checkout: Path) -> None:
-    """Refuse a folder of which Python would run another msgflow, or none.
+    """Refuse a folder from which Python would not run its own msgflow.
 
     Raises:
-        SystemExit: it would.
+        SystemExit: it would not.
     """
     package = checkout.resolve() / "msgflow" / "__init__.py"
     if not package.is_file():

@@ -126,7 +126,7 @@ RECORDINGS = {
         slew_ppm=-20,
     ),
 }
-# Faults do not depend on the layout but for stamps, of which these have all kinds.
+# Faults do not depend on the layout except for stamps; these layouts have all kinds of stamps.
 FAULTY_LAYOUTS = ("jazzy", "humble", "humble-fastdds")
 FAULTY_SYSTEMS = ("pipeline", "two_hosts")
 # What every system is recorded with once, since what it costs depends on what the system does.
@@ -137,7 +137,7 @@ GAP_SYSTEMS = ("container", "container_multi_threaded")
 GAP_RECORDINGS = (
     "brim", "one_cpu", "late_one_cpu", "pause", "stopped_at_rotation", "snapshots", "last_snapshot",
 )  # fmt: skip
-# What is told by time alone depends on how stamps and the trace's clock differ.
+# Links found by time alone depend on how stamps and the trace's clock differ.
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few

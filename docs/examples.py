@@ -59,7 +59,7 @@ def run(command: str, directory: Path) -> str:
     ):
         os.close(terminal)
         said = bytearray()
-        # Where nobody holds the other end any more, Linux says so by an error.
+        # Linux reports an error once no process holds the other end.
         try:
             while read := os.read(controller, 65536):
                 said += read

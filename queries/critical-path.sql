@@ -225,7 +225,7 @@ SELECT
     s.publication_id,
     s.take_id,
     s.latency_ns,
-    -- A flow of a thousand hops has thousands of rows and a path as long: it is told once.
+    -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     n.path
 FROM ordered AS s
 LEFT JOIN named AS n ON s.path_id = n.path_id AND s.place = 1

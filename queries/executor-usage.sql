@@ -40,7 +40,7 @@ last_state AS (
     WHERE list_contains($runs, run_id)
     GROUP BY thread_id
 ),
--- The last state of a thread lasts until the thread was seen last; one before a gap, nobody knows.
+-- The last state of a thread lasts until its last event; before a gap, its end is not known.
 in_state AS (
     SELECT
         m.thread_id,

@@ -1,8 +1,8 @@
 -- How many reasons were excused because events are missing, and how many may be. A hole of length d
 -- meets the time from a message to the next one where it falls in d, or in the one time between two
--- messages before it. So of the n pairs of messages and subscriptions on a host, of which holes
--- cover the share c, about n·c are excused, and one more of each publisher and subscription for each
--- hole; twice as many are allowed, since messages come in bursts. None without a hole.
+-- messages before it. So if holes cover the share c of a host with n pairs of messages and
+-- subscriptions, about n·c are excused, and one more of each publisher and subscription for each
+-- hole; twice as many are allowed, since messages come in bursts. Without a hole none is allowed.
 CREATE OR REPLACE TEMP TABLE excused AS
 WITH span AS (
     SELECT host, min(ts_ns) AS first_ns, max(ts_ns) AS last_ns

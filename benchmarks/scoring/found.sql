@@ -76,7 +76,7 @@ link AS (
     JOIN analysed.store.take AS t ON i.take_id = t.take_id
     WHERE t.method <> 'callback_only'
     UNION ALL
-    -- The middleware's own takes carry no stamp; nobody subscribes to them.
+    -- The middleware's own takes carry no stamp, and have no subscription.
     SELECT 'take', method, 'take', take_id, 'take', take_id, false
     FROM analysed.store.take
     WHERE method = 'ring_buffer'

@@ -9,10 +9,10 @@ ANTI JOIN simulated_unrecorded AS u
     ON e.host = u.host AND e.pid = u.pid AND e.tid = u.tid AND e.ts_ns = u.ts_ns
 JOIN simulated_trace AS t ON e.host = t.host AND e.pid = coalesce(t.pid, e.pid);
 
--- What is missing on a CPU (`pid` is NULL: of whichever process), from the last event in the trace
--- before it to the first one after it; NULL: there is none. Processes that the tracer told to stop
--- are missing themselves (`cpu` is NULL), likewise from event to event of their own. No two holes
--- of a place overlap.
+-- What is missing on a CPU (`pid` is NULL: of any process), from the last event in the trace before
+-- it to the first one after it; NULL if there is no such event. A process that the tracer stopped is
+-- missing itself (`cpu` is NULL), likewise from event to event of its own. Two holes of a place never
+-- overlap.
 CREATE OR REPLACE TEMP TABLE truth_hole AS
 WITH missing AS (
     SELECT u.host, u.pid, u.cpu, u.ts_ns, u.cause, coalesce(t.pid, 0) AS trace_pid

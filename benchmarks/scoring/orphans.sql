@@ -25,7 +25,7 @@ WITH accepted AS (
         -- The message was kept for subscriptions that come late, or nothing of it is traced.
         ('kept', 'no_stamp'),
         ('no event', 'no_stamp'),
-        -- A publication without a trace is one of whoever was not traced.
+        -- A publication without a trace comes from a process that was not traced.
         ('sent, no event', 'publisher_not_traced'),
         ('sent, no event', 'unknown')
     ) AS a(truth, reason)
@@ -73,7 +73,7 @@ SELECT
             AND m.is_beside_hole
             THEN 'events are missing'
         WHEN m.truth = 'sent, no event' AND m.reason = 'ambiguous' THEN 'the link is not decided'
-        -- Whoever publishes anything may have sent a message of a topic that is not known.
+        -- Any publisher may have sent a message of a topic that is not known.
         WHEN (m.is_undecided OR m.truth = 'sent, no event') AND m.reason = 'publisher_gap'
             AND (m.is_unnamed OR m.has_silent)
             THEN 'initialisation is missing'

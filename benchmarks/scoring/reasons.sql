@@ -90,9 +90,9 @@ ASOF LEFT JOIN taken AS n
     AND coalesce(p.publisher_handle, 0) = coalesce(n.publisher_handle, 0)
     AND p.sent_ns < n.sent_ns;
 
--- Pairs of which the trace may not show what became of them, and why: nothing joins the clocks of
--- the two hosts; the take may be in a hole, or whether the two knew each other shows in a hole only;
--- or the take may be one of those whose message the trace does not show.
+-- Pairs whose fate the trace may not show, and why: nothing joins the clocks of the two hosts; the
+-- take may be in a hole; only a hole shows whether the two knew each other; or the take may be one
+-- of those whose message the trace does not show.
 CREATE OR REPLACE TEMP TABLE truth_excuse AS
 WITH unidentified AS (
     SELECT t.subscription_id, coalesce(t.dequeue_ns, t.rmw_ns) AS taken_ns
@@ -165,7 +165,7 @@ buffered AS (
     JOIN simulated_publication AS p ON t.publication_id = p.publication_id
     WHERE t.method = 'ring_buffer'
 ),
--- Publications of which every event that names the publisher is missing.
+-- Publications without any event that names the publisher.
 nameless AS (
     SELECT p.publication_id
     FROM simulated_publication AS p
@@ -233,7 +233,7 @@ LEFT JOIN (
 ) AS w ON u.publication_id = w.publication_id
 WHERE l.is_decided;
 
--- Processes of which it cannot be told which of their subscriptions had a handle.
+-- Processes for which the trace does not show which subscription had a handle.
 CREATE OR REPLACE TEMP TABLE truth_mixed AS
 SELECT DISTINCT host, pid
 FROM simulated_subscription
@@ -243,7 +243,7 @@ SEMI JOIN (
 GROUP BY host, pid, subscription_handle
 HAVING count(*) > 1;
 
--- CPUs of which not one whole packet is in the trace: it does not show that there is more to them.
+-- CPUs without a whole packet in the trace: it does not show that there is more to them.
 CREATE OR REPLACE TEMP TABLE truth_unseen_cpu AS
 SELECT DISTINCT host, cpu
 FROM truth_hole

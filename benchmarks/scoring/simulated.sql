@@ -257,7 +257,7 @@ asked AS (
     JOIN recorded AS r ON r.kind = 'take' AND t.take_id::VARCHAR = r.id
     JOIN simulated_publication AS s ON t.publication_id = s.publication_id
 ),
--- By time alone messages are told together: fewer of a host than these may agree by chance.
+-- Time alone joins messages in groups: fewer messages of a host than these may agree by chance.
 message AS (
     SELECT
         publication_id, take_id, needs,

@@ -23,7 +23,7 @@ from msgflow.cli.options import (
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,7 +131,7 @@ def print_comparison(
 def _signature() -> Signature:
     """Return the signature of the command: parameters of the statement, then its own options."""
     positional, keyword = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
-    declared = (p for p in program().header("comparison").params if p.name not in _COMMON)
+    declared = (p for p in internal_sql().header("comparison").params if p.name not in _COMMON)
     return Signature(
         [
             Parameter("run_a", positional, annotation=_RunA),

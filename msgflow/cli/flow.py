@@ -23,7 +23,7 @@ from msgflow.cli.options import (
 )
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from msgflow.database import Database
@@ -38,7 +38,7 @@ class FlowFormat(StrEnum):
     JSON = "json"
 
 
-_DECLARED = {param.name: param for param in program().header("flow_steps").params}
+_DECLARED = {param.name: param for param in internal_sql().header("flow_steps").params}
 
 
 def command(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.derive import derive_from_clocks
 from msgflow.db.noted import forget, note
 from msgflow.db.runs import change_runs
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,13 +74,13 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
     Raises:
         UsageError: a file that does not fit the run.
     """
-    _correct(con, f"({program().text('clock_as_recorded')})", {"run_id": run_id})
+    _correct(con, f"({internal_sql().text('clock_as_recorded')})", {"run_id": run_id})
     con.execute("DELETE FROM store.clock_uncertainty WHERE run_id = ?", [run_id])
     forget(con, run_id, "clocks")
     if sync.method == "messages":
         con.execute(
             "CREATE OR REPLACE TEMP TABLE clock_synchronised AS\n"
-            + program().text("clock_from_messages"),
+            + internal_sql().text("clock_from_messages"),
             {"run_id": run_id},
         )
         _correct(con, "(FROM clock_synchronised WHERE is_connected)")
@@ -104,7 +104,7 @@ def _correct(
 
 
 def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:
-    clocks = program().run(con, "clock_known", {"run_id": run_id}).fetchall()
+    clocks = internal_sql().run(con, "clock_known", {"run_id": run_id}).fetchall()
     chosen: dict[int, GivenClock] = {}
     for given in sync.clocks:
         found = [clock for clock in clocks if given.name == clock[1]] or [

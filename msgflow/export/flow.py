@@ -75,7 +75,7 @@ def read_flow(connection: duckdb.DuckDBPyConnection, start: Start, **given: Valu
     Args:
         connection: to a database with the public views.
         start: where to begin.
-        given: direction, depth, limit and internal; see `program.flow_steps`.
+        given: direction, depth, limit and internal; see `internal.flow_steps`.
 
     Raises:
         UsageError: the start does not exist, or an argument is out of range.

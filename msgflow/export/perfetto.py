@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -106,7 +106,7 @@ class _Writer:
         self.packets = perfetto_trace_pb2
 
     def rows(self, name: str) -> Iterator[dict[str, Any]]:
-        relation = program().run(self.connection, name, self.bindings)
+        relation = internal_sql().run(self.connection, name, self.bindings)
         with relation.to_arrow_reader(_AT_ONCE) as reader:
             for batch in reader:
                 yield from batch.to_pylist()

@@ -14,7 +14,7 @@ from msgflow.query.clock_notes import clock_notes
 from msgflow.query.result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.header import Column
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     import duckdb
@@ -56,7 +56,7 @@ def read_series(
     """
     run = part.one_run(connection, "a file of series")
     bindings = {"runs": [run.run_id], **part.window([run]).bindings}
-    table = program().run(connection, _STATEMENTS[what], bindings).to_arrow_table()
+    table = internal_sql().run(connection, _STATEMENTS[what], bindings).to_arrow_table()
     subjects = sorted(table["subject"].unique().to_pylist())
     if len(subjects) > MOST_COLUMNS:
         raise UsageError(
@@ -67,7 +67,7 @@ def read_series(
         Column("at_ns", "BIGINT", "epoch ns", "Moment"),
         *(Column(subject, "BIGINT", "ns", subject) for subject in subjects),
     ]
-    values = program().header(_STATEMENTS[what])
+    values = internal_sql().header(_STATEMENTS[what])
     header = replace(
         values,
         name=f"series-{what}",

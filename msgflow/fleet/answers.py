@@ -10,7 +10,7 @@ from msgflow.db.finding import Finding, find
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -68,7 +68,7 @@ def answers() -> tuple[Answer, ...]:
 
 def _statement(name: str) -> Callable[[duckdb.DuckDBPyConnection, int], pa.Table]:
     def read(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
-        return program().run(con, name, {"runs": [run_id]}).to_arrow_table()
+        return internal_sql().run(con, name, {"runs": [run_id]}).to_arrow_table()
 
     return read
 

@@ -14,7 +14,7 @@ from msgflow.nearest import nearest
 from msgflow.query.compare import STATISTICS, Failure, failures
 from msgflow.query.result import QueryResult
 from msgflow.query.selection import CUT_COLUMN
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -36,7 +36,7 @@ class FleetComparison:
     """Runs of one side compared with those of another.
 
     Attributes:
-        result: one row per path and statistic, see `program.fleet_comparison`.
+        result: one row per path and statistic, see `internal.fleet_comparison`.
     """
 
     result: QueryResult
@@ -139,12 +139,12 @@ def compared(
         case: which arrivals of paths.
         confidence: probability that an interval contains the true difference.
     """
-    measured = program().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
+    measured = internal_sql().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
     connection.register("measured", measured)
     statement = "fleet_comparison"
     values = {"z": NormalDist().inv_cdf((1 + confidence) / 2), "least_units": LEAST_RUNS}
-    rows = program().run(connection, statement, values).to_arrow_table()
-    return QueryResult(rows, replace(program().header(statement), name="fleet compare"))
+    rows = internal_sql().run(connection, statement, values).to_arrow_table()
+    return QueryResult(rows, replace(internal_sql().header(statement), name="fleet compare"))
 
 
 def _require_label(choice: Choice, key: str | None) -> None:

@@ -11,8 +11,8 @@ from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import fleet_query, statements
 from msgflow.fleet.listing import list_failures
-from msgflow.view.columns import encode
 from msgflow.view.single_page import Parts, single_page
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from pathlib import Path

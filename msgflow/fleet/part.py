@@ -23,7 +23,7 @@ from msgflow.fleet.layout import (
     part_path,
     view_path,
 )
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
     Raises:
         TraceError: the run has no packets.
     """
-    ((key,),) = program().run(connection, "run_identity", {"runs": [run_id]}).fetchall()
+    ((key,),) = internal_sql().run(connection, "run_identity", {"runs": [run_id]}).fetchall()
     if key is None:
         raise TraceError("the recording has no packets by which it could be known", None)
     return str(key)

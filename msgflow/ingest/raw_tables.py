@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.ingest.catalogue import load
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 from msgflow.trace import PACKET
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class RawTables:
     def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
         self._con.register("packet_batch", rows)
         try:
-            runs = self._con.execute(program().text("known_packet")).fetchall()
+            runs = self._con.execute(internal_sql().text("known_packet")).fetchall()
         finally:
             self._con.unregister("packet_batch")
         if runs and not self._may_replace:

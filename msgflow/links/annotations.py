@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.derive import derive
 from msgflow.db.runs import change_runs
 from msgflow.links.matching import match_links
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,7 +97,7 @@ def declare_links(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile) 
     unique = {_key(link): link for link in matched}
     traced = {
         (kind, process_id, tuple(inputs or ()), tuple(outputs or ()))
-        for kind, process_id, inputs, outputs in program()
+        for kind, process_id, inputs, outputs in internal_sql()
         .run(con, "link_declared", {"run_id": run_id})
         .fetchall()
     }
@@ -137,5 +137,5 @@ def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]
 
 def _link_counts(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[int, int]:
     """Return the number of indirect links from files, and from the trace."""
-    ((of_file, of_trace),) = program().run(con, "link_source", {"run_id": run_id}).fetchall()
+    ((of_file, of_trace),) = internal_sql().run(con, "link_source", {"run_id": run_id}).fetchall()
     return of_file, of_trace

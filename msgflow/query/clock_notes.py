@@ -6,7 +6,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,13 +31,13 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
     )
     if not several.fetchall():
         return []
-    groups = program().run(connection, "clock_group", chosen).fetchall()
+    groups = internal_sql().run(connection, "clock_group", chosen).fetchall()
     clocks = {
         run_id: (len(together), "FILE" if together[0][-1] else "messages")
         for run_id, (*together,) in groupby(groups, key=itemgetter(0))
         if len(together) > 1
     }
-    corrections = program().run(connection, "clock_correction", chosen).fetchall()
+    corrections = internal_sql().run(connection, "clock_correction", chosen).fetchall()
     return [
         f"{'the run' if len(runs) == 1 else f'run {run.title}'} has"
         f" {clocks[run.run_id][0]} clocks that are not synchronised: times between their hosts are"
@@ -64,7 +64,7 @@ def clock_verdicts(
         only_several: leave out runs with one clock, where nothing can be wrong.
     """
     chosen = {"runs": [run.run_id for run in runs]}
-    rows = program().run(connection, "clock_group", chosen).fetchall()
+    rows = internal_sql().run(connection, "clock_group", chosen).fetchall()
     verdicts = []
     for run in runs:
         groups = [tuple(row[1:]) for row in rows if row[0] == run.run_id]

@@ -19,7 +19,7 @@ from msgflow.run.choice import Run, choose_one, read_runs
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors
 from msgflow.sql.header import Header, read
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -225,13 +225,13 @@ def compare(
         choose_one(runs, wanted, "each side of a comparison") for wanted in (run_a, run_b)
     )
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
-    asked = bind(program().header("comparison"), given | both, "msgflow compare")
+    asked = bind(internal_sql().header("comparison"), given | both, "msgflow compare")
     _require_sense(asked)
     what = str(asked["what"])
     for run in (first, second):
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     with query_errors("the comparison", "the comparison failed: {}"):
-        table = program().run(connection, "comparison", asked).to_arrow_table()
+        table = internal_sql().run(connection, "comparison", asked).to_arrow_table()
     result = QueryResult(table, _header(), (first, second))
     result.notes.extend(_one_sided(result, what, first, second))
     result.notes.extend(_doubts(connection, result, what, first, second))

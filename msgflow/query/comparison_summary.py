@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -52,9 +52,9 @@ def changes(result: QueryResult, only_different: bool) -> QueryResult:
 def _summed(compared: pa.Table, only_different: bool) -> pa.Table:
     with duckdb.connect() as con:
         con.register("compared", compared)
-        found = program().run(con, "changes", {"only_different": only_different})
+        found = internal_sql().run(con, "changes", {"only_different": only_different})
         return found.to_arrow_table()
 
 
 def _header() -> Header:
-    return replace(program().header("changes"), name="changes")
+    return replace(internal_sql().header("changes"), name="changes")

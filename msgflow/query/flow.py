@@ -12,7 +12,7 @@ from msgflow.run.choice import Run, read_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import MINIMUM_NS, format_epoch, time_point
 from msgflow.sql.failure import query_errors
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -115,7 +115,7 @@ def require_start(connection: duckdb.DuckDBPyConnection, start: Start) -> Run:
 
 
 def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[str, Any]:
-    """Return the value of every parameter of `program.flow_steps`.
+    """Return the value of every parameter of `internal.flow_steps`.
 
     Args:
         start: where to begin.
@@ -126,7 +126,9 @@ def flow_parameters(start: Start, run: Run, given: Mapping[str, Value]) -> dict[
         UsageError: a direction, depth or limit that is out of range.
     """
     place: dict[str, Value] = {"kind": start.kind, "id": start.id, "run_id": run.run_id}
-    asked: dict[str, Any] = bind(program().header("flow_steps"), {**given, **place}, "msgflow flow")
+    asked: dict[str, Any] = bind(
+        internal_sql().header("flow_steps"), {**given, **place}, "msgflow flow"
+    )
     if asked["limit"] > MOST_VERTICES:
         raise UsageError(f"--limit is at most {MOST_VERTICES} — {asked['limit']}", "1000 is usual")
     return asked
@@ -143,7 +145,7 @@ def read_steps(connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]
         QueryError: the database could not run it.
     """
     with query_errors("the flow", "the flow cannot be read: {}"):
-        return program().run(connection, "flow_steps", asked).to_arrow_table()
+        return internal_sql().run(connection, "flow_steps", asked).to_arrow_table()
 
 
 def _place(time_ns: int, run: Run) -> str:

@@ -66,9 +66,9 @@ class Statements:
 
 
 @cache
-def program() -> Statements:
+def internal_sql() -> Statements:
     """Return what the program asks for itself: rows that become files, pictures or sentences."""
-    return Statements(resource_directory("schema") / "program")
+    return Statements(resource_directory("schema") / "internal")
 
 
 @cache

@@ -6,7 +6,7 @@ import shlex
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,7 +67,7 @@ def find_worst_case(
         window: the time window.
     """
     asked = {"key": key, **window.bindings}
-    rows = program().run(connection, f"worst_{kind}", asked).fetchall()
+    rows = internal_sql().run(connection, f"worst_{kind}", asked).fetchall()
     return worst_case_of(rows[0]) if rows else None
 
 

@@ -1,8 +1,8 @@
-"""The front end as files: modules and style sheet, and how they are put into one file.
+"""Files of the front end: modules, style sheets and libraries, and one file of all of them.
 
-The modules use what every browser has, so nothing builds them. For a report they are joined: each
-after those that it imports, without the words `import` and `export`. For that no two modules may
-use a name twice at their outermost level, which a test makes sure of.
+The modules use what every browser has, so nothing builds them. A report has them in one script:
+each module after those that it imports, without the words `import` and `export`. So no name may
+stand at the outermost level of two modules; a test checks that.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from string import Template
 STATIC = Path(__file__).parent / "static"
 VENDOR = Path(__file__).parent / "vendor"
 ENTRY = "app.js"
-# Libraries of others, each a script that leaves one global name; see vendor/libraries.json.
+# Libraries of others: each script defines one global name; see vendor/libraries.json.
 SCRIPTS = ("uPlot.iife.min.js", "dagre.min.js")
 SHEETS = ("uPlot.min.css",)
 _IMPORT = re.compile(r'^import\s+\{[^}]*\}\s+from\s+"\./([\w-]+\.js)";\n', re.MULTILINE)
@@ -63,7 +63,7 @@ def page(*, head: str, body: str = "", policy: str = "", attributes: str = "") -
     Args:
         head: how style sheets and scripts are included.
         body: what follows the content.
-        policy: the Content-Security-Policy, where no header says it.
+        policy: the Content-Security-Policy, if no header gives it.
         attributes: of the outermost element, beginning with a space.
     """
     meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n' if policy else ""
@@ -73,6 +73,6 @@ def page(*, head: str, body: str = "", policy: str = "", attributes: str = "") -
 
 
 def source_hash(content: str) -> str:
-    """Return how a Content-Security-Policy names an inline script or style sheet."""
+    """Return the name of an inline script or style sheet in a Content-Security-Policy."""
     digest = hashlib.sha256(content.encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode()}'"

@@ -10,8 +10,8 @@ import pyarrow as pa
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
-from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     import duckdb
@@ -27,9 +27,9 @@ def critical_path(
     number: int,
     from_topic: str | None = None,
 ) -> bytes:
-    """Return the pieces of the critical path (see `columns`), with the command that prints them.
+    """Return the pieces of the critical path as bytes, with the command that prints them.
 
-    It is that of the longest flow that ends where the picked one does, see critical_end.sql.
+    It belongs to the longest flow that ends where the picked one does, see critical_end.sql.
 
     Args:
         connection: to a database with the public views.

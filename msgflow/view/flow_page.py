@@ -1,4 +1,4 @@
-"""`msgflow flow --html`: the timeline of one message in one file."""
+"""The page of one flow: the timeline of one message in one file (`msgflow flow --html`)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pyarrow import compute
 from msgflow.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
 from msgflow.run.window import Window
-from msgflow.view.columns import encode
 from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Pages
 from msgflow.view.single_page import Parts, single_page
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 _BAR = ["row_key", "kind", "id", "start_at", "length", "flags"]
-# How much there is, whatever the limits.
+# Vertices of the whole flow, without limits.
 _COUNTS = {
     direction: f"SELECT count(*) FROM main.flow_{direction}(?, ?)"
     for direction in ("forward", "backward", "both")
@@ -57,9 +57,11 @@ def write_flow_page(
     pages = Pages()
     params: dict[str, Any] = {"run": str(run.run_id)}
     extent = pages.extent(connection, params)
-    frame: dict[str, Any] = {"run": run.run_id, "origin_ns": extent.origin_ns}
-    asked = {"kind": kind, "id": number, "direction": direction, "limit": limit}
-    flow = run_page_query(connection, "flow", frame | asked | {"steps": depth * STEPS_PER_MESSAGE})
+    asked: dict[str, Any] = {
+        "origin_ns": extent.origin_ns, "kind": kind, "id": number, "direction": direction,
+        "limit": limit, "steps": depth * STEPS_PER_MESSAGE,
+    }  # fmt: skip
+    flow = run_page_query(connection, "flow", asked)
     ((count,),) = connection.execute(_COUNTS[direction], [kind, number]).fetchall()
     bars = flow.group_by(_BAR, use_threads=False).aggregate([])
     bars = bars.sort_by([(name, "ascending") for name in ("row_key", "start_at", "kind", "id")])
@@ -68,9 +70,8 @@ def write_flow_page(
     known = compute.is_valid(flow["from_id"])
     edges = flow.filter(known).select(["kind", "id", "from_kind", "from_id", "link_kind"])
     window = Window(extent.origin_ns + begin - 1, extent.origin_ns + end + 1)
-    values = pages.recorded(connection, extent, window)
-    rows = run_page_query(connection, "row", frame)
-    links = run_page_query(connection, "links", values | {"limit": 2**40})
+    rows = run_page_query(connection, "row", {"run": run.run_id})
+    links = pages.links(connection, extent.frame(window), 2**40)
     notes = []
     if count > bars.num_rows:
         notes.append(

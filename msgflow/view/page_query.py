@@ -1,8 +1,8 @@
-"""The page queries: SQL whose rows have the shape of a picture, not of an answer.
+"""Page queries: the SQL below `sql`, whose rows have the shape of a picture, not of an answer.
 
-They lie in `msgflow/view/sql`, not in `queries/`, because their rows mean nothing without the page:
-bins as wide as a pixel, keys of rows, times that count from the begin of the run. Headers are those
-of named queries. A file of kind 'inline' is put in front of each that reads from its name.
+They are no named queries, because their rows mean nothing without the page: bins as wide as a
+pixel, keys of rows, times that count from the begin of the run. They have the same headers, and
+read the public views alone. A file of kind 'inline' is put in front of each file that reads it.
 """
 
 from __future__ import annotations

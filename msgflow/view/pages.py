@@ -1,4 +1,4 @@
-"""Answers to the pages from a database: for the server, and for a report in advance."""
+"""Data of the pages, read from a database: by the server on request, by a report in advance."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from msgflow.query.compare import compare
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
-from msgflow.view.columns import encode
 from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import page_query, run_page_query
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -36,10 +36,10 @@ NAMED = (
     "executor-wait", "interference", "publication-rate", "transport-latency", "service-latency",
     "indirect-links", "delivery", "info-hosts", "info-processes", "info-topics", "clocks",
 )  # fmt: skip
-# Bars that a window may have to be drawn one by one, and bins where it has more.
+# A window with more bars than this is drawn in bins, in so many at the most.
 MOST_BARS = 40_000
 MOST_BINS = 2_000
-# Bins of the whole run that wider ones are put together from.
+# Bins of the whole run; wider bins are sums of these.
 LEVEL_BINS = 8_192
 MOST_LINKS = 20_000
 _KEPT_BYTES = 32 * 2**20
@@ -68,7 +68,7 @@ class Extent:
 
 
 class Scratch:
-    """What is computed once per run and asked often: tables in memory, beside the database."""
+    """Tables in memory, beside the database: what is computed once per run and asked often."""
 
     def __init__(self) -> None:
         self._connection = duckdb.connect(":memory:")
@@ -113,7 +113,7 @@ class Scratch:
 
 
 class Pages:
-    """Answers to what pages ask, each as bytes (see `columns`).
+    """Answers to what pages ask, each as bytes (see `table_encoding`).
 
     A pages object may be used by several threads, each with a connection of its own.
 
@@ -223,14 +223,14 @@ class Pages:
         fields = ("name", "severity", "title", "subject", "count", "detail", "description",
                   "cause", "cure")  # fmt: skip
         table = pa.table({field: [found[field] for found in findings] for field in fields})
-        # What a finding says is not said once more below it.
+        # A note does not repeat what a finding says.
         is_said = any(found["name"] in _OF_CLOCKS for found in findings)
         notes = [] if is_said else clock_notes(connection, [extent.run])
         return encode(table, meta={"notes": notes, "command": "msgflow check"})
 
     def _compare(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        # Intervals take longest: the page shows what was measured before it asks for them.
+        # Intervals take longest: the page first shows what was measured, then asks for them.
         is_quick = bool(params.get("quick"))
         comparison = compare(
             connection, str(_whole(params, "other")), str(extent.run.run_id),
@@ -253,13 +253,10 @@ class Pages:
             units=result.units,
         )
 
-    def recorded(
-        self, connection: duckdb.DuckDBPyConnection, extent: Extent, window: Window
-    ) -> Params:
-        """Return the parameters that all queries of a window need."""
-        values = extent.frame(window)
-        recorded: Params = run_page_query(connection, "recorded_window", values).to_pylist()[0]
-        return values | recorded
+    def links(self, connection: duckdb.DuckDBPyConnection, values: Params, limit: int) -> pa.Table:
+        """Return the arrows of a window, at most `limit`; its values are those of `frame`."""
+        (ids,) = run_page_query(connection, "window_ids", values).to_pylist()
+        return run_page_query(connection, "links", values | ids | {"limit": limit})
 
     def _segments(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
@@ -267,8 +264,8 @@ class Pages:
         width = max(window.end_ns - window.start_ns, 1)
         bin_ns = -(-width // MOST_BINS)
         level_ns = extent.length_ns // LEVEL_BINS + 1
-        values = self.recorded(connection, extent, window)
-        # Whether a window is drawn one by one does not depend on what is known of the run already.
+        values = extent.frame(window)
+        # The number of bars decides alone, whatever the page asked for before.
         (count,) = run_page_query(connection, "segment_count", values)["count"].to_pylist()
         meta: dict[str, Any] = {"start": window.start_ns - extent.origin_ns, "count": count}
         meta["end"] = window.end_ns - extent.origin_ns
@@ -293,20 +290,20 @@ class Pages:
             lambda: run_page_query(
                 connection,
                 "segments",
-                self.recorded(connection, extent, whole) | {"bin_ns": level_ns},
+                extent.frame(whole) | {"bin_ns": level_ns},
             ),
         )
 
     def _links(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        values = self.recorded(connection, extent, self.window(extent, params))
-        table = run_page_query(connection, "links", values | {"limit": MOST_LINKS + 1})
+        values = extent.frame(self.window(extent, params))
+        table = self.links(connection, values, MOST_LINKS + 1)
         is_cut = table.num_rows > MOST_LINKS
         return encode(table.slice(0, MOST_LINKS), meta={"is_cut": is_cut}, units=_units("links"))
 
     def _edge(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        values = self.recorded(connection, extent, self.window(extent, params))
+        values = extent.frame(self.window(extent, params))
         return encode(run_page_query(connection, "edge", values), units=_units("edge"))
 
     def _flow(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
@@ -327,7 +324,7 @@ class Pages:
         )
 
     def ask(self, name: str, values: Params) -> pa.Table:
-        """Return the rows of a page query over what was filled."""
+        """Return the rows of a page query over the tables in memory."""
         return self._scratch.ask(name, values)
 
     def _plain(self, connection: duckdb.DuckDBPyConnection, name: str, params: Params) -> bytes:
@@ -371,7 +368,7 @@ def _kind(params: Params) -> str:
 
 
 def _own(name: str, params: Params, given: Mapping[str, Any]) -> Params:
-    # What the page says of the parameters of the query that are not the page's frame.
+    # Parameters of the query that the page gives, besides those of `frame`.
     own: Params = {}
     for param in page_query(name).params:
         if param.name in params and param.name not in given:

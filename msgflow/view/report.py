@@ -1,4 +1,4 @@
-"""`msgflow report`: the pages in one file, with their data inside.
+"""The report: all pages in one file, with their data inside (`msgflow report`).
 
 What does not fit is left out by rules that the pages state: first single bars of the timeline, kept
 around the slowest flows of each path, with the whole run in bins beside them.
@@ -17,10 +17,10 @@ from msgflow.atomic import replacing
 from msgflow.errors import UsageError
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import WHOLE, Window
-from msgflow.view.columns import encode
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
 from msgflow.view.single_page import Parts, single_page
+from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
     from msgflow.run.choice import Run
 
-# Of these the pages show every path's pictures; of more those with the slowest flows.
+# Pictures of at most so many paths: of those with the slowest flows.
 MOST_PATHS = 200
-# Flows that the report tells the critical path of.
+# The report has the critical paths of so many flows, the slowest ones.
 MOST_CRITICAL = 6
-# Estimate of what a bar with its links takes in a file, once compressed.
+# Estimate: bytes of a bar with its links in the file, compressed.
 _BYTES_PER_BAR = 16
 _LEVEL_SHARE = 0.25
 _STRETCHES = 12
@@ -209,7 +209,7 @@ class _Maker:
         return numbers
 
     def critical(self, slowest: pa.Table, paths: pa.Table) -> None:
-        """Keep what the slowest flows waited for: of few, as each takes as long as a query."""
+        """Keep the critical paths of the slowest flows: of few, as each takes a query."""
         topics = zip(paths["path_id"].to_pylist(), paths["topics"].to_pylist(), strict=True)
         first = {path: names[0] for path, names in topics}
         order = [("latency", "descending"), ("path_id", "ascending")]
@@ -238,7 +238,7 @@ class _Maker:
                 f"path_share?path={number}@{other.run_id}",
                 self.pages.answer(self.connection, "path_share", params | {"path": number}),
             )
-        # Whatever path is looked at, its distribution is there of both runs.
+        # The page of the comparison shows the distributions of both runs for any path.
         own = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
         for number in own["path_id"].to_pylist()[:MOST_PATHS]:
             if number not in chosen:
@@ -253,10 +253,10 @@ class _Maker:
             "stretches": [],
             "count": 0,
         }
-        values = self.pages.recorded(self.connection, self.extent, window)
+        values = self.extent.frame(window)
         if not self.extent.length_ns:
             self.stretch(0, window, None)
-            self.edges(window)
+            self.parts.add("edge?", encode(self.edges(window)))
             head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
             head["notes"] = self.notes
             return head
@@ -272,7 +272,7 @@ class _Maker:
             )
         if count * _BYTES_PER_BAR <= room or rows is not None:
             self.stretch(0, window, rows)
-            self.edges(window)
+            self.parts.add("edge?", encode(self.edges(window)))
             head["stretches"] = [{"start": head["start"], "end": head["end"], "whole": True}]
         else:
             self.thinned(head, window, room, count)
@@ -280,9 +280,9 @@ class _Maker:
         return head
 
     def stretch(self, place: int, window: Window, rows: list[int] | None) -> int:
-        values = self.pages.recorded(self.connection, self.extent, window)
+        values = self.extent.frame(window)
         table = run_page_query(self.connection, "segments", values)
-        links = run_page_query(self.connection, "links", values | {"limit": 2**40})
+        links = self.pages.links(self.connection, values, 2**40)
         if rows is not None:
             known = pa.array(rows, pa.int64())
             table = table.filter(compute.is_in(table["row_key"], known))
@@ -296,9 +296,8 @@ class _Maker:
         self.parts.add(f"links?place={place}", encode(links))
         return int(table.num_rows)
 
-    def edges(self, window: Window) -> None:
-        values = self.pages.recorded(self.connection, self.extent, window)
-        self.parts.add("edge?", encode(run_page_query(self.connection, "edge", values)))
+    def edges(self, window: Window) -> pa.Table:
+        return run_page_query(self.connection, "edge", self.extent.frame(window))
 
     def rows_on(self, paths: list[int]) -> list[int]:
         """Return the rows of the timeline on some paths: their objects, timers and executors."""
@@ -321,7 +320,7 @@ class _Maker:
     def thinned(self, head: dict[str, Any], window: Window, room: int, count: int) -> None:
         """Keep the run in bins, and single bars around the slowest flows."""
         origin = self.extent.origin_ns
-        values = self.pages.recorded(self.connection, self.extent, window)
+        values = self.extent.frame(window)
         bins = LEVEL_BINS
         while True:
             bin_ns = (window.end_ns - window.start_ns) // bins + 1
@@ -348,8 +347,7 @@ class _Maker:
             else:
                 stretches.append(Window(low, high))
         held = sum(self.stretch(place, stretch, None) for place, stretch in enumerate(stretches))
-        tables = [self._edge_table(stretch) for stretch in stretches]
-        edges = pa.concat_tables(tables)
+        edges = pa.concat_tables(map(self.edges, stretches))
         distinct = edges.group_by(edges.column_names).aggregate([])
         order = [
             (name, "ascending")
@@ -367,10 +365,6 @@ class _Maker:
             f" ({held:,} bars), the rest in bins of {bin_ns / 1e6:.3f} ms. A larger --max-size, or"
             " --start and --end, keep more; msgflow ui has everything."
         )
-
-    def _edge_table(self, window: Window) -> pa.Table:
-        values = self.pages.recorded(self.connection, self.extent, window)
-        return run_page_query(self.connection, "edge", values)
 
     def slow_moments(self) -> list[int]:
         """Return when the slowest flow of each path began, the slowest first."""

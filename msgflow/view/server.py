@@ -1,8 +1,8 @@
-"""`msgflow ui`: serves the pages of one database to the browser of the one who started it.
+"""The server of `msgflow ui`: it sends the pages of one database to the browser of its user.
 
-Whoever reaches the port needs the token of the printed address, which becomes a cookie; requests
-that other sites make, or that name another host than this machine, are refused. Behind `ssh -L`
-the host is still this machine.
+A request needs the token of the printed address, which becomes a cookie. The server refuses
+requests that other sites make, or that name another host than this machine. Behind `ssh -L` the
+host is still this machine.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _FILE = re.compile(r"[\w.-]+\.(?:js|css)")
 
 
 class ReplacedError(DatabaseError):
-    """The database is another one than that the page was made of."""
+    """The database is not the one that the page was made of."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Identity:
 
 
 class Turns:
-    """Lets questions run together; one that then has too little memory is asked again, alone."""
+    """Turns of questions: several at a time, and one alone that had too little memory."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -133,7 +133,7 @@ class Ahead:
         self._thread.start()
 
     def _ask(self) -> None:
-        # Whoever asks for it meets the same error, and is told.
+        # The page asks for it too, and shows the error.
         with suppress(MsgflowError, duckdb.Error):
             self._turns.ask(lambda: self._pages.answer(self._cursor, "segments", {}))
 
@@ -155,7 +155,7 @@ def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
 
 
 class Shared:
-    """The open database, shared by all requests, and opened anew when its file is another.
+    """The open database, which all requests share; it is opened anew when its file is replaced.
 
     Attributes:
         generation: counts how often that was.
@@ -171,7 +171,7 @@ class Shared:
         self._open()
 
     def _open(self) -> None:
-        # Each request has a connection of its own to the same database, made of this one.
+        # Each request gets a connection of its own, made of this one.
         self._base = connect(
             self.path, read_only=True, memory_limit=self._memory_limit or default_limit()
         )
@@ -180,7 +180,7 @@ class Shared:
         self._ahead = Ahead(self.turns, self.pages, self._base.cursor())
 
     def require_same(self, generation: str | None) -> None:
-        """Raise where the page was made of another file than is there now.
+        """Raise if the file was replaced since the page was made.
 
         Raises:
             ReplacedError: it was; or the file is gone.
@@ -226,7 +226,7 @@ def _identity(path: Path) -> Identity:
 
 
 def application(shared: Shared, token: str) -> ASGIApp:
-    """Return the application: pages and their data, for those who know the token.
+    """Return the application: pages and their data, for requests with the token.
 
     Args:
         shared: the database.
@@ -280,7 +280,7 @@ def application(shared: Shared, token: str) -> ASGIApp:
 
 
 def single_application(make: Callable[[], str], token: str) -> ASGIApp:
-    """Return the application of one page with its data inside, made anew whenever it is loaded.
+    """Return the application of one page with its data inside, made again at each load.
 
     Args:
         make: returns the page, which names its scripts in a policy of its own.
@@ -322,7 +322,7 @@ def serve_single(
 
 
 async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLimiter) -> Response:
-    """Return the answer; interrupt the query when nobody waits for it any more."""
+    """Return the answer; interrupt the query when the browser no longer waits for it."""
     name = request.path_params["name"]
     params: dict[str, Any] = dict(request.query_params)
     pages = shared.pages
@@ -332,7 +332,7 @@ async def _answered(shared: Shared, request: Request, limiter: anyio.CapacityLim
     async def watch(scope: anyio.CancelScope) -> None:
         while not await request.is_disconnected():
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
-        # Again and again: between two statements there is nothing to interrupt.
+        # Repeatedly, since between two statements there is nothing to interrupt.
         while True:
             cursor.interrupt()
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
@@ -370,7 +370,7 @@ def _head() -> str:
 
 
 class Guard:
-    """Lets only those through who know the token, come from our own page, and mean this machine."""
+    """A guard: it passes on requests with the token, from our own page, to this machine."""
 
     def __init__(self, app: ASGIApp, token: str, policy: str = _POLICY) -> None:
         self._app = app
@@ -406,7 +406,7 @@ class Guard:
         if request.method not in ("GET", "HEAD"):
             return PlainTextResponse("error: nothing can be changed here\n", status_code=405)
         if request.headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
-            # A link to the page may be followed from anywhere; then the cookie is not sent.
+            # A link on any site may lead to the page; the browser then sends no cookie.
             is_visit = request.headers.get("sec-fetch-mode") == "navigate"
             if not (is_visit and request.url.path == "/"):
                 return PlainTextResponse("error: another site asks\n", status_code=403)
@@ -537,7 +537,7 @@ def listening(
 
 
 class _Server(uvicorn.Server):
-    """Tells when it can be reached."""
+    """A server that says when it can be reached."""
 
     started_with: Callable[[], None] | None = None
 

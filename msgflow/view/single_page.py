@@ -18,7 +18,7 @@ _POLICY = (
 
 @dataclass
 class Parts:
-    """What a page may ask for, each answer under the question."""
+    """Data of a page: the answers to what it may ask, each under its question."""
 
     keys: list[dict[str, Any]] = field(default_factory=list)
     buffers: list[bytes] = field(default_factory=list)
@@ -29,7 +29,7 @@ class Parts:
         self.buffers.append(content)
 
     def pack(self, head: dict[str, Any]) -> bytes:
-        """Return all of it, compressed."""
+        """Return all answers, compressed."""
         text = json.dumps(head | {"parts": self.keys}, ensure_ascii=False).encode()
         content = b"".join([len(text).to_bytes(4, "little"), text, *self.buffers])
         return gzip.compress(content, compresslevel=6, mtime=0)
@@ -40,7 +40,7 @@ def single_page(parts: Parts, head: dict[str, Any]) -> str:
 
     Args:
         parts: its data.
-        head: what embedded.js has to know of them.
+        head: what report_data.js has to know of them.
     """
     packed = base64.b64encode(parts.pack(head)).decode()
     scripts = [*(assets.vendored(name) for name in assets.SCRIPTS), assets.joined()]

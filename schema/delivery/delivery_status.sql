@@ -1,7 +1,7 @@
 -- name: derive.delivery_status
 -- kind: macro
--- description: The meaning of a reason for a missing delivery: newer messages were taken instead,
---     the message was lost, the two were not connected yet or any more, or it is not known.
+-- description: What a reason for a missing delivery means: newer messages were taken instead, the
+--     message was lost, the two were not connected yet or any more, or the trace does not show it.
 CREATE OR REPLACE MACRO derive.delivery_status(reason) AS
 CASE
     WHEN reason = 'overwritten' THEN 'skipped'

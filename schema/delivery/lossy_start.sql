@@ -1,6 +1,6 @@
 -- name: derive.lossy_start
 -- description: Processes that may have lost events while they were created: a gap other than a
---     pause lies before their first callback instance, or before their first event.
+--     pause lies before the first callback instance, or before the process was seen at all.
 -- grain: one row per process
 WITH loss AS (
     SELECT r.recording_id, min(l.start_ns) AS start_ns

@@ -2,13 +2,13 @@
 -- kind: macro
 -- description: Why the publication of a take is not known: the first reason that holds. The stamp
 --     is compared on the host of each process that could have sent it: those with a publisher of
---     the topic (known senders), those with a publisher of unknown topic or with missing
---     initialisation (possible senders), and all with any publisher where the topic is not known.
---     What comes out of a ring buffer has no stamp: it was put in after the message before it,
---     which came from there. A stamp that a message of another topic has, behind a gap since the
---     subscription was created: another subscription may have its handle by then. That all known
---     senders had ended says nothing where a publisher whose topic is not known published at that
---     moment.
+--     the topic (known senders), those with one whose topic is not known or whose initialisation
+--     is missing (possible senders), and, if the topic is not known, all with any publisher. A
+--     message from a ring buffer has no stamp: it was put in after the message before it, which
+--     came from there. If the stamp is that of a message of another topic, and a gap lies after
+--     the creation of the subscription, another subscription may have its handle by then. If a
+--     publisher whose topic is not known published at that moment, it means nothing that all known
+--     senders had ended.
 -- grain: one row per take whose publication is not known
 -- when: derive.unlinked_take
 CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
@@ -55,7 +55,7 @@ stamping AS (
             AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
     )
 ),
--- Publications of which neither topic nor message is known.
+-- Publications whose topic and message are not known.
 nameless AS (
     SELECT b.process_id, b.end_ns
     FROM store.publication AS b

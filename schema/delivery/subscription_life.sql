@@ -1,8 +1,9 @@
 -- name: derive.subscription_life
 -- description: How long each subscription could take messages, on the clock of its host: from its
---     creation to the last event of the threads that read it, or until its handle was used again. A
---     placeholder for the reader of a ring buffer is left out: it may be the same subscription as
---     the one that reads from the middleware, and it is not known what it should have got.
+--     creation to the last event of the threads that read it, or until its handle was used again.
+--     A placeholder for the reader of a ring buffer is left out: it may be the same subscription
+--     as the one for what comes through the middleware, so that it is not known what it should
+--     have got.
 -- grain: one row per subscription with a handle
 WITH host_end AS (
     SELECT host_id, max(last_seen_ns) AS end_ns

@@ -1,14 +1,14 @@
 -- name: derive.undelivered
 -- kind: macro
--- description: Why a subscription did not take a message of its topic: the first reason that holds.
---     Everything is compared on the clock of the receiver. `not_delivered` rests on a wait: a
---     message in the queue would have ended it. A wait tells this only where a single thread reads,
---     and only if it lasted ten times as long as messages usually need, at least a millisecond. A
---     reader that gets no CPU seems to wait, too, but takes the message when it wakes up.
---     `overwritten` and `lost_in_transport` differ by the depth of the queue alone. Nothing is said
---     where the subscription took a message in that time that could not be identified. Nor are
---     messages said to be overwritten where the subscription took none of the publisher, and no
---     later one.
+-- description: Why a subscription did not take a message of its topic; the first reason that
+--     holds. Everything is compared on the clock of the receiver. `not_delivered` rests on a
+--     wait: a message in the queue would have ended it. A wait tells this only where a single
+--     thread reads, and only if it lasted ten times as long as messages usually need, at least a
+--     millisecond. A reader that gets no CPU seems to wait, too, but takes the message when it
+--     wakes up. Only the depth of the queue tells `overwritten` from `lost_in_transport`. The
+--     reason is unknown if the subscription took a message in that time that could not be
+--     identified. A message is not `overwritten` if the subscription took none of the publisher,
+--     and no later one.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
 CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
 WITH arrival AS MATERIALIZED (

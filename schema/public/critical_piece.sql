@@ -1,7 +1,7 @@
 -- name: main.critical_piece
 -- kind: macro
--- description: What flows had to wait for, moment by moment, as in main.critical_path, of which
---     this is the last step: their parts, with waits replaced by what they waited for.
+-- description: What flows had to wait for, moment by moment: the last step of main.critical_path.
+--     It replaces each wait of a flow by the parts of what the flow waited for.
 -- grain: one row per piece of a flow
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of

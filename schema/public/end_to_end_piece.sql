@@ -1,6 +1,6 @@
 -- name: main.end_to_end_piece
 -- kind: macro
--- description: The parts of flows, as in main.end_to_end_part, of which this is the last step.
+-- description: The parts of flows: the last step of main.end_to_end_part.
 -- grain: one row per flow and part
 -- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
 -- param: trail VARCHAR  Likewise of main.end_to_end_trail

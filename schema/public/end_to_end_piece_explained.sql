@@ -1,8 +1,8 @@
 -- name: main.end_to_end_piece_explained
 -- kind: macro
--- description: The parts of flows (main.end_to_end_piece), with the callback that each is of, and
---     how long its executor was busy while it waited. What is told of callback instances is given,
---     so that it need not be looked up for each part.
+-- description: The parts of flows (main.end_to_end_piece), with the callback of each, and how long
+--     its executor was busy while it waited. A parameter gives the callback instances, so that
+--     they need not be looked up for each part.
 -- grain: one row per flow and part
 -- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
 -- param: trail VARCHAR  Likewise of main.end_to_end_trail

@@ -104,7 +104,7 @@ SELECT
     NULL
 FROM query_table(vertices) AS v
 JOIN (
-    -- A message of a service is told on the thread of the client, where it is known.
+    -- A message of a service is on the thread of the client, if that is known.
     SELECT
         'request' AS kind, q.request_id AS id, q.run_id, q.sent_ns, q.taken_ns,
         coalesce(q.sender_thread_id, q.receiver_thread_id) AS thread_id,

@@ -1,11 +1,14 @@
-"""CONTRIBUTING.md names what there is: every room, and files where they lie."""
+"""CONTRIBUTING.md names every room, and files where they lie; its first change works."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+import duckdb
 import pytest
+
+from msgflow.sql.header import parse
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -36,3 +39,11 @@ def test_every_place_exists(name: str) -> None:
 @pytest.mark.parametrize("room", ROOMS, ids=lambda room: str(room.relative_to(ROOT)))
 def test_every_room_is_named(room: Path) -> None:
     assert any(room.name in name.split("/") for name in NAMED)
+
+
+def test_the_query_of_the_first_change_is_one(empty_database: Path) -> None:
+    (sql,) = re.findall(r"cat > queries/[\w-]+\.sql <<'END'\n(.*?)END\n", TEXT, re.DOTALL)
+    header = parse(sql, ROOT / "CONTRIBUTING.md")
+    with duckdb.connect(str(empty_database), read_only=True) as con:
+        columns = con.sql(header.body, params={"runs": [1]}).columns
+    assert columns == [column.name for column in header.columns]

@@ -1,4 +1,4 @@
-"""The Dockerfile copies what a wheel is made of, and nobody is root in the container."""
+"""The Dockerfile copies all files of a wheel, and the user of the container is not root."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def written(
     databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Part, Part]:
-    """A lake that both were written into, with all there is of them: nobody sees them yet."""
+    """A lake with all files of both, without a commit."""
     folder = tmp_path_factory.mktemp("written")
     lake = Lake.open_or_create(folder / "lake")
     parts = []
@@ -59,7 +59,7 @@ def written(
 
 @pytest.fixture(scope="session")
 def night(written: tuple[Path, Part, Part], tmp_path_factory: pytest.TempPathFactory) -> Lake:
-    """A lake of three runs, which nobody changes: both databases, and the first once more.
+    """A lake of three runs, not to be changed: both databases, and the first once more.
 
     The copy has a key of its own, and takes twice as long for its flows; it has no views.
     """

@@ -1,6 +1,6 @@
-"""Which run a source is, when sources change or have equal packets, or others write meanwhile.
+"""Runs and their sources, when sources change or have equal packets, or others write meanwhile.
 
-A recording here is a folder with a file that says which packets it has; nobody ingests it.
+A recording here is a folder with a file that names its packets; it is not really ingested.
 """
 
 from __future__ import annotations

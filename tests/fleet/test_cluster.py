@@ -100,7 +100,7 @@ def test_much_goes_wrong(
     runs = lake.runs().to_pylist()
     assert sorted(run["name"] for run in runs) == [f"r{number}" for number in range(GOOD)]
     if [row["reason"] for row in read_failures(lake).to_pylist()] == ["unreachable"]:
-        # It was refused too often while it was looked at: whoever comes next looks again.
+        # Looking at it was refused too often: the next call looks again.
         start_ingest(SOURCES, LAKE, cluster.address, scratch).communicate(timeout=300)
     assert [row["reason"] for row in read_failures(lake).to_pylist()] == ["broken"]
 

@@ -18,7 +18,7 @@ from msgflow.errors import UsageError
 from msgflow.fleet.compare import LEAST_RUNS, compare
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 
 PATH = "/camera → /image → /control"
 # 100 flows about a middle of 1: enough for p95, whose value is 1.095.
@@ -68,7 +68,7 @@ def version(name: str, values: Sequence[float]) -> list[tuple[dict[str, str], di
 
 @pytest.fixture(scope="module")
 def slower(tmp_path_factory: pytest.TempPathFactory) -> Lake:
-    """A lake with 30 runs of each of two versions, of which 2.10 is slower by 5 %."""
+    """A lake with 30 runs of each of two versions; 2.10 is slower by 5 %."""
     runs = version("2.9", spread(1.0, 30)) + version("2.10", spread(1.05, 30))
     return fill(tmp_path_factory.mktemp("slower"), [*runs, ({"robot": "r9"}, {PATH: 9.0})])
 
@@ -253,7 +253,7 @@ def test_students_t_is_close_where_runs_are_few() -> None:
             " FROM value"
         )
         values = {"z": Z95, "least_units": LEAST_RUNS}
-        (row,) = program().run(con, "fleet_comparison", values).to_arrow_table().to_pylist()
+        (row,) = internal_sql().run(con, "fleet_comparison", values).to_arrow_table().to_pylist()
     winsorized = [max(logs[1], min(logs[4], x)) for x in logs]
     error = math.sqrt(statistics.variance(winsorized) * 5 / (4 * 3))
     assert math.log(1 + row["high_percent"] / 100) / error == pytest.approx(3.182446, rel=0.003)
@@ -284,6 +284,6 @@ def test_five_values_of_a_run_beyond_a_quantile_are_enough(
         )
         con.execute("CREATE TABLE e2e_latency AS SELECT 'r' AS run, false AS is_cut")
         con.execute("CREATE TABLE sided AS SELECT 'r' AS run, 'a' AS side, 'u' AS unit")
-        told = program().run(con, "fleet_run_value", {"case": "every_pair"}).to_arrow_table()
+        told = internal_sql().run(con, "fleet_run_value", {"case": "every_pair"}).to_arrow_table()
     enough = [row["statistic"] for row in told.to_pylist() if row["is_enough"]]
     assert enough == list(told_of)

@@ -194,7 +194,7 @@ def test_what_was_mended_is_tried_again(
     assert run("ingest", *sources).exit_code == 3
     assert run("ingest", *sources).exit_code == 3
     shutil.rmtree(recordings / "broken")
-    # What was mended is another recording from outside, so that nobody has to ask for it.
+    # A mended source looks like another recording, so that it is tried without an option.
     simulate("pipeline", recordings / "broken", factor=_LENGTH, seed=9)
     mended = run("ingest", *sources)
     assert mended.exit_code == 0, mended.stderr

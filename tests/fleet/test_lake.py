@@ -1,4 +1,4 @@
-"""A lake shows each run once and whole, to whoever reads it as docs/fleet.md says."""
+"""A lake shows each run once and whole to readers that follow docs/fleet.md."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CREATE_RUN, EXAMPLE = (
 
 
 def write(lake: Lake, database: Path, scratch: Path, **more: Any) -> Part:
-    """Write what a lake holds of a database; nobody sees it yet."""
+    """Write the files of a database into a lake, without a commit."""
     given: dict[str, Any] = {"source": "here", "options": {}, "content": _ANSWERS}
     with Database(database) as opened:
         return write_part(opened.connection, database, lake.store, scratch, **given | more)

@@ -154,7 +154,7 @@ def test_all_tables_are_there_and_rows_of_runs_that_count(night: Lake) -> None:
 def test_a_damaged_file_is_said(tmp_path: Path) -> None:
     lake = Lake.open_or_create(tmp_path / "lake")
     lake.commit([{"run": "1", "generation": 1, "is_removed": False, "part": "1-x"}])
-    # A table that nobody wrote is not there.
+    # A table without files is not there.
     with open_runs(lake, tables=["flow"]) as reading, pytest.raises(duckdb.CatalogException):
         reading.connection.execute("FROM flow")
     lake.store.put("flow/part=1-x/data.parquet", b"no parquet")
@@ -191,7 +191,7 @@ def test_a_bucket_answers_as_a_folder_does(
         fleet_sql(night, text, where=where).table
     )
     assert len(fleet_worst(lake, "/", limit=3)) == 3
-    # What DuckDB is told has no credentials, and reaches nothing itself.
+    # The text for DuckDB has no credentials, and DuckDB reaches nothing itself.
     with open_runs(lake, tables=["flow"]) as reading:
         said = str(reading.connection.execute("FROM duckdb_settings()").fetchall())
         assert not any(secret in said for secret in KEYS.values() if "-east-" not in secret)

@@ -20,7 +20,7 @@ RULES = (
     "publication_beside_gap",
     "nearest_message",
 )
-# What the rules look at, without the store that it is told from.
+# The input of the rules, without the tables that it comes from.
 STAGE = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;

@@ -27,7 +27,7 @@ Bounds = Sequence[tuple[int, int]]
 
 @pytest.fixture
 def chain() -> Iterator[duckdb.DuckDBPyConnection]:
-    """Three clocks, nothing of which is known."""
+    """Three clocks about which nothing is known."""
     with derived(STAGE, RULES) as con:
         yield con
 

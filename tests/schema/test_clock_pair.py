@@ -183,7 +183,7 @@ def test_a_line_is_possible_where_the_hulls_do_not_cross(
 def test_without_a_possible_line_the_fastest_of_each_stretch_counts(
     clocks: duckdb.DuckDBPyConnection, slow_ns: int, missed: float
 ) -> None:
-    """Stretches are a 256th of the time: here 2 ns, of which the first has a fast message."""
+    """Stretches are a 256th of the time: here 2 ns; the first has a fast message."""
     exchange(clocks, {0: 1, slow_ns / 1e9: -9, 511e-9: 1}, {0: -1, 511e-9: -1})
     assert line(clocks) == (0, 0, missed, 0, None)
     assert bounds(clocks) == {0: missed, 511e-9: missed}

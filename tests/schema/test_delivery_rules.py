@@ -10,7 +10,7 @@ import pytest
 from rules import derived
 
 MS = 1_000_000
-# What the rules look at, without the views and the store that it is told from.
+# The input of the rules, without the views and tables that it comes from.
 STAGE = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;

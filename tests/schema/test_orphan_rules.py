@@ -128,7 +128,7 @@ def test_a_topic_without_senders_from_the_first_trace_on(
 def test_all_that_are_known_to_send_were_recorded_later(
     con: duckdb.DuckDBPyConnection, since: int, expected: str
 ) -> None:
-    """One of two tells nothing; nor does one of which the topic is not known."""
+    """One of two proves nothing; nor does one whose topic is not known."""
     expected_of_all = reason(
         con, TAKE, SENDER, OTHER.format("'/a'"), OTHER.format("NULL"),
         recorded(1, 100 * MS, STAMP + 1), recorded(2, 100 * MS, since),

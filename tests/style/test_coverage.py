@@ -15,7 +15,7 @@ from msgflow.view.page_query import DIRECTORY, page_query
 TESTS = Path(__file__).resolve().parents[1]
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
-PROGRAM = [file for file in FILES if file.layer == "program" and file.header.kind != "inline"]
+INTERNAL = [file for file in FILES if file.layer == "internal" and file.header.kind != "inline"]
 FINDINGS = [file for file in FILES if file.layer == "finding"]
 PUBLIC = [file for file in FILES if file.layer == "public"]
 # Those of kind 'inline' are parts of others.
@@ -56,7 +56,7 @@ def test_every_public_view_with_logic_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 
-@each(PROGRAM)
+@each(INTERNAL)
 def test_everything_that_the_program_asks_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 

@@ -18,7 +18,9 @@ from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
-from msgflow.sql.statement import program
+from msgflow.sql.header import Header
+from msgflow.sql.statement import internal_sql
+from msgflow.view.page_query import DIRECTORY, page_query
 
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
@@ -33,7 +35,8 @@ TABLES = {
     "parts": "main.end_to_end_part([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
-PROGRAM = [file for file in FILES if file.layer == "program"]
+INTERNAL = [file for file in FILES if file.layer == "internal"]
+PAGE_QUERIES = [page_query(path.stem) for path in sorted(DIRECTORY.glob("*.sql"))]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 LAYER_OF |= {
     header.name: layer for layer in ("model", "stat", "public") for header in objects.load(layer)
@@ -95,8 +98,11 @@ def test_each_layer_reads_only_to_its_left(file: SqlFile) -> None:
         stored_of = LAYER_OF.get(name.replace("store.", "derive.", 1), "store")
         layer = stored_of if name.startswith("store.") else LAYER_OF.get(name, "model")
         assert LAYERS.index(layer) <= position, f"{file} reads {name}"
-    if file.layer == "queries":
-        assert {name.partition(".")[0] for name in file.references} <= {"main"}
+
+
+@each([*(file.header for file in QUERIES), *PAGE_QUERIES], name=lambda header: header.name)
+def test_queries_of_users_and_pages_read_public_views_alone(header: Header) -> None:
+    assert {name.partition(".")[0] for name in header.needs} <= {"main"}
 
 
 @each(FILES)
@@ -174,18 +180,18 @@ def test_a_query_has_a_title_and_a_grain(file: SqlFile) -> None:
     assert file.header.grain.startswith("one row per ")
 
 
-@each(PROGRAM)
+@each(INTERNAL)
 def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     file: SqlFile, connection: duckdb.DuckDBPyConnection
 ) -> None:
     name = file.path.stem
-    (statement,) = connection.extract_statements(program().text(name))
+    (statement,) = connection.extract_statements(internal_sql().text(name))
     assert {param.name for param in file.header.params} == statement.named_parameters
     values = {"run_id": 1, "runs": [1], "start_ns": 0, "end_ns": 1, "kind": "take", "id": 1}
     values |= {p.name: [1, 1] if p.type.endswith("[]") else 1 for p in file.header.params} | values
     # Those without columns say of what they have the columns; some read what is made for them.
     if file.header.columns and name not in ("changes", "fleet_run_value", "fleet_comparison"):
-        assert described(program().run(connection, name, values)) == declared(file)
+        assert described(internal_sql().run(connection, name, values)) == declared(file)
 
 
 @pytest.mark.parametrize(
@@ -195,7 +201,9 @@ def test_methods_have_the_defaults_that_are_declared(
     name: str, method: Callable[..., object]
 ) -> None:
     declared = {
-        param.name: param.default for param in program().header(name).params if param.has_default
+        param.name: param.default
+        for param in internal_sql().header(name).params
+        if param.has_default
     }
     parameters = {
         key.removesuffix("_"): parameter.default

@@ -45,9 +45,9 @@ def test_columns_are_listed(file: SqlFile) -> None:
 
 @each(MACROS)
 def test_parameters_for_runs_have_one_name(file: SqlFile) -> None:
-    """A run that a macro is of is `only_run`, of which no column has the name; several are `runs`.
+    """The run of a macro is `only_run`, a name that no column has; several are `runs`.
 
-    The two sides of a comparison are not the run that it is of.
+    The two sides of a comparison are other runs.
     """
     signatures = SIGNATURE.findall("\n".join(code_lines(file)))
     assert signatures

@@ -32,7 +32,7 @@ class Analysis:
     One connection serves many tests, as opening and attaching takes as long as the rest: `build`
     replaces what was built before. A test mostly reads one view; only what that view needs, by the
     headers of the SQL files, is built: every statement of the model takes as long to plan as to run
-    on a few rows. Whoever takes `connection` gets all of it.
+    on a few rows. A test that takes `connection` gets all of it.
     """
 
     def __init__(self, empty_database: Path, directory: Path) -> None:

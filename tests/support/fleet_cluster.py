@@ -62,7 +62,7 @@ def start_ingest(
 
 
 class Watcher:
-    """Reads a lake again and again, as anybody might: whoever sees a run has to see all of it.
+    """Reads a lake again and again, as anybody might: a reader sees all of a run, or nothing.
 
     Attributes:
         polls: how often it looked.

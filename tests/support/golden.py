@@ -17,13 +17,13 @@
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
-A query is run as `Database.query` runs it; what the program asks for itself (program.<name>) of
+A query is run as `Database.query` runs it; what the program asks for itself (internal.<name>) of
 run 1, likewise over tables of scratch; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
 `main.node`), a finding, an audit or a diagnostic of run 1 (`finding.NAME`, `check.NAME`,
 `diagnostic.NAME`) is read whole, a table macro called with its arguments, all sorted by all
 columns. An empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables
-of BASE of which a case says nothing have one row, of key 1.
+of BASE that a case leaves out have one row, of key 1.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
-from msgflow.sql.statement import program
+from msgflow.sql.statement import internal_sql
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import Scratch
 
@@ -69,7 +69,7 @@ FLOW = {header.name for header in objects.load("flow")}
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SLICE = tuple(field.name for field in fields(Slice))
 _PAGE_QUERY = "view."
-_PROGRAM = "program."
+_INTERNAL = "internal."
 _HEALTH = ("finding.", "check.")
 _DIAGNOSTIC = "diagnostic."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
@@ -375,8 +375,8 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
     given = dict(case.parameters or {})
     if name.startswith(_PAGE_QUERY):
         return QueryResult(_page_rows(connection, case, name.removeprefix(_PAGE_QUERY), given))
-    if name.startswith(_PROGRAM):
-        return QueryResult(_program_rows(connection, case, name.removeprefix(_PROGRAM), given))
+    if name.startswith(_INTERNAL):
+        return QueryResult(_internal_rows(connection, case, name.removeprefix(_INTERNAL), given))
     if name.startswith(_HEALTH):
         return QueryResult(_health_rows(connection, name))
     if name.startswith(_DIAGNOSTIC):
@@ -397,11 +397,11 @@ def _make_scratch(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
         _create(connection, f"TEMP TABLE {table}", text)
 
 
-def _program_rows(
+def _internal_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     _make_scratch(connection, case)
-    return program().run(connection, name, _FRAME | given).to_arrow_table()
+    return internal_sql().run(connection, name, _FRAME | given).to_arrow_table()
 
 
 def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None:
@@ -439,8 +439,9 @@ def _page_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     values = _FRAME | given
-    (recorded,) = run_page_query(connection, "recorded_window", values).to_pylist()
-    values = recorded | values
+    if name == "links":
+        (ids,) = run_page_query(connection, "window_ids", values).to_pylist()
+        values |= ids
     if not case.scratch:
         return run_page_query(connection, name, values)
     scratch = Scratch()

@@ -1,4 +1,4 @@
-"""An S3-compatible store for tests: moto's server, which refuses requests when it is told to."""
+"""An S3-compatible store for tests: moto's server, which can be made to refuse requests."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from msgflow.sql.header import Header, read
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
     "model", "overlap", "store", "link", "clock", "delivery", "flow", "stat", "public",
-    "check", "finding", "diagnostic", "queries", "program",
+    "check", "finding", "diagnostic", "queries", "internal",
 )  # fmt: skip
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
@@ -27,7 +27,7 @@ SCHEMAS = {
     "check": "check",
     "finding": "finding",
     "diagnostic": "diagnostic",
-    "program": "program",
+    "internal": "internal",
 }
 
 

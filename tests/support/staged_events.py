@@ -43,7 +43,7 @@ class Thread:
 
 @dataclass(frozen=True)
 class Source:
-    """A trace: of which host, by which clock, unless alone of which recording; where it lies."""
+    """A trace: its host, its clock, its recording unless it is alone, and its path."""
 
     hostname: str = "alpha"
     clock: str = "boot"

@@ -19,7 +19,7 @@ class Decoded:
 
 
 def decoded(content: bytes) -> Decoded:
-    """Return the table that `msgflow.view.columns.encode` made these bytes of."""
+    """Return the table that `msgflow.view.table_encoding.encode` made these bytes of."""
     length = int.from_bytes(content[:4], "little")
     head = json.loads(content[4 : 4 + length])
     at = 4 + length

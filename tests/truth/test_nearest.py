@@ -47,7 +47,7 @@ CHANGES = {
         "(SELECT min(publisher_id) FROM store.publisher WHERE topic_name = '/x')"
     ),
 }
-# Where several processes publish on one topic at the same moment, some messages are of nobody.
+# If several processes publish on one topic at the same moment, some messages have no publisher.
 LEAST_RECALL = {"publisher_not_traced": 0.99}
 
 
@@ -93,7 +93,7 @@ def test_nearest_is_exact(
 
 
 def test_nothing_is_invented_for_orphans(unstamped: Callable[[str], Path]) -> None:
-    """The publisher's trace ends early: forty messages are of nobody."""
+    """The publisher's trace ends early: forty messages have no publication."""
     with duckdb.connect(str(unstamped("tracecompass-ros2")), read_only=True) as con:
         assert con.execute(
             "SELECT method, count(*) FROM store.link_transport GROUP BY method"

@@ -1,4 +1,4 @@
-"""The comparison of two checkouts: each runs its own code, and what differs is told."""
+"""The comparison of two checkouts: each runs its own code; the comparison names the differences."""
 
 from __future__ import annotations
 

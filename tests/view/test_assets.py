@@ -13,7 +13,7 @@ _DECLARED = re.compile(
     r"^(?:export )?(?:async )?(?:function\*?|class|const|let) (?:(\w+)|\[)", re.MULTILINE
 )
 _ADDRESS = re.compile(r"https?://[\w./-]+")
-# A name space of XML is an address that nobody asks for.
+# The name of a name space of XML looks like an address; browsers do not ask for it.
 _NAME_SPACES = {"http://www.w3.org/2000/svg"}
 
 

@@ -23,7 +23,7 @@ Read = Callable[[Path], duckdb.DuckDBPyConnection]
 def values(connection: duckdb.DuckDBPyConnection, pages: Pages, run: int | None = None) -> Any:
     params = {} if run is None else {"run": str(run)}
     extent = pages.extent(connection, params)
-    return pages.recorded(connection, extent, pages.window(extent, params))
+    return extent.frame(pages.window(extent, params))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -96,7 +96,7 @@ def test_a_window_has_the_bars_that_overlap_it(demo: Path, read: Read) -> None:
     extent = pages.extent(connection, {})
     whole = run_page_query(connection, "segments", values(connection, pages)).to_pylist()
     window = {"start": 700_000_000, "end": 900_000_000}
-    known = pages.recorded(connection, extent, pages.window(extent, window))
+    known = extent.frame(pages.window(extent, window))
     part = run_page_query(connection, "segments", known).to_pylist()
     wanted = [
         bar
@@ -204,7 +204,7 @@ def test_a_flow_is_what_flow_both_says(systems: Path, demo: Path, read: Read) ->
 def test_arrows_are_the_links(systems: Path, read: Read) -> None:
     connection = read(systems)
     known = values(connection, Pages(), 3)
-    arrows = run_page_query(connection, "links", known | {"limit": 10**6}).to_pylist()
+    arrows = Pages().links(connection, known, 10**6).to_pylist()
     transport = connection.execute(
         "SELECT count(*), sum(latency_ns) FROM link_transport WHERE run_id = 3"
     ).fetchall()
@@ -233,14 +233,12 @@ def test_arrows_of_a_window_are_those_that_overlap_it(demo: Path, read: Read) ->
     connection = read(demo)
     pages = Pages()
     extent = pages.extent(connection, {})
-    every = values(connection, pages) | {"limit": 10**6}
-    arrows = run_page_query(connection, "links", every).to_pylist()
+    arrows = pages.links(connection, values(connection, pages), 10**6).to_pylist()
     for width in (extent.length_ns // 10, extent.length_ns // 1000, 20_000):
         for tenth in range(0, 11, 2):
             start = tenth * extent.length_ns // 10 - width // 2
             window = pages.window(extent, {"start": start, "end": start + width})
-            known = pages.recorded(connection, extent, window) | {"limit": 10**6}
-            found = run_page_query(connection, "links", known).to_pylist()
+            found = pages.links(connection, extent.frame(window), 10**6).to_pylist()
             begin, end = (at - extent.origin_ns for at in astuple(window))
             assert found == [
                 arrow
@@ -258,7 +256,8 @@ def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
     extent = pages.extent(connection, {"run": "3"})
     middle = extent.length_ns // 2
     window = pages.window(extent, {"start": middle, "end": middle + extent.length_ns // 100})
-    known = pages.recorded(connection, extent, window) | {"limit": 10**6}
+    known = extent.frame(window) | {"limit": 10**6}
+    known |= run_page_query(connection, "window_ids", known).to_pylist()[0]
     sql = statement("links")
     named = connection.extract_statements(sql)[0].named_parameters
     rows = connection.execute(

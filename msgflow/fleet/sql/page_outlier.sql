@@ -1,8 +1,8 @@
 -- name: fleet.page_outlier
 -- title: Runs that stand out, by path
 -- description: Runs whose median is further from that of the others than five times what is usual
---     (the median of the distances, scaled to a standard deviation) and than a twentieth of it. Of
---     paths with fewer than five runs nobody can say what is usual.
+--     (the median of the distances, scaled to a standard deviation) and than a twentieth of it.
+--     Paths with fewer than five runs have no row: what is usual is not known.
 -- grain: one row per path and run that stands out
 -- column: path VARCHAR [path]        Nodes and topics
 -- column: run VARCHAR                Key of the run

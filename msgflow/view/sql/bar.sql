@@ -1,23 +1,21 @@
 -- name: bar
--- description: Everything that one thread did and the timeline draws as a bar, at the times of its
---     own clock: by these the file finds a window without reading the rest, by corrected ones it
---     could not.
--- grain: one row per callback instance, publication, take and state of an executor
+-- description: What the timeline draws as a bar: callback instances, publications, takes, requests
+--     and responses of services, from sending to taking, and states of executors.
+-- grain: one row per bar
 -- kind: inline
 -- column: run_id BIGINT  Run
--- column: process_id BIGINT  Process, whose clock it is
--- column: row_key BIGINT  Row of the timeline, see row.sql
--- column: kind UTINYINT  0 callback instance, 1 publication, 2 take; states of an executor: 5 wait,
---     6 process, 7 execute
+-- column: row_key BIGINT  Row of the timeline, see row.sql; of requests and responses that of the
+--     client, else of the service, else of the process
+-- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; states
+--     of an executor: 5 wait, 6 process, 7 execute
 -- column: id BIGINT  Identity of the thing within its kind; of states the first callback instance
 --     in it, -1: none
--- column: recorded_ns BIGINT  Begin
--- column: recorded_end_ns BIGINT  End; the begin where the end was not seen
--- column: flags UTINYINT  1: lost events may hide a part; 2: the end was not seen; 4: called with
+-- column: start_ns BIGINT [epoch ns]  Begin
+-- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
+-- column: flags UTINYINT  1: lost events may hide a part; 2: an end was not seen; 4: called with
 --     an intra-process message; 8: nested in another callback instance
 SELECT
     i.run_id,
-    i.process_id,
     CASE c.kind
         WHEN 'timer' THEN coalesce(8 * c.timer_id, 8 * c.callback_id + 5)
         WHEN 'subscription' THEN coalesce(8 * c.subscription_id + 1, 8 * c.callback_id + 5)
@@ -26,27 +24,39 @@ SELECT
     END AS row_key,
     0::UTINYINT AS kind,
     i.callback_instance_id AS id,
-    i.start_ns AS recorded_ns,
-    coalesce(i.end_ns, i.start_ns) AS recorded_end_ns,
+    i.start_ns,
+    coalesce(i.end_ns, i.start_ns) AS end_ns,
     (coalesce(i.is_loss_affected, false)::UTINYINT + 2 * (i.end_ns IS NULL)::UTINYINT
         + 4 * i.is_intra_process::UTINYINT + 8 * (i.depth > 1)::UTINYINT)::UTINYINT AS flags
-FROM store.callback_instance AS i
-JOIN store.callback AS c ON i.callback_id = c.callback_id
+FROM main.callback_instance AS i
+JOIN main.callback AS c ON i.callback_id = c.callback_id
 UNION ALL
 SELECT
-    run_id, process_id, coalesce(8 * publisher_id + 4, 8 * process_id + 7), 1, publication_id,
-    start_ns, end_ns, coalesce(is_loss_affected, false)::UTINYINT
-FROM store.publication
+    run_id, coalesce(8 * publisher_id + 4, 8 * process_id + 7), 1, publication_id, start_ns, end_ns,
+    coalesce(is_loss_affected, false)::UTINYINT
+FROM main.publication
 UNION ALL
 SELECT
-    run_id, process_id, coalesce(8 * subscription_id + 1, 8 * process_id + 7), 2, take_id,
-    taken_ns, taken_ns, coalesce(is_loss_affected, false)::UTINYINT
-FROM store.take
+    run_id, coalesce(8 * subscription_id + 1, 8 * process_id + 7), 2, take_id, taken_ns, taken_ns,
+    coalesce(is_loss_affected, false)::UTINYINT
+FROM main.take
 UNION ALL
 SELECT
-    s.run_id, t.process_id, 8 * s.thread_id + 6,
-    CASE s.state WHEN 'wait' THEN 5 WHEN 'process' THEN 6 ELSE 7 END,
-    coalesce(s.callback_instance_id, -1), s.start_ns, coalesce(s.end_ns, s.start_ns),
-    (2 * (s.end_ns IS NULL)::UTINYINT)::UTINYINT
-FROM store.executor_state AS s
-JOIN store.thread AS t ON s.thread_id = t.thread_id
+    q.run_id, coalesce(8 * q.client_id + 3, 8 * q.service_id + 2, 8 * t.process_id + 7), 3,
+    q.request_id, coalesce(q.sent_ns, q.taken_ns), coalesce(q.taken_ns, q.sent_ns),
+    (2 * (q.taken_ns IS NULL OR q.sent_ns IS NULL)::UTINYINT)::UTINYINT
+FROM main.request AS q
+JOIN main.thread AS t ON coalesce(q.sender_thread_id, q.receiver_thread_id) = t.thread_id
+UNION ALL
+SELECT
+    r.run_id, coalesce(8 * r.client_id + 3, 8 * r.service_id + 2, 8 * t.process_id + 7), 4,
+    r.response_id, coalesce(r.sent_ns, r.taken_ns), coalesce(r.taken_ns, r.sent_ns),
+    (2 * (r.taken_ns IS NULL OR r.sent_ns IS NULL)::UTINYINT)::UTINYINT
+FROM main.response AS r
+JOIN main.thread AS t ON coalesce(r.receiver_thread_id, r.sender_thread_id) = t.thread_id
+UNION ALL
+SELECT
+    run_id, 8 * thread_id + 6, CASE state WHEN 'wait' THEN 5 WHEN 'process' THEN 6 ELSE 7 END,
+    coalesce(callback_instance_id, -1), start_ns, coalesce(end_ns, start_ns),
+    (2 * (end_ns IS NULL)::UTINYINT)::UTINYINT
+FROM main.executor_state

@@ -6,9 +6,7 @@
 -- param: run BIGINT  Run
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
--- param: recorded_from_ns BIGINT  Begin of the window on the earliest clock
--- param: recorded_before_ns BIGINT  Its end on the latest clock
--- column: to_kind UTINYINT  Effect, as in bar.sql and call.sql
+-- column: to_kind UTINYINT  Effect, as in bar.sql
 -- column: to_id BIGINT  Its identity
 -- column: from_kind UTINYINT  Cause
 -- column: from_id BIGINT  Its identity
@@ -23,7 +21,7 @@ code AS (
 ),
 coded AS (
     SELECT t.code AS to_kind, l.to_id, f.code AS from_kind, l.from_id, l.link_kind
-    FROM derive.flow_link AS l
+    FROM main.flow_edge AS l
     JOIN code AS f ON l.from_kind = f.name
     JOIN code AS t ON l.to_kind = t.name
     WHERE l.run_id = $run

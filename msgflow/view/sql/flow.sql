@@ -1,15 +1,15 @@
 -- name: flow
 -- title: The flow of what was picked
--- description: Everything that the picked thing caused and was caused by (main.flow_both), or one of
---     the two, as bars, and the links between them.
+-- description: Everything that the picked thing caused, or was caused by, or both
+--     (main.flow_both), as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
 -- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
--- param: steps BIGINT = NULL  Most steps each way, of which a message is three; any number when NULL
+-- param: steps BIGINT = NULL  Most steps each way, three per message; any number when NULL
 -- param: limit BIGINT = 20000  Most vertices, those nearest in time
--- column: kind UTINYINT  As in bar.sql and call.sql
+-- column: kind UTINYINT  As in bar.sql
 -- column: id BIGINT  Identity of the vertex
 -- column: row_key BIGINT  Row of the timeline
 -- column: start_at BIGINT [ns since origin]  Begin
@@ -46,22 +46,9 @@ vertex AS (
 ),
 drawn AS MATERIALIZED (
     SELECT
-        v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key,
-        derive.corrected_ns(
-            b.recorded_ns, c.offset_ns, c.drift_ppb, c.reference_ns
-        ) AS start_ns,
-        derive.corrected_ns(
-            b.recorded_end_ns, c.offset_ns, c.drift_ppb, c.reference_ns
-        ) AS end_ns,
-        b.flags
-    FROM vertex AS v
-    JOIN bar AS b ON v.kind = b.kind AND v.id = b.id AND v.kind < 3
-    JOIN derive.process_clock AS c ON b.process_id = c.process_id
-    UNION ALL
-    SELECT
         v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key, b.start_ns, b.end_ns, b.flags
     FROM vertex AS v
-    JOIN call AS b ON v.kind = b.kind AND v.id = b.id
+    JOIN bar AS b ON v.kind = b.kind AND v.id = b.id
 ),
 near AS MATERIALIZED (
     SELECT d.name, d.kind, d.id, d.is_effect, d.is_cause, d.row_key, d.start_ns, d.end_ns, d.flags
@@ -73,7 +60,7 @@ near AS MATERIALIZED (
 ),
 link AS (
     SELECT l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind
-    FROM derive.flow_link AS l
+    FROM main.flow_edge AS l
     SEMI JOIN near AS f ON l.from_kind = f.name AND l.from_id = f.id
     SEMI JOIN near AS t ON l.to_kind = t.name AND l.to_id = t.id
 )

@@ -12,26 +12,10 @@
 -- column: id BIGINT  Identity of the thing
 -- column: start_at BIGINT [ns since origin]  Begin
 -- column: length BIGINT [ns]  Length
-WITH beside AS (
-    SELECT
-        b.kind, b.id,
-        derive.corrected_ns(
-            b.recorded_ns, c.offset_ns, c.drift_ppb, c.reference_ns
-        ) AS start_ns,
-        derive.corrected_ns(
-            b.recorded_end_ns, c.offset_ns, c.drift_ppb, c.reference_ns
-        ) AS end_ns
-    FROM bar AS b
-    JOIN derive.process_clock AS c ON b.process_id = c.process_id
-    WHERE b.run_id = $run AND b.row_key = $row AND b.kind = $kind
-    UNION ALL
-    SELECT kind, id, start_ns, end_ns
-    FROM call
-    WHERE run_id = $run AND row_key = $row AND kind = $kind
-),
-numbered AS (
+WITH numbered AS (
     SELECT kind, id, start_ns, end_ns, row_number() OVER (ORDER BY start_ns, id) AS position
-    FROM beside
+    FROM bar
+    WHERE run_id = $run AND row_key = $row AND kind = $kind
 )
 SELECT kind, id, start_ns - $origin_ns AS start_at, end_ns - start_ns AS length
 FROM numbered

@@ -27,8 +27,8 @@ visited AS (
 timed AS (
     SELECT
         v.path_id,
-        count(DISTINCT derive.clock_group_id(c.clock_id, c.reference_clock_id)) = 1
-            AS is_comparable
+        -- A clock that none was corrected to, and that was not corrected itself, stands alone.
+        count(DISTINCT coalesce(c.reference_clock_id, -c.clock_id)) = 1 AS is_comparable
     FROM visited AS v
     JOIN main.process AS p ON v.process_id = p.process_id
     JOIN main.host AS h ON p.host_id = h.host_id

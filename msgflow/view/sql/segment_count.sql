@@ -3,8 +3,6 @@
 -- description: Number of bars in a window, which decides whether they are drawn one by one.
 -- grain: one row per window
 -- param: run BIGINT  Run
--- param: recorded_from_ns BIGINT  Begin of the window on the earliest clock
--- param: recorded_before_ns BIGINT  Its end on the latest clock
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
 -- column: count BIGINT  Bars

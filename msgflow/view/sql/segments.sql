@@ -4,8 +4,6 @@
 --     per row, kind and bin, and only longer ones come one by one.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
 -- param: run BIGINT  Run
--- param: recorded_from_ns BIGINT  Begin of the window on the earliest clock
--- param: recorded_before_ns BIGINT  Its end on the latest clock
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive

@@ -1,10 +1,9 @@
-// Starts the page: chooses where data come from, and shows the page that the address names.
+// The application: it chooses where data come from, and shows the page of the address.
 
 import { h, clear, color } from "./dom.js";
-import { address, current, go, onChange } from "./state.js";
-import { ServedSource } from "./source.js";
-import { embedded } from "./embedded.js";
-import { records } from "./columns.js";
+import { address, current, go, onChange } from "./address.js";
+import { embedded } from "./report_data.js";
+import { decode, records } from "./table_decoding.js";
 import { OverviewPage } from "./overview.js";
 import { PathsPage } from "./paths.js";
 import { TimelinePage } from "./timeline.js";
@@ -25,6 +24,49 @@ const PAGES = {
 };
 // Of a lake, which is no database.
 const OTHER_PAGES = ["lake"];
+
+// What the server said in place of an answer.
+class SourceError extends Error {
+  constructor(message, hint, code) {
+    super(message);
+    this.hint = hint;
+    this.code = code;
+  }
+}
+
+// The data of pages that a server sent: answers of the server, the latest 60 of them kept.
+class ServedSource {
+  constructor() {
+    this.isServed = true;
+    this.notes = [];
+    this.kept = new Map();
+    this.generation = document.documentElement.dataset.generation ?? "";
+  }
+
+  async fetch(name, params = {}, signal = undefined) {
+    const query = new URLSearchParams();
+    for (const [key, value] of Object.entries(params)) {
+      if (value !== null && value !== undefined) query.set(key, value);
+    }
+    const address = `api/${name}?${query}`;
+    if (this.kept.has(address)) return this.kept.get(address);
+    let answer;
+    try {
+      answer = await fetch(address, { signal, headers: { "X-Generation": this.generation } });
+    } catch (error) {
+      if (error.name === "AbortError") throw error;
+      throw new SourceError("the server does not answer", "is msgflow ui still running?", "gone");
+    }
+    if (!answer.ok) {
+      const said = await answer.json().catch(() => ({}));
+      throw new SourceError(said.error ?? answer.statusText, said.hint, said.code);
+    }
+    const table = decode(new Uint8Array(await answer.arrayBuffer()));
+    this.kept.set(address, table);
+    if (this.kept.size > 60) this.kept.delete(this.kept.keys().next().value);
+    return table;
+  }
+}
 
 class App {
   constructor(source) {

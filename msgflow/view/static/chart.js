@@ -1,7 +1,7 @@
 // Charts by uPlot in the colours of the page, with labels as people read durations.
 
 import { h, color } from "./dom.js";
-import { duration } from "./words.js";
+import { duration } from "./labels.js";
 
 const drawn = new Set();
 

@@ -1,8 +1,8 @@
 // Two runs: what is longer or shorter, and the distributions of a path one over the other.
 
 import { h, clear } from "./dom.js";
-import { current, replace } from "./state.js";
-import { count, duration, percent } from "./words.js";
+import { current, replace } from "./address.js";
+import { count, duration, percent } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";

@@ -1,8 +1,8 @@
 // Executors: what their threads did over time, and who kept whom waiting.
 
 import { h, clear, color } from "./dom.js";
-import { count, duration, moment, percent } from "./words.js";
-import { address } from "./state.js";
+import { count, duration, moment, percent } from "./labels.js";
+import { address } from "./address.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { fill, section } from "./overview.js";

@@ -1,6 +1,6 @@
 // A picked flow: its vertices once each, its links, and what of it lies on the critical path.
 
-import { KIND_NAMES } from "./words.js";
+import { KIND_NAMES } from "./labels.js";
 
 export function buildFlow(table, picked) {
   const vertices = [];

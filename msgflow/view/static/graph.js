@@ -1,8 +1,8 @@
 // The graph of nodes, topics and services, with rates on topics and latencies on edges.
 
 import { h, svg, clear, color } from "./dom.js";
-import { address, current, replace } from "./state.js";
-import { brief, count, duration } from "./words.js";
+import { address, current, replace } from "./address.js";
+import { brief, count, duration } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 

@@ -1,8 +1,8 @@
 // A lake: paths of many runs by label over time, runs that stand out, slowest flows, failures.
 
 import { h, clear, breakable } from "./dom.js";
-import { current, replace } from "./state.js";
-import { PATH_HELP, count, duration, pathText } from "./words.js";
+import { current, replace } from "./address.js";
+import { PATH_HELP, count, duration, pathText } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";

@@ -1,4 +1,4 @@
-// What pages say when something is under way, missing or wrong.
+// Notices: what pages say when something is under way, missing or wrong.
 
 import { h } from "./dom.js";
 

@@ -1,8 +1,8 @@
 // The first page: what was recorded, what is wrong with it, and what is slow.
 
 import { h, clear, breakable } from "./dom.js";
-import { address } from "./state.js";
-import { PATH_HELP, count, duration, pathText, wallClock } from "./words.js";
+import { address } from "./address.js";
+import { PATH_HELP, count, duration, pathText, wallClock } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 

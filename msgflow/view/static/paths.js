@@ -1,8 +1,8 @@
-// Paths: latency of each, and of the chosen one how it is distributed, over time, and made up.
+// Paths: the latency of each; distribution, course over time and parts of the chosen one.
 
 import { h, clear, color, breakable } from "./dom.js";
-import { address, current, replace } from "./state.js";
-import { PALE, PART_COLORS, PATH_HELP, count, duration, partTitle, pathText, percent } from "./words.js";
+import { address, current, replace } from "./address.js";
+import { PALE, PART_COLORS, PATH_HELP, count, duration, partTitle, pathText, percent } from "./labels.js";
 import { dataTable, besides } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 import { chart, redrawCharts } from "./chart.js";

@@ -1,8 +1,8 @@
-// Draws the timeline on a canvas: bars, what is several bars, arrows, gaps, the picked flow.
+// Drawing of the timeline on a canvas: bars, bins of bars, arrows, gaps, the picked flow.
 
 import { color } from "./dom.js";
-import { lowerBound } from "./lanes.js";
-import { PALE, PART_COLORS, duration, partTitle } from "./words.js";
+import { lowerBound } from "./timeline_rows.js";
+import { PALE, PART_COLORS, duration, partTitle } from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;

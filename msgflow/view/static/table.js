@@ -1,7 +1,7 @@
 // A table beside every chart: sorted by a click, with what its columns mean.
 
 import { h, clear, breakable } from "./dom.js";
-import { cell, title, count } from "./words.js";
+import { cell, title, count } from "./labels.js";
 import { doubt } from "./notice.js";
 
 const SHOWN = 100;

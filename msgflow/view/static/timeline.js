@@ -1,10 +1,10 @@
-// The page with the timeline: what the window shows, what is picked, and how one moves about.
+// The page with the timeline: its window, what is picked, and how one moves about.
 
 import { h, clear } from "./dom.js";
-import { current, go, replace } from "./state.js";
-import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./words.js";
+import { current, go, replace } from "./address.js";
+import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
 import { Renderer, AXIS } from "./renderer.js";
-import { ROW_KINDS, indexBars, layout } from "./lanes.js";
+import { ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
 import { besides, scrolls } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";

@@ -1,4 +1,4 @@
--- 1500 nodes in a line, each of which passes on every message to the next one at once. The first
+-- 1500 nodes in a line: each passes on every message to the next one at once. The first
 -- has a timer, which publishes twice.
 INSERT INTO store.node (node_id, run_id, process_id, full_name, is_inferred)
 SELECT node, 1, 1, '/node_' || node, false FROM range(1, 1502) AS r(node);

@@ -1,6 +1,6 @@
 -- A camera on a robot, whose clock is 1000 ns behind, and a filter and a server on another host:
 -- one message each way, a call of a service, a callback inside another one, and what is not known
--- or not seen to the end. Beside them another run, of which pages must show nothing.
+-- or not seen to the end. Beside them another run, which no page may show.
 UPDATE store.run SET end_ns = 4000;
 INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash, start_ns, end_ns)
 VALUES (2, 'other', '1970-01-01', '1.2', '', 5000, 6000);

@@ -1,0 +1,130 @@
+// Labels: names that people read, for columns of queries, statistics and kinds.
+
+export const KINDS = [
+  "callback instance", "publication", "take", "request", "response", "wait", "process", "execute",
+];
+export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
+
+export const LINKS = {
+  transport: "publish to take",
+  callback: "take to callback",
+  direct: "published by",
+  periodic_async: "periodic (cached until the timer)",
+  partial_sync: "synchronised (cached until the set was complete)",
+  take_adjacent: "published after the take",
+  service: "service",
+};
+export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent"];
+
+const TITLES = {
+  run_id: "run", roots: "flows", loss_affected: "touched by losses",
+  sink_event: "ends with", lost_reasons: "reasons", is_cut: "search cut", what: "what",
+  topic_name: "topic", is_loss_affected: "touched by losses", rate_hz: "rate",
+  callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
+  start_at: "begin", length: "duration", subject: "path", a_ns: "A", b_ns: "B",
+  difference_ns: "B − A", change_percent: "change", low_ns: "95 % interval, from", high_ns: "to",
+  a_count: "values of A", b_count: "values of B", share: "share", affected_percent: "affected",
+  seen_ns: "seen", executor_kind: "executor", root_at: "began at",
+  publisher_count: "publishers", subscription_count: "subscriptions", publication_count: "messages published",
+  take_count: "messages taken", delayed_min: "delayed, at least", delayed_max: "delayed, at most",
+  busy_worst_ns: "busy, longest", busy_total_min_ns: "busy in all, at least", busy_total_max_ns: "busy in all, at most",
+  meanwhile_node: "kept waiting by", meanwhile_callback: "its callback", overlap_min_ns: "ran meanwhile, at least",
+  overlap_max_ns: "ran meanwhile, at most", worst_ns: "longest", a_share: "share in A", b_share: "share in B",
+  usual_ns: "usual median", at_ns: "begin in the run", value: "value", to_open_it: "opens with", worst_run: "run with most", cure: "what to do",
+};
+
+// Parts of a latency, as path-breakdown names them.
+const PARTS = {
+  network_or_idle: "network, or executor idle", executor_busy: "executor busy with others",
+  undecided: "undecided: network or busy executor", take_to_callback: "take to callback",
+  blocked: "blocked by another callback", unpublished: "waiting for a message not published yet",
+  timer: "waiting for the timer", cache: "in a cache",
+};
+export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
+// Of these colours too light or too dull for the page's own colour as text on them.
+export const PALE = new Set(["wait", "faint"]);
+export const PART_COLORS = {
+  callback: "subscription", cache: "indirect", take_to_callback: "faint", network_or_idle: "transport", undecided: "wait",
+  executor_busy: "process", blocked: "process", unpublished: "faint", timer: "timer", service: "service", rclcpp: "publication",
+  rcl: "publication", rmw: "publication", dds: "publication", intra: "publication", publish: "publication", take: "take",
+};
+
+// Nodes and topics take turns in a path: a topic with the name of its node is written once.
+export const PATH_HELP = "A topic with the name of the node that publishes it is written once.";
+export function pathText(path) {
+  return String(path ?? "").split(" → ").reduce((text, part, place, parts) =>
+    place % 2 && part === parts[place - 1] ? text : place ? `${text} → ${part}` : part, "");
+}
+
+export function title(name) {
+  if (name in TITLES) return TITLES[name];
+  return name.replace(/_(ns|hz|percent)$/, "").replace(/^p(\d\d)$/, "p$1").replaceAll("_", " ");
+}
+
+const UNITS = [[1e9, "s"], [1e6, "ms"], [1e3, "µs"], [1, "ns"]];
+
+// Durations as people say them: at most six digits, exact to the nanosecond where these suffice.
+export function duration(ns) {
+  if (ns === null || ns === undefined || Number.isNaN(ns)) return "–";
+  if (ns === 0) return "0";
+  const size = Math.abs(ns);
+  const [scale, unit] = UNITS.find(([least]) => size >= least) ?? UNITS[3];
+  const value = ns / scale;
+  return `${trimmed(value, scale === 1 ? 0 : 3)} ${unit}`;
+}
+
+// Three digits are enough beside an arrow.
+export function brief(ns) {
+  const size = Math.abs(ns);
+  const [scale, unit] = UNITS.find(([least]) => size >= least) ?? UNITS[3];
+  return `${Number((ns / scale).toPrecision(3)).toLocaleString("en-US")} ${unit}`;
+}
+
+function trimmed(value, digits) {
+  return value.toLocaleString("en-US", { maximumFractionDigits: digits, useGrouping: true });
+}
+
+// Points in time since the begin of the run, all nanoseconds: 12.345 678 901 s.
+export function moment(at) {
+  if (at === null || at === undefined || Number.isNaN(at)) return "–";
+  const negative = at < 0;
+  const whole = Math.floor(Math.abs(at) / 1e9);
+  const rest = Math.round(Math.abs(at) - whole * 1e9).toString().padStart(9, "0");
+  return `${negative ? "−" : ""}${whole}.${rest.slice(0, 3)} ${rest.slice(3, 6)} ${rest.slice(6)} s`;
+}
+
+export function count(number, thing) {
+  return `${number.toLocaleString("en-US")} ${thing}${number === 1 ? "" : "s"}`;
+}
+
+export function percent(share, digits = 1) {
+  return share === null || Number.isNaN(share) ? "–" : `${(100 * share).toFixed(digits)} %`;
+}
+
+// A wall-clock time of an offset, in UTC, to the nanosecond.
+export function wallClock(originText, at) {
+  const ns = BigInt(originText) + BigInt(Math.round(at));
+  const seconds = ns / 1000000000n;
+  const rest = ns - seconds * 1000000000n;
+  const date = new Date(Number(seconds) * 1000);
+  if (Number.isNaN(date.getTime())) return "";
+  return `${date.toISOString().slice(0, 19)}.${rest.toString().padStart(9, "0")}Z`;
+}
+
+export function cell(value, column) {
+  if (value === null || value === undefined || (typeof value === "number" && Number.isNaN(value))) return "";
+  if (typeof value === "boolean") return value ? "yes" : "no";
+  if (Array.isArray(value)) return value.join(", ");
+  if (column.unit === "epoch ns" || column.unit === "ns since origin") return moment(value);
+  if (column.unit === "ns") return duration(value);
+  if (column.unit === "Hz") return `${trimmed(value, 3)} Hz`;
+  if (column.unit === "%") return `${trimmed(value, 2)} %`;
+  if (column.name === "change_percent") return `${trimmed(value, 2)} %`;
+  if (column.name === "part") return partTitle(value);
+  if (column.name === "path") return pathText(value);
+  if (typeof value === "number") {
+    if (/share$/.test(column.name)) return percent(value);
+    return trimmed(value, 3);
+  }
+  return value;
+}

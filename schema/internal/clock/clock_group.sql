@@ -1,0 +1,38 @@
+-- name: internal.clock_group
+-- title: Clocks that are together
+-- description: Clocks that are corrected to the same one. The bound of two clocks is the sum of
+--     theirs, and that of the reference is 0.
+-- grain: one row per clock that others are corrected to, or that stands alone
+-- param: runs BIGINT[]  Runs
+-- column: run_id BIGINT  Run
+-- column: hosts VARCHAR  Hosts of the clocks
+-- column: clocks BIGINT  How many
+-- column: greatest_ms DOUBLE [ms]  Most by which two of them can differ; NULL: not known
+-- column: is_tried BOOLEAN  Messages did not suffice to bring the clocks of the run together
+WITH known AS (
+    SELECT clock_id, max(uncertainty_ns) AS greatest_ns
+    FROM main.clock_uncertainty
+    GROUP BY clock_id
+),
+bound AS (
+    SELECT
+        c.run_id, c.clock_id, n.hosts,
+        derive.clock_group_id(c.clock_id, c.reference_clock_id) AS together,
+        coalesce(k.greatest_ns, c.uncertainty_ns) AS bound_ns
+    FROM main.clock AS c
+    LEFT JOIN clock_host AS n ON c.clock_id = n.clock_id
+    LEFT JOIN known AS k ON c.clock_id = k.clock_id
+    WHERE list_contains($runs, c.run_id)
+)
+SELECT
+    run_id,
+    string_agg(hosts, ', ' ORDER BY clock_id) AS hosts,
+    count(*) AS clocks,
+    CASE WHEN bool_and(bound_ns IS NOT NULL) THEN list_sum(max(bound_ns, 2)) / 1e6 END
+        AS greatest_ms,
+    run_id IN (
+        SELECT run_id FROM main.diagnostic WHERE name = 'clock_not_synchronised'
+    ) AS is_tried
+FROM bound
+GROUP BY run_id, together
+ORDER BY run_id, min(clock_id)

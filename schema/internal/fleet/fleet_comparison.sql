@@ -1,0 +1,262 @@
+-- name: internal.fleet_comparison
+-- title: How runs of one side differ from those of another
+-- description: What `measured` (rows of `internal.fleet_run_value`) says of two sides. A run, or
+--     what it is a sample of, is one value, however many flows it has: how much runs of a side
+--     differ from each other tells whether the sides do. Both are compared by trimmed means (the
+--     lowest and the highest fifth of the runs is left out) and Welch's t with winsorized variances
+--     (Yuen), of logarithms, so that a difference is a share; where a value is not positive, of
+--     the values.
+-- grain: one row per path and statistic; paths that only one side has, too
+-- param: z DOUBLE  Quantile of the standard normal distribution for the confidence wanted
+-- param: least_units BIGINT  Fewest runs of either side for an interval
+-- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
+-- column: a_ns BIGINT [ns]  Its value in a typical run of side A
+-- column: b_ns BIGINT [ns]  Its value in a typical run of side B
+-- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
+-- column: low_percent DOUBLE  Lower end of the confidence interval of the change
+-- column: high_percent DOUBLE  Its upper end
+-- column: verdict VARCHAR  'B is longer' or 'B is shorter' where both ends have one sign, else 'no
+--     difference shown'; 'too few runs', 'too few values' (in too many of the runs) or 'not
+--     estimated' (maximum), 'only in A' or 'only in B'
+-- column: a_spread_percent DOUBLE  Width of the middle half of the runs of A, in percent
+-- column: b_spread_percent DOUBLE  Width of the middle half of the runs of B, in percent
+-- column: difference_ns BIGINT [ns]  B less A
+-- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
+-- column: high_ns BIGINT [ns]  Its upper end
+-- column: cliffs_delta DOUBLE  How often a run of B exceeds one of A, minus how often it is the
+--     other way round: -1 to 1
+-- column: separation VARCHAR  How well medians of the runs of both can be told apart, by Cliff's
+--     delta: 'negligible', 'small', 'medium' or 'large'
+-- column: a_count BIGINT  Runs of A whose values count
+-- column: b_count BIGINT  Runs of B whose values count
+-- column: a_flows BIGINT  Flows measured in all runs of A
+-- column: b_flows BIGINT  Flows measured in all runs of B
+-- column: a_share DOUBLE  Share of the roots of all runs of A that reached the end
+-- column: b_share DOUBLE  Share of the roots of all runs of B that reached the end
+-- column: a_loss_affected BIGINT  Roots of A with a gap of a trace in their time
+-- column: b_loss_affected BIGINT  Roots of B with a gap of a trace in their time
+-- column: is_cut BOOLEAN  Paths of a run were left out beyond the limits
+-- column: subject VARCHAR  Nodes and topics of the path
+WITH of_side AS (
+    SELECT
+        side,
+        subject,
+        statistic,
+        sum(number)::BIGINT AS flows,
+        sum(roots) AS roots,
+        sum(reached) AS reached,
+        sum(loss_affected)::BIGINT AS loss_affected,
+        bool_or(is_cut) AS is_cut,
+        count(DISTINCT unit) FILTER (value_ns IS NOT NULL) AS units,
+        -- Short runs count where there are no others, and then there is no interval.
+        coalesce(bool_or(is_enough), false) AS is_enough
+    FROM measured
+    GROUP BY side, subject, statistic
+),
+unit AS (
+    SELECT m.side, m.unit, m.subject, m.statistic, median(m.value_ns) AS value_ns
+    FROM measured AS m
+    JOIN of_side AS s
+        ON m.side = s.side AND m.subject = s.subject AND m.statistic = s.statistic
+    WHERE m.value_ns IS NOT NULL AND m.is_enough = s.is_enough
+    GROUP BY m.side, m.unit, m.subject, m.statistic
+),
+scaled AS (
+    SELECT
+        *,
+        min(value_ns) OVER whole > 0 AS is_log,
+        -- Ties in the middle.
+        rank() OVER (whole ORDER BY value_ns)
+            + (count(*) OVER (PARTITION BY subject, statistic, value_ns) - 1) / 2 AS place
+    FROM unit
+    WINDOW whole AS (PARTITION BY subject, statistic)
+),
+ranked AS (
+    SELECT
+        side,
+        subject,
+        statistic,
+        is_log,
+        place,
+        CASE WHEN is_log THEN ln(value_ns) ELSE value_ns END AS x,
+        row_number() OVER (PARTITION BY side, subject, statistic ORDER BY value_ns, unit) AS nth,
+        count(*) OVER (PARTITION BY side, subject, statistic) AS number,
+        (number // 5) AS trimmed
+    FROM scaled
+),
+ends AS (
+    SELECT
+        side,
+        subject,
+        statistic,
+        any_value(is_log) AS is_log,
+        any_value(number) AS number,
+        any_value(number - 2 * trimmed) AS kept,
+        avg(x) FILTER (nth > trimmed AND nth <= number - trimmed) AS centre,
+        min(x) FILTER (nth > trimmed) AS lowest,
+        max(x) FILTER (nth <= number - trimmed) AS highest,
+        quantile_cont(x, 0.75) - quantile_cont(x, 0.25) AS spread,
+        sum(place) AS places
+    FROM ranked
+    GROUP BY side, subject, statistic
+),
+centre AS (
+    SELECT
+        e.side,
+        e.subject,
+        e.statistic,
+        any_value(e.is_log) AS is_log,
+        any_value(e.number) AS number,
+        any_value(e.kept) AS kept,
+        any_value(e.centre) AS centre,
+        any_value(CASE
+            WHEN e.is_log THEN 100 * (exp(e.spread) - 1) ELSE 100 * e.spread / abs(e.centre)
+        END) AS spread_percent,
+        any_value(e.places) AS places,
+        -- How far the trimmed mean may be off, squared.
+        var_samp(greatest(e.lowest, least(e.highest, r.x))) * (any_value(e.number) - 1)
+            / any_value(e.kept * (e.kept - 1)) AS error
+    FROM ends AS e
+    JOIN ranked AS r
+        ON e.side = r.side AND e.subject = r.subject AND e.statistic = r.statistic
+    GROUP BY e.side, e.subject, e.statistic
+),
+known AS (
+    SELECT
+        s.side,
+        s.subject,
+        s.statistic,
+        s.flows,
+        s.roots,
+        s.reached,
+        s.loss_affected,
+        s.is_cut,
+        s.units,
+        s.is_enough,
+        c.is_log,
+        c.number,
+        c.kept,
+        c.centre,
+        c.error,
+        c.spread_percent,
+        c.places,
+        round(CASE WHEN c.is_log THEN exp(c.centre) ELSE c.centre END)::BIGINT AS value_ns
+    FROM of_side AS s
+    LEFT JOIN centre AS c
+        ON s.side = c.side AND s.subject = c.subject AND s.statistic = c.statistic
+),
+paired AS (
+    SELECT
+        coalesce(a.subject, b.subject) AS subject,
+        coalesce(a.statistic, b.statistic) AS statistic,
+        a.value_ns AS a_ns,
+        b.value_ns AS b_ns,
+        coalesce(a.is_log, b.is_log) AS is_log,
+        coalesce(a.number, 0) AS a_count,
+        coalesce(b.number, 0) AS b_count,
+        a.spread_percent AS a_spread_percent,
+        b.spread_percent AS b_spread_percent,
+        coalesce(a.flows, 0) AS a_flows,
+        coalesce(b.flows, 0) AS b_flows,
+        a.reached / nullif(a.roots, 0) AS a_share,
+        b.reached / nullif(b.roots, 0) AS b_share,
+        a.loss_affected AS a_loss_affected,
+        b.loss_affected AS b_loss_affected,
+        coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut,
+        b.centre - a.centre AS difference,
+        sqrt(a.error + b.error) AS error,
+        -- Welch and Satterthwaite.
+        pow(a.error + b.error, 2)
+            / nullif(pow(a.error, 2) / (a.kept - 1) + pow(b.error, 2) / (b.kept - 1), 0) AS freedom,
+        (2 * b.places - b.number * (b.number + 1)) / (a.number * b.number) - 1 AS delta,
+        CASE
+            WHEN a.number IS NULL AND b.number IS NULL THEN 'too few values'
+            WHEN b.number IS NULL THEN 'only in A'
+            WHEN a.number IS NULL THEN 'only in B'
+            WHEN coalesce(a.statistic, b.statistic) = 'max' THEN 'not estimated'
+            WHEN least(a.units, b.units) < $least_units THEN 'too few runs'
+            WHEN NOT a.is_enough OR NOT b.is_enough OR least(a.number, b.number) < $least_units
+                THEN 'too few values'
+        END AS reason
+    FROM (SELECT * FROM known WHERE side = 'a') AS a
+    FULL JOIN (SELECT * FROM known WHERE side = 'b') AS b
+        ON a.subject = b.subject AND a.statistic = b.statistic
+),
+-- Student's t for the degrees of freedom, by the expansion of Cornish and Fisher.
+judged AS (
+    SELECT
+        *,
+        coalesce(error * (
+            $z
+            + (pow($z, 3) + $z) / (4 * freedom)
+            + (5 * pow($z, 5) + 16 * pow($z, 3) + 3 * $z) / (96 * pow(freedom, 2))
+            + (3 * pow($z, 7) + 19 * pow($z, 5) + 17 * pow($z, 3) - 15 * $z)
+                / (384 * pow(freedom, 3))
+            + (79 * pow($z, 9) + 776 * pow($z, 7) + 1482 * pow($z, 5) - 1920 * pow($z, 3)
+                - 945 * $z) / (92160 * pow(freedom, 4))
+        ), 0) AS off
+    FROM paired
+),
+bounded AS (
+    SELECT
+        *,
+        CASE
+            WHEN is_log THEN 100 * (exp(difference - off) - 1)
+            WHEN a_ns > 0 THEN 100 * (difference - off) / a_ns
+        END AS low,
+        CASE
+            WHEN is_log THEN 100 * (exp(difference + off) - 1)
+            WHEN a_ns > 0 THEN 100 * (difference + off) / a_ns
+        END AS high
+    FROM judged
+)
+SELECT
+    statistic,
+    a_ns,
+    b_ns,
+    CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
+    CASE WHEN reason IS NULL THEN round(low, 3) END AS low_percent,
+    CASE WHEN reason IS NULL THEN round(high, 3) END AS high_percent,
+    CASE
+        WHEN reason IS NOT NULL THEN reason
+        WHEN difference - off > 0 THEN 'B is longer'
+        WHEN difference + off < 0 THEN 'B is shorter'
+        ELSE 'no difference shown'
+    END AS verdict,
+    round(a_spread_percent, 2) AS a_spread_percent,
+    round(b_spread_percent, 2) AS b_spread_percent,
+    b_ns - a_ns AS difference_ns,
+    CASE
+        WHEN reason IS NULL AND is_log THEN round(a_ns * low / 100)
+        WHEN reason IS NULL THEN round(difference - off)
+    END::BIGINT AS low_ns,
+    CASE
+        WHEN reason IS NULL AND is_log THEN round(a_ns * high / 100)
+        WHEN reason IS NULL THEN round(difference + off)
+    END::BIGINT AS high_ns,
+    CASE WHEN reason IS NULL THEN round(delta, 4) END AS cliffs_delta,
+    CASE
+        WHEN abs(of_median) < 0.147 THEN 'negligible'
+        WHEN abs(of_median) < 0.33 THEN 'small'
+        WHEN abs(of_median) < 0.474 THEN 'medium'
+        WHEN of_median IS NOT NULL THEN 'large'
+    END AS separation,
+    a_count,
+    b_count,
+    a_flows,
+    b_flows,
+    round(a_share, 4) AS a_share,
+    round(b_share, 4) AS b_share,
+    a_loss_affected,
+    b_loss_affected,
+    is_cut,
+    subject
+FROM (
+    SELECT
+        *,
+        any_value(delta) FILTER (statistic = 'median' AND reason IS NULL)
+            OVER (PARTITION BY subject) AS of_median
+    FROM bounded
+)
+ORDER BY
+    subject, list_position(['median', 'mean', 'p95', 'p99', 'max'], statistic)

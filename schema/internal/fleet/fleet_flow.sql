@@ -1,0 +1,45 @@
+-- name: internal.fleet_flow
+-- title: Flows of every path, one by one
+-- description: Rows of main.end_to_end with its defaults (from the start of a callback to the end
+--     of one), each with its path. What e2e-latency says of a run it says of these rows; over
+--     several runs it can be computed from theirs.
+-- grain: one row per path, root and arrival; one per path and root that did not arrive
+-- param: runs BIGINT[]  Runs
+-- column: run_id BIGINT  Run
+-- column: path VARCHAR  Nodes and topics of the path
+-- column: path_id BIGINT  Number of the path in the run: several paths may have one text
+-- column: root_kind VARCHAR  'callback_instance' or 'publication'
+-- column: root_id BIGINT  Identity of the root in the run
+-- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: take_id BIGINT  Take at the end of the path; NULL: not reached
+-- column: sink_event VARCHAR  Event that ended the flow: 'callback_end', or 'take' where the sink
+--     never shows a callback
+-- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: status VARCHAR  'reached', 'superseded', 'lost' or 'cut_by_recording'
+-- column: reason VARCHAR  Why it did not arrive
+-- column: is_first BOOLEAN  First arrival of the root
+-- column: is_last BOOLEAN  Last arrival of the root
+-- column: is_newest BOOLEAN  Newest root of the arrival
+-- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
+SELECT
+    e.run_id,
+    p.path,
+    e.path_id,
+    e.root_kind,
+    e.root_id,
+    e.root_ns,
+    e.take_id,
+    e.sink_event,
+    e.sink_ns,
+    e.latency_ns,
+    e.status,
+    e.reason,
+    e.is_first,
+    e.is_last,
+    e.is_newest,
+    e.is_loss_affected
+FROM main.end_to_end($runs) AS e
+JOIN main.flow_path($runs, only_paths := true) AS p ON e.path_id = p.path_id
+ORDER BY
+    e.run_id, p.path, e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id

@@ -1,0 +1,43 @@
+-- name: internal.perfetto_name
+-- title: Names in Perfetto
+-- description: Names that slices refer to by number; with 0 those of what is not known.
+-- grain: one row per name
+-- param: run_id BIGINT  Run
+-- column: code INTEGER  What kind of slice has it
+-- column: id BIGINT  Of the callback, publisher, subscription, client, service or state
+-- column: name VARCHAR  The name
+SELECT 0 AS code, callback_id AS id, node || ' ' || label AS name
+FROM main.callback_label
+WHERE run_id = $run_id
+UNION ALL
+SELECT 1, publisher_id, 'publish ' || coalesce(topic_name, '?')
+FROM main.publisher
+WHERE run_id = $run_id
+UNION ALL
+SELECT 2, subscription_id, 'take ' || coalesce(topic_name, '?')
+FROM main.subscription
+WHERE run_id = $run_id
+UNION ALL
+SELECT 3, client_id, 'request ' || coalesce(service_name, '?')
+FROM main.client
+WHERE run_id = $run_id
+UNION ALL
+SELECT 4, service_id, 'take request ' || coalesce(service_name, '?')
+FROM main.service
+WHERE run_id = $run_id
+UNION ALL
+SELECT 5, service_id, 'respond ' || coalesce(service_name, '?')
+FROM main.service
+WHERE run_id = $run_id
+UNION ALL
+SELECT 6, client_id, 'take response ' || coalesce(service_name, '?')
+FROM main.client
+WHERE run_id = $run_id
+UNION ALL
+SELECT code, 0, name
+FROM (VALUES (0, 'callback'), (1, 'publish ?'), (2, 'take ?'), (3, 'request ?'),
+    (4, 'take request ?'), (5, 'respond ?'), (6, 'take response ?')) AS unknown (code, name)
+UNION ALL
+SELECT 7, id, name
+FROM (VALUES (1, 'wait'), (2, 'process'), (3, 'execute')) AS state (id, name)
+ORDER BY code, id

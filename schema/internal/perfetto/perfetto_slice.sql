@@ -1,0 +1,132 @@
+-- name: internal.perfetto_slice
+-- title: Slices in Perfetto
+-- description: Begins and ends of slices of threads and of executors, in the order of each track,
+--     with the links between them. A link begins at the last and ends at the first moment of a
+--     request or response that was traced.
+-- grain: one row per begin and end of a slice, and per moment
+-- param: run_id BIGINT  Run
+-- param: start_ns BIGINT  Begin of the window, epoch ns
+-- param: end_ns BIGINT  End of the window, epoch ns
+-- column: track BIGINT  Its track
+-- column: at_ns BIGINT [epoch ns]  When
+-- column: rank INTEGER  0 an end, 1 a begin, 2 a moment
+-- column: name BIGINT  Number of its name; NULL: an end
+-- column: code INTEGER  What kind of slice it is
+-- column: id BIGINT  What it is of
+-- column: symbol_id BIGINT  Callback whose symbol it has; NULL: none
+-- column: outgoing UBIGINT[]  Links that begin there
+-- column: incoming UBIGINT[]  Links that end there
+WITH slice AS MATERIALIZED (
+    SELECT
+        i.thread_id * 8 + 2 AS track, i.start_ns, coalesce(i.end_ns, i.start_ns) AS end_ns,
+        0 AS code, i.callback_id AS object_id, i.callback_instance_id AS id,
+        CASE WHEN c.symbol IS NOT NULL THEN c.callback_id END AS symbol_id
+    FROM main.callback_instance AS i
+    JOIN main.callback AS c ON i.callback_id = c.callback_id
+    WHERE i.run_id = $run_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+    UNION ALL
+    SELECT thread_id * 8 + 2, start_ns, coalesce(end_ns, start_ns), 1,
+        coalesce(publisher_id, 0), publication_id, NULL
+    FROM main.publication
+    WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
+    UNION ALL
+    SELECT thread_id * 8 + 2, taken_ns, taken_ns, 2, coalesce(subscription_id, 0), take_id, NULL
+    FROM main.take
+    WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
+        AND method <> 'callback_only'
+    UNION ALL
+    SELECT sender_thread_id * 8 + 2, sent_ns, sent_ns, 3, coalesce(client_id, 0), request_id, NULL
+    FROM main.request
+    WHERE run_id = $run_id AND sent_ns >= $start_ns AND sent_ns < $end_ns
+        AND sender_thread_id IS NOT NULL
+    UNION ALL
+    SELECT receiver_thread_id * 8 + 2, taken_ns, taken_ns, 4, coalesce(service_id, 0), request_id,
+        NULL
+    FROM main.request
+    WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
+        AND receiver_thread_id IS NOT NULL
+    UNION ALL
+    SELECT sender_thread_id * 8 + 2, sent_ns, sent_ns, 5, coalesce(service_id, 0), response_id,
+        NULL
+    FROM main.response
+    WHERE run_id = $run_id AND sent_ns >= $start_ns AND sent_ns < $end_ns
+        AND sender_thread_id IS NOT NULL
+    UNION ALL
+    SELECT receiver_thread_id * 8 + 2, taken_ns, taken_ns, 6, coalesce(client_id, 0), response_id,
+        NULL
+    FROM main.response
+    WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
+        AND receiver_thread_id IS NOT NULL
+),
+link AS (
+    SELECT
+        CASE l.from_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
+            WHEN 'take' THEN 2 ELSE CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
+        END AS from_code,
+        l.from_id,
+        CASE l.to_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
+            WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN o.sent_ns IS NULL THEN 4 ELSE 3 END
+            ELSE CASE WHEN r.sent_ns IS NULL THEN 6 ELSE 5 END
+        END AS to_code,
+        l.to_id,
+        l.link_kind
+    FROM main.flow_edge AS l
+    LEFT JOIN main.request AS q ON l.from_kind = 'request' AND l.from_id = q.request_id
+    LEFT JOIN main.request AS o ON l.to_kind = 'request' AND l.to_id = o.request_id
+    LEFT JOIN main.response AS r ON l.to_kind = 'response' AND l.to_id = r.response_id
+    WHERE l.run_id = $run_id
+    UNION ALL
+    SELECT 3, request_id, 4, request_id, 'transport'
+    FROM main.request
+    WHERE run_id = $run_id AND sent_ns IS NOT NULL AND taken_ns IS NOT NULL
+    UNION ALL
+    SELECT 5, response_id, 6, response_id, 'transport'
+    FROM main.response
+    WHERE run_id = $run_id AND sent_ns IS NOT NULL AND taken_ns IS NOT NULL
+),
+-- Arrows with both ends drawn.
+arrow AS MATERIALIZED (
+    SELECT l.from_code, l.from_id, l.to_code, l.to_id,
+        hash(l.from_code, l.from_id, l.to_code, l.to_id, l.link_kind) AS arrow_id
+    FROM link AS l
+    SEMI JOIN slice AS f ON l.from_code = f.code AND l.from_id = f.id
+    SEMI JOIN slice AS t ON l.to_code = t.code AND l.to_id = t.id
+),
+outgoing AS (
+    SELECT from_code AS code, from_id AS id, list(arrow_id ORDER BY arrow_id) AS arrows
+    FROM arrow
+    GROUP BY from_code, from_id
+),
+incoming AS (
+    SELECT to_code AS code, to_id AS id, list(arrow_id ORDER BY arrow_id) AS arrows
+    FROM arrow
+    GROUP BY to_code, to_id
+),
+drawn AS NOT MATERIALIZED (
+    SELECT track, start_ns, end_ns, code, object_id, id, symbol_id FROM slice
+    UNION ALL
+    SELECT
+        thread_id * 8 + 3, start_ns, coalesce(end_ns, start_ns), 7,
+        list_position(['wait', 'process', 'execute'], state), executor_id, NULL
+    FROM main.executor_state
+    WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
+),
+-- What ends at a moment before what begins there, the inner before the outer, and what begins the
+-- other way round.
+event AS (
+    SELECT
+        track, start_ns AS at_ns, CASE WHEN end_ns > start_ns THEN 1 ELSE 2 END AS rank,
+        end_ns AS far_ns, code, object_id, id, symbol_id
+    FROM drawn
+    UNION ALL
+    SELECT track, end_ns, 0, start_ns, code, NULL, id, NULL
+    FROM drawn
+    WHERE end_ns > start_ns
+)
+SELECT
+    e.track, e.at_ns, e.rank, e.object_id * 8 + e.code + 1 AS name, e.code, e.id,
+    e.symbol_id, o.arrows AS outgoing, i.arrows AS incoming
+FROM event AS e
+LEFT JOIN outgoing AS o ON e.rank > 0 AND e.code = o.code AND e.id = o.id
+LEFT JOIN incoming AS i ON e.rank > 0 AND e.code = i.code AND e.id = i.id
+ORDER BY e.track, e.at_ns, e.rank, e.far_ns DESC, e.code, e.id

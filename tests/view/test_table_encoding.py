@@ -1,0 +1,66 @@
+"""Tables survive being packed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pyarrow as pa
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tables import decoded
+
+from msgflow.view.table_encoding import LARGEST_EXACT, encode
+
+WHOLE = st.integers(-LARGEST_EXACT, LARGEST_EXACT)
+
+
+@settings(deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.none() | WHOLE, st.none() | st.text(), st.none() | st.booleans(),
+            st.none() | st.floats(allow_nan=False), st.none() | st.lists(st.text(), max_size=3),
+        )
+    )
+)  # fmt: skip
+def test_what_goes_in_comes_out(rows: list[tuple[object, ...]]) -> None:
+    types = (pa.int64(), pa.string(), pa.bool_(), pa.float64(), pa.list_(pa.string()))
+    names = ("whole", "text", "truth", "real", "several")
+    table = pa.table(
+        {
+            name: pa.array([row[place] for row in rows], kind)
+            for place, (name, kind) in enumerate(zip(names, types, strict=True))
+        }
+    )
+    assert decoded(encode(table)).rows == table.to_pylist()
+
+
+def test_what_a_browser_would_round_is_text() -> None:
+    table = pa.table({"handle": pa.array([2**63 + 1, 5], pa.uint64())})
+    assert decoded(encode(table)).rows == [{"handle": str(2**63 + 1)}, {"handle": "5"}]
+
+
+def test_points_in_time_are_offsets() -> None:
+    origin = 1_741_944_413_589_793_238
+    table = pa.table({"at_ns": pa.array([origin, origin + 1, None], pa.int64())})
+    content = decoded(encode(table, origin_ns=origin, units={"at_ns": "epoch ns"}))
+    assert [row["at_ns"] for row in content.rows] == [0, 1, None]
+    assert content.columns[0]["unit"] == "epoch ns"
+
+
+def test_what_follows_in_steps_takes_few_bytes() -> None:
+    table = pa.table({"start": pa.array(range(0, 10_000_000, 1_000), pa.int64())})
+    assert len(encode(table)) < 2 * table.num_rows + 200
+
+
+def test_pandas_is_not_imported_where_it_is_installed() -> None:
+    """The server would hold it for nothing."""
+    # Not pa.array: that one does import it.
+    program = (
+        "import sys, duckdb; from msgflow.view.table_encoding import encode;"
+        "rows = duckdb.sql('SELECT unnest([1, NULL]) AS a, a::DOUBLE, a = 1, a::TEXT');"
+        "encode(rows.to_arrow_table()); print('pandas' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("False\n", "")
