@@ -9,7 +9,13 @@ every other reader shows. That a clock was set is undone: times of one host have
 
 from __future__ import annotations
 
-GIGA = 1_000_000_000
+from typing import TYPE_CHECKING
+
+from msgflow.trace.ctf.clock import GIGA
+
+if TYPE_CHECKING:
+    from msgflow.trace.ctf.clock import Clock
+
 # LTTng reads the two clocks next to each other, several times, and takes the best: some ns, or some
 # hundred where reading a clock needs the kernel.
 GREATEST_ERROR_NS = 1_000
@@ -21,18 +27,14 @@ class TimeBase:
     def __init__(self) -> None:
         self._offsets: dict[tuple[str, str | None], int] = {}
 
-    def correction_ns(
-        self, uuid: str | None, name: str | None, frequency: int, offset_ns: int
-    ) -> int:
-        """Return what to add to the times of a trace, so that they fit those of the first one.
+    def correction_ns(self, clock: Clock) -> int:
+        """Return what to add to the times of a trace [ns], so that they fit those of the first one.
 
-        Args:
-            uuid: of the trace's clock, or None, which is a clock of its own.
-            name: of the clock, or None.
-            frequency: of the clock [Hz]; only clocks that count nanoseconds are corrected.
-            offset_ns: what the trace says that its clock is ahead of the epoch.
+        Only a clock that has a uuid and counts nanoseconds is corrected: without a uuid it is a
+        clock of its own.
         """
-        if uuid is None or frequency != GIGA:
+        if clock.uuid is None or clock.frequency != GIGA:
             return 0
-        correction = self._offsets.setdefault((uuid, name), offset_ns) - offset_ns
+        offset_ns = clock.to_ns(0)
+        correction = self._offsets.setdefault((clock.uuid, clock.name), offset_ns) - offset_ns
         return 0 if abs(correction) <= GREATEST_ERROR_NS else correction

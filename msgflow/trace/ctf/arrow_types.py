@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from msgflow.trace.columns import BASE
 from msgflow.trace.ctf.types import (
     Array,
     Integer,
@@ -48,13 +49,17 @@ def arrow_type(declared: Type) -> pa.DataType:
 
 
 def declared_schema(structure: Structure) -> pa.Schema:
-    """Return the columns of a payload, all its fields."""
-    return pa.schema([(member.name, arrow_type(member.type)) for member in structure.members])
-
-
-def hexadecimal_names(structure: Structure) -> set[str]:
-    """Return the fields that are, or are arrays of, integers to be shown in base 16."""
-    return {member.name for member in structure.members if _is_hexadecimal(member.type)}
+    """Return the columns of a payload, all its fields; integers of base 16 are marked."""
+    return pa.schema(
+        [
+            pa.field(
+                member.name,
+                arrow_type(member.type),
+                metadata={BASE: b"16"} if _is_hexadecimal(member.type) else None,
+            )
+            for member in structure.members
+        ]
+    )
 
 
 def _is_hexadecimal(declared: Type) -> bool:
