@@ -160,11 +160,11 @@ class _Reading:
     def _begin_packet(self, context: Any, stream: _Stream, begin_ns: int | None) -> Any:
         """Return the row of a packet, None for a copy."""
         trace, *stream_id = stream.key
-        if begin_ns is not None:
-            # Copies begin at the same time: Babeltrace delivers that of the first trace first.
-            if self._first_traces.setdefault((stream.recording, begin_ns), trace) != trace:
-                self.duplicates += 1
-                return None
+        # Copies begin at the same time: Babeltrace delivers that of the first trace first.
+        first_trace = self._first_traces.setdefault((stream.recording, begin_ns), trace)
+        if begin_ns is not None and first_trace != trace:
+            self.duplicates += 1
+            return None
         stream.packet_count += 1
         discarded: int | None = 0
         if stream.discards is not None:

@@ -1,27 +1,13 @@
-"""Rows of Python values to Arrow record batches."""
+"""Columns of events: which field fills which column, and Arrow batches from Python values."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-
-
-@dataclass(frozen=True)
-class InnerField:
-    """A field inside a structure or variant: names from the outermost on, and Arrow type."""
-
-    path: tuple[str, ...]
-    type: pa.DataType
-
-    @property
-    def name(self) -> str:
-        """The names with dots in between."""
-        return ".".join(self.path)
 
 
 ALIASES = b"aliases"
@@ -103,26 +89,26 @@ def matching(columns: Iterable[pa.Field], fields: Iterable[pa.Field]) -> dict[st
 
 def inner_matching(
     columns: Iterable[pa.Field], fields: Iterable[pa.Field]
-) -> dict[str, tuple[InnerField, ...]]:
-    """Return column to the fields inside others that fill it, for columns named by such.
+) -> dict[str, tuple[tuple[str, ...], ...]]:
+    """Return column to the paths of the fields inside others that fill it.
 
-    The name of such a field has dots: those of the structures, variants and options around it come
-    before its own. Options of one variant may fill the same column, each in the events that have
-    it.
+    A path is the names from the outermost structure, variant or option to the field itself; the
+    name of such a column has dots between them. Options of one variant may fill the same column,
+    each in the events that have it.
     """
     by_name = {field.name: field.type for field in fields}
     found = {}
     for column in columns:
-        inner = []
+        paths = []
         for name in names_of(column):
             path = tuple(name.split("."))
             declared = by_name.get(path[0]) if len(path) > 1 else None
             for member in path[1:]:
                 declared = _member_type(declared, member)
             if declared is not None and can_hold(column.type, declared):
-                inner.append(InnerField(path, declared))
-        if inner:
-            found[column.name] = tuple(inner)
+                paths.append(path)
+        if paths:
+            found[column.name] = tuple(paths)
     return found
 
 
@@ -132,9 +118,7 @@ def paths_of(
     """Return for each column the paths of names of the fields that fill it; none: no field does."""
     plain, inner = matching(columns, fields), inner_matching(columns, fields)
     return [
-        [(plain[column.name].name,)]
-        if column.name in plain
-        else [field.path for field in inner.get(column.name, ())]
+        [(plain[column.name].name,)] if column.name in plain else list(inner.get(column.name, ()))
         for column in columns
     ]
 

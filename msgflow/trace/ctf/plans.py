@@ -92,8 +92,8 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
     payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, wanted)
     declared = declared_schema(layout.event.payload)
     inner = {
-        column: tuple(field.path for field in fields)
-        for column, fields in inner_matching(wanted, declared).items()
+        column: paths
+        for column, paths in inner_matching(wanted, declared).items()
         if column not in payload
     }
     schema = pa.schema([*COMMON_SCHEMA, *wanted])
