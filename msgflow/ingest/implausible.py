@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
-from msgflow.numpy_arrow import is_valid, text_lengths, to_numpy, without
+from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

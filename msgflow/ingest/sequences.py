@@ -16,8 +16,8 @@ import pyarrow as pa
 from msgflow import kernel
 from msgflow.ingest.catalogue import Origin
 from msgflow.ingest.compiled_sequences import Latest, Numbers, OfTracepoint
-from msgflow.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
 from msgflow.trace import COMMON_SCHEMA
+from msgflow.trace.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     import ctypes

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from msgflow.ingest.calls import CALLS, Call, apart, layers
 from msgflow.ingest.catalogue import load
-from msgflow.numpy_arrow import is_valid, to_arrow, to_numpy
+from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

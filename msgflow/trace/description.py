@@ -10,8 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence, Set
     from pathlib import Path
 
-    from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.time_base import TimeBase
+    from msgflow.trace.time_base import DeclaredClock, TimeBase
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
@@ -23,7 +22,7 @@ def description(
     *,
     uuid: str | None,
     environment: Mapping[str, int | str],
-    clock: Clock,
+    clock: DeclaredClock,
     begins: Sequence[int],
     ends: Sequence[int],
     events: Sequence[tuple[str, Set[str]]],

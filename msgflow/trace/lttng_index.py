@@ -6,7 +6,7 @@ import struct
 from collections import Counter
 from typing import TYPE_CHECKING, Any, Final
 
-from msgflow.trace.files import read_regular
+from msgflow.trace.regular_file import read_regular
 
 if TYPE_CHECKING:
     from pathlib import Path

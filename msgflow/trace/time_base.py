@@ -9,16 +9,31 @@ every other reader shows. That a clock was set is undone: times of one host have
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from msgflow.trace.ctf.clock import GIGA
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.clock import Clock
-
+GIGA = 1_000_000_000
 # LTTng reads the two clocks next to each other, several times, and takes the best: some ns, or some
 # hundred where reading a clock needs the kernel.
 GREATEST_ERROR_NS = 1_000
+
+
+class DeclaredClock(Protocol):
+    """A clock as the metadata of a trace declares it."""
+
+    @property
+    def uuid(self) -> str | None:
+        """Its uuid."""
+
+    @property
+    def name(self) -> str | None:
+        """Its name."""
+
+    @property
+    def frequency(self) -> int:
+        """How often it counts [Hz]."""
+
+    def to_ns(self, value: int) -> int:
+        """Return the time of a value of it [ns since the epoch]."""
 
 
 class TimeBase:
@@ -27,7 +42,7 @@ class TimeBase:
     def __init__(self) -> None:
         self._offsets: dict[tuple[str, str | None], int] = {}
 
-    def correction_ns(self, clock: Clock) -> int:
+    def correction_ns(self, clock: DeclaredClock) -> int:
         """Return what to add to the times of a trace [ns], so that they fit those of the first one.
 
         Only a clock that has a uuid and counts nanoseconds is corrected: without a uuid it is a

@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.ingest.implausible import Implausible
-from msgflow.numpy_arrow import to_arrow
+from msgflow.trace.numpy_arrow import to_arrow
 
 LATEST = (1 << 62) - 1
 

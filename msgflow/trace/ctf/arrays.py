@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.numpy_arrow import to_arrow
+from msgflow.trace.numpy_arrow import to_arrow
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.numpy_arrow import to_arrow
 from msgflow.trace.columns import first_inner_value, to_array
 from msgflow.trace.ctf.arrays import list_array, number_array, scattered_array, text_array
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.gather import FieldRows
 from msgflow.trace.ctf.thread_names import ThreadNames, word_offsets
 from msgflow.trace.ctf.types import Scope
+from msgflow.trace.numpy_arrow import to_arrow
 from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:

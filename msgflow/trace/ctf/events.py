@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.numpy_arrow import distinct
 from msgflow.trace.ctf.compiled import compiled
 from msgflow.trace.ctf.headers import read_headers
 from msgflow.trace.ctf.lockstep import scan_lockstep
 from msgflow.trace.ctf.types import BYTE
 from msgflow.trace.ctf.walk import FieldError
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -10,7 +10,7 @@ from msgflow.trace.ctf import index
 from msgflow.trace.ctf.rising import misplaced
 from msgflow.trace.ctf.types import BYTE
 from msgflow.trace.ctf.walk import FieldError
-from msgflow.trace.files import UnsuitableFileError
+from msgflow.trace.regular_file import UnsuitableFileError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

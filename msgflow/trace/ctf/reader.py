@@ -18,9 +18,9 @@ from msgflow.trace.ctf.scan import BEYOND_END
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.timeless import give_order, is_timeless, numbers_of
 from msgflow.trace.discovery import irregular_files, stream_files
-from msgflow.trace.files import unreadable_error
 from msgflow.trace.metadata import FILE_NAME
 from msgflow.trace.model import Damage, undeclared
+from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import TimeBase
 from msgflow.trace.trace_set import ExclusiveTraceSet
 

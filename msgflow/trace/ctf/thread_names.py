@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow
 from msgflow.trace.ctf.compiled_columns import Texts
+from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
