@@ -51,7 +51,6 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.getoption("--without-bt2"):
         # An import of it fails then as where it is missing, and no other place is searched.
         sys.modules["bt2"] = None  # type: ignore[assignment]
-        bt2_library.ROOTS = ()
         bt2_library.PREFIXES = ()
 
 

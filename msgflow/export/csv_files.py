@@ -47,7 +47,7 @@ def _write(
 ) -> int:
     import pyarrow.csv
 
-    from msgflow.numpy_arrow import empty_batch
+    from msgflow.trace.numpy_arrow import empty_batch
 
     row_count = 0
     with selection.read(connection, view, selection.runs) as reader:

@@ -127,7 +127,7 @@ def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
 def _write_csv(table: pa.Table, stream: IO[bytes]) -> None:
     import pyarrow.csv
 
-    from msgflow.numpy_arrow import empty_batch
+    from msgflow.trace.numpy_arrow import empty_batch
 
     with pyarrow.csv.CSVWriter(stream, csv_batch(empty_batch(table.schema)).schema) as writer:
         for batch in table.to_batches(max_chunksize=_ROWS_AT_ONCE):
@@ -137,7 +137,7 @@ def _write_csv(table: pa.Table, stream: IO[bytes]) -> None:
 def _csv_column(column: pa.Array) -> pa.Array:
     import pyarrow.types as types
 
-    from msgflow.numpy_arrow import texts_to_arrow
+    from msgflow.trace.numpy_arrow import texts_to_arrow
 
     kind = column.type
     if (

@@ -17,8 +17,8 @@ from msgflow.ingest.catalogue import load
 from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
-from msgflow.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
+from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msgflow.ingest.catalogue import load
-from msgflow.numpy_arrow import distinct, is_valid, to_arrow, to_numpy
 from msgflow.resources import resource_directory
 from msgflow.sql.statement import Statements
+from msgflow.trace.numpy_arrow import distinct, is_valid, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,8 +14,8 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.ingest.catalogue import Origin
-from msgflow.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
 from msgflow.trace import COMMON_SCHEMA
+from msgflow.trace.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

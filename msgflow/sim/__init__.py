@@ -96,7 +96,6 @@ tracing), failed_takes (of executors), full_queues (arrivals at a queue that was
 
 from __future__ import annotations
 
-from msgflow.sim.builtin import scenarios
 from msgflow.sim.engine import Simulation, simulate
 from msgflow.sim.entity import (
     Call,
@@ -114,6 +113,7 @@ from msgflow.sim.entity import (
 from msgflow.sim.layout import layouts
 from msgflow.sim.long_recording import long_recording
 from msgflow.sim.recording import Buffers, Recording
+from msgflow.sim.scenario import scenarios
 from msgflow.sim.system import Executor, Group, Host, Node, Process, Scenario
 
 __all__ = [

@@ -119,12 +119,12 @@ def _transition(
     assert lifecycle is not None
     machine = thread.machine
     for state in _TRANSITIONS[lifecycle.state]:
-        time += 4_000 + int(thread.world.random() * 20_000)
+        time += 4_000 + int(thread.scheduler.random() * 20_000)
         thread.emit(
             machine.tracepoints.rcl_lifecycle_transition, time, thread.context,
             lifecycle.handle, lifecycle.state, state,
         )  # fmt: skip
-        thread.world.truth.lifecycle_transition.add(
+        thread.scheduler.truth.lifecycle_transition.add(
             machine.hostname, thread.process.pid, thread.tid, lifecycle.node,
             time + machine.epoch, lifecycle.state, state,
         )  # fmt: skip

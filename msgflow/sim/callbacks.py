@@ -21,7 +21,7 @@ def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: 
     timer.due += timer.period
     if timer.due < time:
         timer.due += (1 + (time - timer.due - 1) // timer.period) * timer.period
-    start = time + 500 + int(thread.world.random() * 2_500)
+    start = time + 500 + int(thread.scheduler.random() * 2_500)
     if not timer.code.is_callback:
         return execute(thread, middleware, timer.code, start, None)
     return run_callback(thread, middleware, timer.code, start, timer.callback, timer.node, "timer")
@@ -42,7 +42,7 @@ def run_subscription(
     if taken.is_copy:
         taken.write(thread, subscription, None)
         return time + 300
-    start = time + 400 + int(thread.world.random() * 1_500)
+    start = time + 400 + int(thread.scheduler.random() * 1_500)
     if code.is_callback:
         return run_callback(
             thread, middleware, code, start, subscription.callback, subscription.node,
@@ -58,7 +58,7 @@ def run_subscription(
 
 def run_buffer(thread: Thread, middleware: Middleware, buffer: IntraBuffer, time: int) -> Steps:
     """Take one message from a buffer and run the callback with it."""
-    random = thread.world.random
+    random = thread.scheduler.random
     time = yield thread.hold(time + 300 + int(random() * 1_500))
     if not buffer.ring.messages:
         # Another thread of the executor was faster.
@@ -68,7 +68,7 @@ def run_buffer(thread: Thread, middleware: Middleware, buffer: IntraBuffer, time
     if buffer.ring.messages:
         subscription.executor.wake(time)
     taken = Taken(
-        next(thread.world.take_ids), message, time, "ring_buffer", None,
+        next(thread.scheduler.take_ids), message, time, "ring_buffer", None,
         dequeue_ns=time + thread.machine.epoch,
     )  # fmt: skip
     taken.is_replay = message.time < subscription.created
@@ -97,9 +97,9 @@ def run_callback(
     instance_id: int | None = None,
 ) -> Run:
     """Run a callback from `start` on; returns the time of callback_end."""
-    world, machine = thread.world, thread.machine
+    scheduler, machine = thread.scheduler, thread.machine
     if instance_id is None:
-        instance_id = next(world.callback_instance_ids)
+        instance_id = next(scheduler.callback_instance_ids)
     hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
     start_ns = start + machine.epoch
     if taken is None:
@@ -166,4 +166,4 @@ def _write(
         if subscription.is_sink:
             taken.reach_sink(thread, subscription, end)
     end_ns = None if end is None else end + thread.machine.epoch
-    thread.world.truth.callback_instance.add(*facts, end_ns, take_id, bool(is_intra), parent_id)
+    thread.scheduler.truth.callback_instance.add(*facts, end_ns, take_id, bool(is_intra), parent_id)

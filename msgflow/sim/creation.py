@@ -12,7 +12,7 @@ from msgflow.sim import entity, symbols
 from msgflow.sim.actions import Lifecycle, NodeObjects, deeds
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import CallbackGroup, Executor
-from msgflow.sim.intra import put
+from msgflow.sim.intra_process import put
 from msgflow.sim.links import CallbackLinks, LinkObject
 from msgflow.sim.objects import (
     IntraBuffer,
@@ -23,8 +23,8 @@ from msgflow.sim.objects import (
     TimerObject,
     UserCode,
 )
+from msgflow.sim.rmw import entity_of
 from msgflow.sim.services import ClientObject, ServiceNetwork, ServiceObject
-from msgflow.sim.write import entity_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -100,7 +100,7 @@ class Creator:
     def emit(self, name: str, *values: object) -> None:
         """Emit an event a little later than the one before."""
         thread = self.thread
-        self.time += 300 + int(thread.world.random() * 1_500)
+        self.time += 300 + int(thread.scheduler.random() * 1_500)
         thread.emit(getattr(self._tracepoints, name), self.time, thread.context, *values)
 
     def _emit_of_rclcpp(self, name: str, *values: object) -> None:
@@ -109,7 +109,7 @@ class Creator:
 
     def work(self, duration: int) -> None:
         """Let time pass."""
-        self.time += duration // 2 + int(self.thread.world.random() * duration)
+        self.time += duration // 2 + int(self.thread.scheduler.random() * duration)
 
     def announce(self) -> None:
         """Tell other processes what there is."""
@@ -171,7 +171,8 @@ class Creator:
         )
         code = self._code(node, description, executor)
         created = SubscriptionObject(
-            next(self.thread.world.subscription_ids), self._process, executor, group, description,
+            next(self.thread.scheduler.subscription_ids),
+            self._process, executor, group, description,
             node.description.full_name, handle, rmw_handle, callback, memory.allocate(), code,
             self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS,
@@ -361,9 +362,9 @@ class Creator:
     def _add_write_to_truth(self, stamp_ns: int) -> None:
         """DDS has published for itself, of which nothing but its own event tells."""
         thread = self.thread
-        truth = thread.world.truth
+        truth = thread.scheduler.truth
         place = (thread.machine.hostname, thread.process.pid, thread.tid)
-        publication_id = next(thread.world.publication_ids)
+        publication_id = next(thread.scheduler.publication_ids)
         truth.publication.add(
             publication_id, *place, None, None, None, None, None, None, None, stamp_ns, None, True,
             None,

@@ -11,7 +11,7 @@ from collections import deque
 
 from msgflow.sim.latency import latency_between
 from msgflow.sim.machine import RunningProcess, Thread
-from msgflow.sim.write import read, write
+from msgflow.sim.rmw import read, write
 
 _TOPIC = "ros_discovery_info"
 _NUMBER = 9
@@ -32,18 +32,18 @@ class DiscoveryListener(Thread):
         self._heard.append(taken)
         if not self._awake:
             self._awake = True
-            self.world.at(time + 10_000 + self.world.tail(20_000), self._listen)
+            self.scheduler.at(time + 10_000 + self.scheduler.tail(20_000), self._listen)
 
     def _listen(self, time: int, _: None) -> None:
         if self.process.is_stopped:
             return
         if later := self.take_cpu(time):
-            self.world.at(later, self._listen)
+            self.scheduler.at(later, self._listen)
             return
         while self._heard:
             taken = self._heard.popleft()
             time = read(self, self.rmw_handle, self._message, time, 0, taken)
-            time += 1_500 + int(self.world.random() * 2_000)
+            time += 1_500 + int(self.scheduler.random() * 2_000)
         self.keep_cpu(time)
         self._awake = False
 
@@ -64,17 +64,17 @@ class Discovery:
 
     def announce(self, thread: Thread, rmw_handle: int, message: int, time: int) -> int:
         """Publish what the process has, from `time` on; returns the time when that is done."""
-        world, machine = thread.world, thread.machine
+        scheduler, machine = thread.scheduler, thread.machine
         written = write(thread, rmw_handle, message, time)
-        publication_id = next(world.publication_ids)
+        publication_id = next(scheduler.publication_ids)
         written.add_to_truth(thread, publication_id)
-        world.truth.publication.add(
+        scheduler.truth.publication.add(
             publication_id, machine.hostname, thread.process.pid, thread.tid, None,
             _TOPIC, None, rmw_handle, None, None, written.rmw + machine.epoch, written.stamp_ns,
             None, True, None,
         )  # fmt: skip
         for listener in self._listeners:
             latency = latency_between(thread.process, listener.process)
-            arrival = written.end + latency.base + world.tail(latency.tail)
-            world.at(arrival, listener.hear, int(listener.process is not thread.process))
-        return written.end + 5_000 + int(world.random() * 10_000)
+            arrival = written.end + latency.base + scheduler.tail(latency.tail)
+            scheduler.at(arrival, listener.hear, int(listener.process is not thread.process))
+        return written.end + 5_000 + int(scheduler.random() * 10_000)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -10,7 +11,6 @@ from typing import TYPE_CHECKING
 from uuid import UUID
 
 from msgflow.errors import UsageError
-from msgflow.sim.builtin import scenarios
 from msgflow.sim.creation import PARAMETER_EVENTS
 from msgflow.sim.ctf import TraceIdentity
 from msgflow.sim.discovery import Discovery
@@ -18,13 +18,13 @@ from msgflow.sim.entity import SECOND
 from msgflow.sim.host_clock import HostClock
 from msgflow.sim.layout import layouts
 from msgflow.sim.machine import Machine, RunningProcess
-from msgflow.sim.meta import write_meta
 from msgflow.sim.recorder import Recorder
+from msgflow.sim.scenario import scenarios
+from msgflow.sim.scheduler import Scheduler
 from msgflow.sim.services import ServiceNetwork
 from msgflow.sim.startup import Startup
 from msgflow.sim.transport import Middleware
 from msgflow.sim.truth import Truth
-from msgflow.sim.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -102,29 +102,31 @@ def simulate(
     for event in layouts()[chosen.layout].events:
         for field in event.fields or (None,):
             truth.declared.add(event.name, None if field is None else field.name)
-    world = World(course, truth)
+    scheduler = Scheduler(course, truth)
     machines = {
         host.hostname: _machine(chosen, host, clock, target, identity, truth, length)
         for host, clock in zip(
             chosen.hosts, _clocks(chosen.hosts, clock_offset_ns, clock_drift_ppm), strict=True
         )
     }
-    middleware = Middleware(world, overwrites=chosen.overwrites, expected=_subscriptions(chosen))
-    network = ServiceNetwork(world)
-    processes = _start(chosen, world, machines, middleware, network, course)
-    world.run(length, middleware.arrive)
+    middleware = Middleware(
+        scheduler, overwrites=chosen.overwrites, expected=_subscriptions(chosen)
+    )
+    network = ServiceNetwork(scheduler)
+    processes = _start(chosen, scheduler, machines, middleware, network, course)
+    scheduler.run(length, middleware.arrive)
 
     for process in processes:
         for thread in process.threads:
             thread.finish()
     network.finish()
     middleware.finish()
-    end = world.end + _STOP_DELAY_NS
+    end = scheduler.end + _STOP_DELAY_NS
     for machine in machines.values():
         machine.recorder.close(end)
     truth.close()
     meta = target / "truth" / "meta.json"
-    write_meta(
+    _write_meta(
         meta,
         chosen,
         {
@@ -174,7 +176,7 @@ def _choose(scenario: str | Scenario, layout: str | None, recording: Recording |
 
 def _start(
     scenario: Scenario,
-    world: World,
+    scheduler: Scheduler,
     machines: Mapping[str, Machine],
     middleware: Middleware,
     network: ServiceNetwork,
@@ -188,12 +190,12 @@ def _start(
     for number, description in enumerate(scenario.processes):
         machine = machines[description.hostname]
         place = (description.hostname, description.pid)
-        process = RunningProcess(world, machine, description, number, course, lives[place])
+        process = RunningProcess(scheduler, machine, description, number, course, lives[place])
         lives[place] += 1
         startup = Startup(process, middleware, discovery, network, version)
-        world.at(description.start_ns, startup.begin)
+        scheduler.at(description.start_ns, startup.begin)
         if description.stop_ns is not None:
-            world.at(description.stop_ns, startup.end)
+            scheduler.at(description.stop_ns, startup.end)
         processes.append(process)
     return processes
 
@@ -265,3 +267,45 @@ def _machine(
     return Machine(
         host.hostname, clock, recorder, recording, host.stamp_resolution_ns, host.publish_pace,
     )  # fmt: skip
+
+
+def _write_meta(
+    path: Path,
+    scenario: Scenario,
+    arguments: Mapping[str, object],
+    machines: Mapping[str, Machine],
+    truth: Truth,
+    outcome: Mapping[str, object],
+) -> None:
+    """Write `meta.json`; see the docstring of `msgflow.sim`."""
+    content = {
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "layout": scenario.layout,
+        **arguments,
+        "hosts": {
+            name: {
+                "traces": [
+                    str(directory.relative_to(path.parent.parent))
+                    for directory in machine.recorder.directories
+                ],
+                "begin_of_tracing_ns": 0 + machine.epoch,
+                "clock_drift_ppb": machine.epoch.drift_ppb,
+                "cpu_count": machine.recorder.cpu_count,
+                "events": dict(machine.tracepoints.counts()),
+            }
+            for name, machine in machines.items()
+        },
+        "processes": [
+            {
+                "host": process.hostname,
+                "pid": process.pid,
+                "name": process.name,
+                "nodes": [node.full_name for node in process.nodes],
+            }
+            for process in scenario.processes
+        ],
+        "rows": {name: table.count for name, table in truth.tables.items()},
+        **outcome,
+    }
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

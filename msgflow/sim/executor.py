@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from msgflow.sim import system
-    from msgflow.sim.world import World
+    from msgflow.sim.scheduler import Scheduler
 
 # Some guard conditions look like data on a subscription, which then is not there.
 _FAILED_TAKE = 0.02
@@ -73,7 +73,9 @@ class Executor:
         thread_count: threads that spin it.
     """
 
-    def __init__(self, world: World, description: system.Executor, *, is_rclcpp: bool) -> None:
+    def __init__(
+        self, scheduler: Scheduler, description: system.Executor, *, is_rclcpp: bool
+    ) -> None:
         self.timers: list[Timer] = []
         self.subscriptions: list[Entity] = []
         self.waitables: list[Entity] = []
@@ -82,7 +84,7 @@ class Executor:
         self.owner: Spinner | None = None
         self.sleeper: Spinner | None = None
         self.thread_count = description.thread_count
-        self._world = world
+        self._scheduler = scheduler
         self._ready: deque[Entity] = deque()
         self._blocked: deque[Spinner] = deque()
 
@@ -100,7 +102,7 @@ class Executor:
         self.owner = None
         if self._blocked:
             self.owner = self._blocked.popleft()
-            self.owner.go_on(time + 1_500 + int(self._world.random() * 4_000))
+            self.owner.go_on(time + 1_500 + int(self._scheduler.random() * 4_000))
 
     def forget(self, entity: Entity) -> None:
         """An entity does not exist any more."""
@@ -120,7 +122,7 @@ class Executor:
                 ready.append(subscription)
         if self.waitables:
             ready.extend(entity for entity in self.waitables if entity.is_ready(time))
-        if not ready and self.subscriptions and self._world.random() < _FAILED_TAKE:
+        if not ready and self.subscriptions and self._scheduler.random() < _FAILED_TAKE:
             ready.append(self.subscriptions[-1])
 
     def pick(self) -> Entity | None:

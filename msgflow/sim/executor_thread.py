@@ -12,7 +12,6 @@ from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.machine import Run, RunningProcess, Steps, Thread
 from msgflow.sim.objects import IntraBuffer, SubscriptionObject, TimerObject
 from msgflow.sim.services import ClientObject, ServiceObject, run_client, run_service
-from msgflow.sim.states import ExecutorStates
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -45,9 +44,8 @@ class ExecutorThread(Thread):
         super().__init__(process, tid)
         process.threads.append(self)
         self._middleware = middleware
-        self._states = ExecutorStates(
-            self.world.truth.executor_state, self.machine.hostname, process.pid, tid
-        )
+        # What the thread does, and since when [ns since the epoch].
+        self._state: tuple[int, str] | None = None
         self._is_idle = False
         self._asleep_since = 0
         self._wake_at: int | None = None
@@ -55,7 +53,7 @@ class ExecutorThread(Thread):
     def wake(self, time: int) -> None:
         """Something has arrived at `time` for the executor that the thread waits in."""
         start = max(time, self._asleep_since)
-        wake_at = start + 6 * MICROSECOND + self.world.tail(5 * MICROSECOND)
+        wake_at = start + 6 * MICROSECOND + self.scheduler.tail(5 * MICROSECOND)
         if self._wake_at is None or wake_at < self._wake_at:
             self._wake_at = wake_at
             self.go_on(wake_at)
@@ -68,7 +66,7 @@ class ExecutorThread(Thread):
     def finish(self) -> None:
         """Write down what has begun and whose end was not seen."""
         self.cut()
-        self._states.finish()
+        self._write_state(None)
 
     def spin(
         self,
@@ -114,13 +112,13 @@ class ExecutorThread(Thread):
                     # It may have to wait for the executor next, but has used its CPU up to here.
                     self.keep_cpu(time + 1)
                     executor.release(time)
-                    time += 900 + int(self.world.random() * 3_000)
+                    time += 900 + int(self.scheduler.random() * 3_000)
                     continue
             executor.release(time)
             end = self._execute(executor, entity, time)
             if not isinstance(end, int):
                 end = yield from end
-            end += 400 + int(self.world.random() * 2_000)
+            end += 400 + int(self.scheduler.random() * 2_000)
             self.keep_cpu(end)
             time = yield end
             entity.group.is_busy = False
@@ -131,7 +129,7 @@ class ExecutorThread(Thread):
         return time
 
     def _execute(self, executor: Executor, entity: Entity, time: int) -> Run:
-        time += 800 + int(self.world.random() * 3_500)
+        time += 800 + int(self.scheduler.random() * 3_500)
         entity.group.is_busy = True
         kind = type(entity)
         if kind in _ANNOUNCED:
@@ -139,7 +137,7 @@ class ExecutorThread(Thread):
         return _RUN[kind](self, self._middleware, entity, time)
 
     def _fall_asleep(self, executor: Executor, time: int, until: int | None) -> None:
-        random = self.world.random
+        random = self.scheduler.random
         time += 300 + int(random() * 2_500)
         timeout = _NO_TIMEOUT if until is None else max(0, until - time)
         self._enter(executor, _WAIT, time, timeout)
@@ -168,4 +166,13 @@ class ExecutorThread(Thread):
             self.emit(tracepoints.rclcpp_executor_wait_for_work, time, self.context, argument)
         else:
             self.emit(tracepoints.rclcpp_executor_execute, time, self.context, argument)
-        self._states.add(time + self.machine.epoch, state)
+        start_ns = time + self.machine.epoch
+        self._write_state(start_ns)
+        self._state = (start_ns, state)
+
+    def _write_state(self, end_ns: int | None) -> None:
+        if self._state is not None:
+            self.scheduler.truth.executor_state.add(
+                self.machine.hostname, self.process.pid, self.tid, self._state[0], end_ns,
+                self._state[1],
+            )  # fmt: skip

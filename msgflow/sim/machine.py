@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from random import Random
 from typing import TYPE_CHECKING
 
 from msgflow.sim.ctf import thread_context
-from msgflow.sim.memory import AddressSpace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
     from msgflow.sim.host_clock import HostClock
     from msgflow.sim.recorder import Recorder
     from msgflow.sim.recording import Recording
-    from msgflow.sim.world import World
+    from msgflow.sim.scheduler import Scheduler
 
 # A woken thread sometimes finds itself on another CPU.
 _MIGRATION = 1 / 128
+_ALIGNMENT = 16
 
 
 class Machine:
@@ -62,6 +63,43 @@ class Machine:
         return now - now % self._stamp_resolution
 
 
+class AddressSpace:
+    """Heap and stacks of one process, with plausible addresses.
+
+    The same seed gives the same addresses: processes with equal ids on two hosts have equal ones.
+    """
+
+    def __init__(self, seed: str) -> None:
+        self._random = Random(seed)
+        self._freed: list[int] = []
+        self._heap = 0x5500_0000_0000 + (self._random.getrandbits(36) << 4 & ~0xFFF)
+        self._main_stack = 0x7FFC_0000_0000 + (self._random.getrandbits(31) & ~0xF)
+        self._thread_stack = 0x7F00_0000_0000 + (self._random.getrandbits(38) & ~0xFFF)
+
+    def allocate(self) -> int:
+        """Address of a new object on the heap; the one that was freed last is used again."""
+        if self._freed:
+            return self._freed.pop()
+        self._heap += _ALIGNMENT * self._random.randrange(2, 200)
+        return self._heap
+
+    def free(self, address: int) -> None:
+        """An object on the heap exists no more."""
+        self._freed.append(address)
+
+    def on_stack(self) -> int:
+        """Address of a local variable of the main thread."""
+        return self._main_stack - _ALIGNMENT * self._random.randrange(1, 500)
+
+    def on_thread_stack(self) -> int:
+        """Address of a local variable of the middleware's thread."""
+        return self._thread_stack - _ALIGNMENT * self._random.randrange(1, 500)
+
+    def garbage(self, size: int) -> bytes:
+        """Bytes that nobody initialised."""
+        return self._random.randbytes(size)
+
+
 class RunningProcess:
     """A process that exists.
 
@@ -77,14 +115,14 @@ class RunningProcess:
 
     def __init__(
         self,
-        world: World,
+        scheduler: Scheduler,
         machine: Machine,
         description: system.Process,
         number: int,
         seed: str,
         life: int = 0,
     ) -> None:
-        self.world = world
+        self.scheduler = scheduler
         self.machine = machine
         self.description = description
         self.number = number
@@ -139,7 +177,7 @@ class Thread:
 
     def __init__(self, process: RunningProcess, tid: int) -> None:
         self.process = process
-        self.world = process.world
+        self.scheduler = process.scheduler
         self.machine = process.machine
         self.tid = tid
         self.context = thread_context(process.pid, tid, process.description.name)
@@ -160,7 +198,7 @@ class Thread:
             return time - passed + period
         free_at = self.machine.free_at
         cpu = self.cpu
-        if self.world.random() < _MIGRATION:
+        if self.scheduler.random() < _MIGRATION:
             cpu = (cpu + 1) % len(free_at)
         if free_at[cpu] > time:
             cpu = min(range(len(free_at)), key=free_at.__getitem__)
@@ -173,8 +211,8 @@ class Thread:
     def keep_cpu(self, until: int) -> None:
         """Have the CPU until that time, which is after the last event emitted."""
         self.machine.free_at[self.cpu] = until
-        if until > self.world.end:
-            self.world.end = until
+        if until > self.scheduler.end:
+            self.scheduler.end = until
 
     def hold(self, time: int) -> int:
         """Keep the CPU up to the next step at `time`; returns that, to be yielded."""
@@ -185,12 +223,12 @@ class Thread:
         """Let the thread do something from `time` on."""
         self._steps = steps
         self._plan += 1
-        self.world.at(time, self._first_step, self._plan)
+        self.scheduler.at(time, self._first_step, self._plan)
 
     def go_on(self, time: int) -> None:
         """Plan the next step for `time`, in the place of any other."""
         self._plan += 1
-        self.world.at(time, self._step, self._plan)
+        self.scheduler.at(time, self._step, self._plan)
 
     def cut(self) -> None:
         """End in the middle of whatever the thread does."""
@@ -224,4 +262,4 @@ class Thread:
             return
         if following is not None:
             self._plan += 1
-            self.world.at(following, self._step, self._plan)
+            self.scheduler.at(following, self._step, self._plan)

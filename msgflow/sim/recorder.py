@@ -111,7 +111,7 @@ class Recorder:
         if recording.is_perfect:
             only = self._writer(0, "")
             self.emitters: tuple[Callable[..., None], ...] = tuple(
-                self._on_clock(stream.emit_all) for stream in only.streams
+                self._on_clock(stream.emit) for stream in only.streams
             )
             return
         if recording.is_dual_session:

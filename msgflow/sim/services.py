@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from msgflow.sim.executor import CallbackGroup, Executor
     from msgflow.sim.machine import RunningProcess, Steps, Thread
     from msgflow.sim.objects import UserCode
+    from msgflow.sim.scheduler import Scheduler
     from msgflow.sim.transport import Middleware
     from msgflow.sim.truth import Truth
-    from msgflow.sim.world import World
 
 
 @dataclass(slots=True, eq=False)
@@ -97,8 +97,8 @@ class ClientObject:
 class ServiceNetwork:
     """Carries requests to the service of that name, and responses back."""
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(self, scheduler: Scheduler) -> None:
+        self._scheduler = scheduler
         self._services: dict[str, ServiceObject] = {}
         self._requests: list[Request] = []
 
@@ -112,18 +112,18 @@ class ServiceNetwork:
         service = self._services.get(request.client.name)
         if service is not None and not service.process.is_stopped:
             arrival = self._arrival(time, request.client.process, service.process)
-            self._world.at(arrival, self._arrive, (service.requests, service.executor, request))
+            self._scheduler.at(arrival, self._arrive, (service.requests, service.executor, request))
 
     def send_response(self, time: int, service: ServiceObject, request: Request) -> None:
         """Send a response to the client."""
         client = request.client
         arrival = self._arrival(time, service.process, client.process)
-        self._world.at(arrival, self._arrive, (client.responses, client.executor, request))
+        self._scheduler.at(arrival, self._arrive, (client.responses, client.executor, request))
 
     def finish(self) -> None:
         """Write down what became of each request."""
         for request in self._requests:
-            write_request(self._world.truth, request)
+            write_request(self._scheduler.truth, request)
 
     def _arrive(self, time: int, delivery: tuple[deque[Request], Executor, Request]) -> None:
         queue, executor, request = delivery
@@ -132,12 +132,12 @@ class ServiceNetwork:
 
     def _arrival(self, time: int, source: RunningProcess, target: RunningProcess) -> int:
         latency = latency_between(source, target)
-        return time + latency.base + self._world.tail(latency.tail)
+        return time + latency.base + self._scheduler.tail(latency.tail)
 
 
 def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstance | None) -> int:
     """Send a request; returns the time at which the call returns."""
-    random, machine = thread.world.random, thread.machine
+    random, machine = thread.scheduler.random, thread.machine
     client.sequence_number += 1
     sent = time + 400 + int(random() * 1_500)
     thread.emit(
@@ -145,7 +145,7 @@ def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstanc
         client.rmw_handle, client.message, client.sequence_number,
     )  # fmt: skip
     request = Request(
-        next(thread.world.request_ids), client, client.sequence_number,
+        next(thread.scheduler.request_ids), client, client.sequence_number,
         None if cause is None else cause.callback_instance_id, thread.tid, sent + machine.epoch,
     )  # fmt: skip
     client.network.send_request(sent, request)
@@ -155,7 +155,7 @@ def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstanc
 def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, time: int) -> Steps:
     """Take a request, run the callback, send the response; returns the time when that is done."""
     machine = thread.machine
-    random, tracepoints, epoch = thread.world.random, machine.tracepoints, machine.epoch
+    random, tracepoints, epoch = thread.scheduler.random, machine.tracepoints, machine.epoch
     time += 1_000 + int(random() * 5_000)
     request = service.requests.popleft()
     client = request.client
@@ -164,7 +164,7 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
         service.rmw_handle, service.message, client.gid, request.sequence_number, 1,
     )  # fmt: skip
     request.service, request.taken_tid, request.taken_ns = service, thread.tid, time + epoch
-    request.callback_instance_id = next(thread.world.callback_instance_ids)
+    request.callback_instance_id = next(thread.scheduler.callback_instance_ids)
     end = yield from settle(
         run_callback(
             thread, middleware, service.code, time + 600 + int(random() * 1_500),
@@ -185,7 +185,7 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
 
 def run_client(thread: Thread, middleware: Middleware, client: ClientObject, time: int) -> Run:
     """Take a response and do what is to be done with it, in no callback that is traced."""
-    random, machine = thread.world.random, thread.machine
+    random, machine = thread.scheduler.random, thread.machine
     time += 1_000 + int(random() * 5_000)
     request = client.responses.popleft()
     thread.emit(

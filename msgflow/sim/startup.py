@@ -14,7 +14,7 @@ from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import Executor
 from msgflow.sim.executor_thread import ExecutorThread
 from msgflow.sim.links import link_objects
-from msgflow.sim.publish import publish
+from msgflow.sim.publication import publish
 from msgflow.sim.user_thread import UserThread
 
 if TYPE_CHECKING:
@@ -47,9 +47,9 @@ class Startup:
         self._middleware = middleware
         self._discovery = discovery
         self._version = version
-        self._world = process.world
+        self._scheduler = process.scheduler
         self._executors = tuple(
-            Executor(process.world, description, is_rclcpp=process.is_rclcpp)
+            Executor(process.scheduler, description, is_rclcpp=process.is_rclcpp)
             for description in process.description.executors
         )
         self._creator = Creator(self.thread, middleware, discovery, network)
@@ -65,7 +65,7 @@ class Startup:
         if self._process.is_stopped:
             return
         if later := thread.take_cpu(time):
-            self._world.at(later, self.begin)
+            self._scheduler.at(later, self.begin)
             return
         self._creator.time = time
         if next(self._steps, None) is None:
@@ -73,7 +73,7 @@ class Startup:
             return
         time = self._creator.time + MICROSECOND
         thread.keep_cpu(time)
-        self._world.at(time, self.begin)
+        self._scheduler.at(time, self.begin)
 
     def end(self, time: int, _: None = None) -> None:
         """The process ends at `time`: its threads do as soon as they have executed, or at once."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.sim.write import read
+from msgflow.sim.rmw import read
 
 if TYPE_CHECKING:
     from msgflow.sim.machine import Thread
@@ -43,7 +43,7 @@ class Taken:
         """Write down the take and its link."""
         machine, message = thread.machine, self.message
         hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
-        publisher, truth = message.publisher, thread.world.truth
+        publisher, truth = message.publisher, thread.scheduler.truth
         is_internal = subscription.is_internal
         stamp_ns = None if self.method == "ring_buffer" else message.stamp_ns
         truth.take.add(
@@ -69,7 +69,7 @@ class Taken:
         if end is None or self.message.is_self_loop(subscription):
             return
         for root, path in self.message.origins:
-            thread.world.truth.end_to_end.add(
+            thread.scheduler.truth.end_to_end.add(
                 root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns,
                 path, machine.hostname, thread.process.pid, thread.tid,
                 subscription.node, self.take_id, self.time + machine.epoch, end + machine.epoch,
@@ -84,8 +84,8 @@ def take(
 
     Else the message and the time of the last event of the take.
     """
-    world, machine = thread.world, thread.machine
-    random, epoch = world.random, machine.epoch
+    scheduler, machine = thread.scheduler, thread.machine
+    random, epoch = scheduler.random, machine.epoch
     tracepoints = machine.tracepoints
     emit, context = thread.emit, thread.context
     buffer = subscription.message
@@ -95,7 +95,7 @@ def take(
         middleware.failed_takes += 1
         return None, read(thread, subscription.rmw_handle, buffer, reading, 0, 0)
     taken = Taken(
-        next(world.take_ids), message, reading, "callback_only", None,
+        next(scheduler.take_ids), message, reading, "callback_only", None,
         is_copy=message.is_copy_for(subscription),
         is_replay=message.time < subscription.created,
     )  # fmt: skip

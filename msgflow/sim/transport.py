@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from msgflow.sim.machine import RunningProcess
     from msgflow.sim.objects import Message, PublisherObject, RingBuffer, SubscriptionObject
-    from msgflow.sim.world import World
+    from msgflow.sim.scheduler import Scheduler
 
 
 class Middleware:
@@ -28,15 +28,15 @@ class Middleware:
         undelivered: how many messages were not delivered to a subscription, by reason.
     """
 
-    def __init__(self, world: World, *, overwrites: bool, expected: Counter[str]) -> None:
+    def __init__(self, scheduler: Scheduler, *, overwrites: bool, expected: Counter[str]) -> None:
         """Begin without any objects.
 
         Args:
-            world: where it is.
+            scheduler: where it is.
             overwrites: a full queue drops its oldest message.
             expected: subscriptions that there will be, by topic.
         """
-        self._world = world
+        self._scheduler = scheduler
         self._overwrites = overwrites
         self._expected = expected
         self.full_queues = 0
@@ -94,7 +94,7 @@ class Middleware:
 
     def send(self, time: int, message: Message) -> None:
         """Send a message at `time` to whom the publisher knows."""
-        world, publisher = self._world, message.publisher
+        scheduler, publisher = self._scheduler, message.publisher
         self.remember(message)
         if publisher.history is not None:
             publisher.history.append(message)
@@ -102,7 +102,7 @@ class Middleware:
             if match.subscription.ended is not None or match.since > time:
                 self.miss(message, match, time)
                 continue
-            if match.loss and world.random() < match.loss:
+            if match.loss and scheduler.random() < match.loss:
                 self.drop(message, match.subscription, "lost_in_transport")
                 continue
             self._deliver(time, message, match)
@@ -155,7 +155,7 @@ class Middleware:
 
     def finish(self) -> None:
         """Write down what was on its way or waiting at the end."""
-        for subscription, message in self._world.left(self.arrive):
+        for subscription, message in self._scheduler.left(self.arrive):
             self.drop(
                 message,
                 subscription,
@@ -169,7 +169,7 @@ class Middleware:
                 if subscription.intra is not None:
                     for message in subscription.intra.ring.messages:
                         self.lose(message, subscription, "pending_at_end")
-        for match in self._world.left(self._replay):
+        for match in self._scheduler.left(self._replay):
             for message in match.missed:
                 self.drop(message, match.subscription, "pending_at_end")
 
@@ -182,7 +182,7 @@ class Middleware:
         """A message does not reach a subscription."""
         publisher = message.publisher
         self.undelivered[reason] = self.undelivered.get(reason, 0) + 1
-        self._world.truth.undelivered.add(
+        self._scheduler.truth.undelivered.add(
             message.publication_id,
             publisher.topic,
             publisher.process.machine.hostname,
@@ -200,7 +200,7 @@ class Middleware:
 
     def _write(self, subscription: SubscriptionObject) -> None:
         machine, ended = subscription.process.machine, subscription.ended
-        self._world.truth.subscription.add(
+        self._scheduler.truth.subscription.add(
             subscription.subscription_id, machine.hostname, subscription.process.pid,
             subscription.node, subscription.description.topic, subscription.handle,
             subscription.rmw_handle, subscription.created + machine.epoch,
@@ -209,16 +209,16 @@ class Middleware:
 
     def _deliver(self, time: int, message: Message, match: Match) -> None:
         latency = match.latency
-        arrival = time + latency.base + self._world.tail(latency.tail)
+        arrival = time + latency.base + self._scheduler.tail(latency.tail)
         if arrival <= match.last_arrival:
             arrival = match.last_arrival + 1
         match.last_arrival = arrival
-        self._world.at(arrival, self.arrive, (match.subscription, message))
+        self._scheduler.at(arrival, self.arrive, (match.subscription, message))
 
     def _match(self, publisher: PublisherObject, subscription: SubscriptionObject) -> None:
         latency = latency_between(publisher.process, subscription.process)
         since = max(publisher.created, subscription.created) + latency.discovery
-        since += int(self._world.random() * latency.discovery_spread)
+        since += int(self._scheduler.random() * latency.discovery_spread)
         since += subscription.description.discovery_ns
         buffer, intra = subscription.intra, publisher.intra
         is_intra = (
@@ -235,7 +235,7 @@ class Middleware:
         keeps = publisher.history is not None and subscription.description.transient_local
         if keeps and subscription.ended is None:
             match.missed = list(publisher.sent)
-            self._world.at(since, self._replay, match)
+            self._scheduler.at(since, self._replay, match)
         else:
             for message in publisher.sent:
                 self.drop(message, subscription, "before_subscription")

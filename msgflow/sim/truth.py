@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
 _ROWS_PER_GROUP = 8_192
@@ -124,10 +124,6 @@ class TruthTable:
         if len(self._rows) == _ROWS_PER_GROUP:
             self._flush()
 
-    def add_columns(self, *columns: Sequence[object] | pa.Array) -> None:
-        """Write many rows: the values of each column."""
-        self._write(columns)
-
     def close(self) -> None:
         """Complete the file."""
         self._flush()
@@ -136,16 +132,11 @@ class TruthTable:
     def _flush(self) -> None:
         if not self._rows:
             return
-        self._write(tuple(zip(*self._rows, strict=True)))
-        self._rows.clear()
-
-    def _write(self, columns: Sequence[Sequence[object] | pa.Array]) -> None:
-        arrays = [
-            column if isinstance(column, pa.Array) else pa.array(column, type=field.type)
-            for column, field in zip(columns, self._schema, strict=True)
-        ]
+        columns = zip(zip(*self._rows, strict=True), self._schema, strict=True)
+        arrays = [pa.array(column, type=field.type) for column, field in columns]
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
-        self.count += len(columns[0])
+        self.count += len(self._rows)
+        self._rows.clear()
 
 
 class Truth:
@@ -157,23 +148,12 @@ class Truth:
             name: TruthTable(directory / f"{name}.parquet", schema)
             for name, schema in _SCHEMAS.items()
         }
-        self.publication = self.tables["publication"]
-        self.take = self.tables["take"]
-        self.callback_instance = self.tables["callback_instance"]
-        self.transport = self.tables["transport"]
-        self.undelivered = self.tables["undelivered"]
-        self.causal = self.tables["causal"]
-        self.end_to_end = self.tables["end_to_end"]
-        self.executor_state = self.tables["executor_state"]
-        self.subscription = self.tables["subscription"]
-        self.request = self.tables["request"]
-        self.response = self.tables["response"]
-        self.lifecycle_transition = self.tables["lifecycle_transition"]
-        self.trace = self.tables["trace"]
-        self.dds_event = self.tables["dds_event"]
-        self.declared = self.tables["declared"]
-        self.unrecorded = self.tables["unrecorded"]
-        self.emitted = self.tables["emitted"]
+        for name, table in self.tables.items():
+            setattr(self, name, table)
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> TruthTable: ...
 
     def close(self) -> None:
         """Complete all files."""

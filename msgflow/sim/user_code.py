@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.sim.entity import Work
-from msgflow.sim.intra import publish_intra
+from msgflow.sim.intra_process import publish_intra
 from msgflow.sim.machine import settle
-from msgflow.sim.publish import publish
+from msgflow.sim.publication import publish
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,7 +106,7 @@ def _execute(
 
 
 def _duration(thread: Thread, work: Work) -> int:
-    random = thread.world.random
+    random = thread.scheduler.random
     duration = work.typical_ns + int(random() * work.spread_ns)
     if work.slow_probability and random() < work.slow_probability:
         duration += int((1 + random()) * work.slow_ns / 2)

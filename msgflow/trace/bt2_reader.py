@@ -1,51 +1,229 @@
-"""The reader on Babeltrace 2."""
+"""Reader on Babeltrace 2: simple, slow and complete, the reference for our own decoder."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import Counter
+from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
-from msgflow.trace import bt2_library
-from msgflow.trace.bt2_describe import describe
-from msgflow.trace.bt2_iteration import Iteration
-from msgflow.trace.exclusive import ExclusiveTraceSet
+import pyarrow as pa
+
+from msgflow.errors import TraceError
+from msgflow.trace import bt2_library, columns
+from msgflow.trace.bt2_description import clock_of, context_of, describe
+from msgflow.trace.bt2_fields import schema_of, value_of
+from msgflow.trace.bt2_messages import messages
+from msgflow.trace.ctf.clock import GIGA, Clock
+from msgflow.trace.lttng_index import DiscardCounters
+from msgflow.trace.model import EventBatch, Progress
+from msgflow.trace.schemas import COMMON_SCHEMA, PACKET, PACKET_SCHEMA
 from msgflow.trace.time_base import TimeBase
+from msgflow.trace.trace_set import ExclusiveTraceSet, Report
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping, Sequence
+    from collections.abc import Generator, Iterator, Mapping, Sequence
 
-    import pyarrow as pa
+    from msgflow.trace.model import TraceInfo, TraceLocation
 
-    from msgflow.trace.model import EventBatch, Progress, TraceLocation
+# Babeltrace orders by times that it rounds, where a clock does not count nanoseconds.
+_ROUNDING_NS = 1000
+_CONTEXT = [COMMON_SCHEMA.field(name) for name in ("vpid", "vtid", "procname", "pid_ns")]
 
 
 class Bt2TraceSet(ExclusiveTraceSet):
-    """Traces read through bt2."""
+    """Traces read through Babeltrace 2."""
 
     def __init__(self, locations: Sequence[TraceLocation]) -> None:
-        """Describe the traces; nothing is read yet.
-
-        Raises:
-            TraceError: bt2 is not installed, or cannot open one of the traces.
-        """
+        """Describe the traces; raises TraceError where bt2 is missing or cannot open one."""
         super().__init__()
-        self._library = bt2_library.load()
-        base = TimeBase()
-        self.traces = tuple(
-            describe(self._library, location, index, base)
-            for index, location in enumerate(locations)
-        )
+        self._bt2, base = bt2_library.load(), TimeBase()
+        described = [
+            describe(self._bt2, at.path, index, base) for index, at in enumerate(locations)
+        ]
+        self.traces = tuple(info for info, _ in described)
+        self._declared = columns.merged_schemas(e for _, events in described for e in events)
 
     def _batches(
         self,
         wanted: Mapping[str, pa.Schema | None] | None,
-        progress: Callable[[Progress], None] | None,
+        progress: Report | None,
         batch_rows: int,
     ) -> Generator[EventBatch, None, None]:
-        iteration = Iteration(self._library, self.traces, wanted, progress, batch_rows)
+        reading = _Reading(self._bt2, self.traces, columns.complete_schemas(wanted, self._declared))
         try:
-            yield from iteration.run()
+            yield from reading.batches(progress, batch_rows)
         finally:
-            self.event_counts = iteration.event_counts()
-            self.duplicate_packet_count = iteration.duplicate_packet_count
-            iteration.close()
+            self.event_counts = dict(sorted(reading.counts.items()))
+            self.duplicate_packet_count = reading.duplicates
             self._running = None
+
+
+@dataclass
+class _Stream:
+    """A data stream; its packet is a row of `PACKET_SCHEMA`, None where it is a copy."""
+
+    key: tuple[int, int, int]  # trace, stream class, stream instance
+    recording: tuple[Any, ...]  # equal in all directories of a recording
+    clock: Clock
+    index: int = 0
+    packet: dict[str, Any] | None = None
+    packet_count: int = 0
+    discards: Any = None  # the message that reports them
+    lost_packets: int | None = 0
+
+
+@dataclass
+class _Reading:
+    """One pass over all messages."""
+
+    bt2: Any
+    traces: Sequence[TraceInfo]
+    payloads: Mapping[str, pa.Schema]
+    counts: Counter[tuple[int, str]] = field(default_factory=Counter)
+    duplicates: int = 0
+
+    def __post_init__(self) -> None:
+        self._streams: dict[int, _Stream] = {}
+        self._first_traces: dict[Any, int] = {}
+        self._counters = DiscardCounters()
+        self._simultaneous: list[Any] = []
+        self._paths: dict[int, tuple[Any, Any]] = {}
+        self._rows: dict[str, list[list[Any]]] = {}
+        self._packets: list[dict[str, Any]] = []
+        self._round = self._event_count = self._time_ns = self._slack_ns = 0
+        self._begin_ns = min((info.begin_ns for info in self.traces if info.begin_ns), default=0)
+        self._end_ns = max((info.end_ns for info in self.traces if info.end_ns), default=0)
+
+    def batches(self, progress: Report | None, batch_rows: int) -> Iterator[EventBatch]:
+        places = [(trace.path, trace.clock_correction_ns) for trace in self.traces]
+        horizon_ns = flushed = 0
+        try:
+            for message in messages(self.bt2, places):
+                stream, time_ns = self._place(message)
+                if time_ns is not None and time_ns > horizon_ns:
+                    self._number()
+                    if self._event_count >= flushed + batch_rows:
+                        yield from self._flush(progress)
+                        flushed = self._event_count
+                horizon_ns = max(horizon_ns, (time_ns or 0) + self._slack_ns)
+                self._take(message, stream, time_ns)
+        except TraceError as error:
+            yield from self._flush(progress)
+            read = f"{self._event_count} events were read before"
+            raise TraceError(f"{error.message}; {read}", error.hint) from error
+        self._number()
+        self._time_ns = self._end_ns
+        yield from self._flush(progress)
+
+    def _place(self, message: Any) -> tuple[_Stream, int | None]:
+        """Return the stream and the time of a message; None if it has no time."""
+        bt2, kind = self.bt2, type(message)
+        has_packet = kind in (bt2._PacketBeginningMessageConst, bt2._PacketEndMessageConst)
+        has_time = kind is bt2._EventMessageConst
+        stream = (message.event if has_time else message.packet if has_packet else message).stream
+        if has_packet:
+            end = "end" if kind is bt2._PacketEndMessageConst else "beginning"
+            has_time = getattr(stream.cls, f"packets_have_{end}_default_clock_snapshot")
+        known = self._streams.get(stream.addr) or self._add(stream)
+        return known, known.clock.to_ns(message.default_clock_snapshot.value) if has_time else None
+
+    def _add(self, stream: Any) -> _Stream:
+        # Babeltrace puts the host name and a slash before the name of the trace.
+        trace = self.traces[int(stream.trace.name.rpartition("/")[2])]
+        ids, clock = (stream.cls.id, stream.id), clock_of(stream.cls.default_clock_class)
+        recording = (trace.uuid or trace.path, *ids)
+        added = self._streams[stream.addr] = _Stream((trace.index, *ids), recording, clock)
+        if clock.frequency != GIGA:
+            self._slack_ns = _ROUNDING_NS
+        of_trace = [known for known in self._streams.values() if known.key[0] == trace.index]
+        for index, known in enumerate(sorted(of_trace, key=lambda stream: stream.key)):
+            known.index = index
+        return added
+
+    def _take(self, message: Any, stream: _Stream, time_ns: int | None) -> None:
+        bt2, kind, packet = self.bt2, type(message), stream.packet
+        if kind is bt2._PacketBeginningMessageConst:
+            stream.packet = self._begin_packet(message.packet.context_field or {}, stream, time_ns)
+            stream.discards, stream.lost_packets = None, 0
+        elif kind is bt2._DiscardedEventsMessageConst:
+            stream.discards = message
+        elif kind is bt2._DiscardedPacketsMessageConst:
+            stream.lost_packets = message.count
+        elif kind is bt2._PacketEndMessageConst and packet is not None:
+            self._packets.append(packet | {"end_ns": time_ns})
+        elif kind is bt2._EventMessageConst and packet is not None:
+            packet["event_count"] += 1
+            packet["last_event_ns"] = time_ns
+            self._simultaneous.append((time_ns, stream.key, packet["cpu_id"], message.event))
+
+    def _begin_packet(self, context: Any, stream: _Stream, begin_ns: int | None) -> Any:
+        """Return the row of a packet, None for a copy."""
+        trace, *stream_id = stream.key
+        # Copies begin at the same time: Babeltrace delivers that of the first trace first.
+        first_trace = self._first_traces.setdefault((stream.recording, begin_ns), trace)
+        if begin_ns is not None and first_trace != trace:
+            self.duplicates += 1
+            return None
+        stream.packet_count += 1
+        discarded: int | None = 0
+        if stream.discards is not None:
+            path, count = self.traces[trace].path, stream.discards.count
+            discarded = self._counters.rise(stream.recording, path, count)
+        if stream.lost_packets != 0 and discarded != 0:
+            discarded = None  # nothing tells which of them were in the lost packets
+        return {
+            "trace_index": trace,
+            "stream_index": stream.index,
+            "stream_class_id": stream_id[0],
+            "stream_instance_id": stream_id[1],
+            "cpu_id": int(context["cpu_id"]) if "cpu_id" in context else None,
+            "position": stream.packet_count - 1,
+            "begin_ns": begin_ns,
+            "last_event_ns": None,
+            "event_count": 0,
+            "discarded_event_count": discarded,
+            "lost_packet_count": stream.lost_packets,
+            "is_numbered": False,
+        }
+
+    def _number(self) -> None:
+        """Number the events of one time in order of trace and stream, and keep what is wanted."""
+        held, self._simultaneous = sorted(self._simultaneous, key=itemgetter(0, 1)), []
+        for time_ns, (trace_index, *_), cpu_id, event in held:
+            name = event.name or ""
+            if name in self.payloads:
+                row = [self._event_count, time_ns, trace_index, cpu_id, *self._values(event)]
+                self._rows.setdefault(name, []).append(row)
+            self.counts[trace_index, name] += 1
+            self._event_count += 1
+            self._time_ns = time_ns
+
+    def _values(self, event: Any) -> list[Any]:
+        """Return the values of contexts and payload in the order of the columns."""
+        bt2, cls = self.bt2, event.cls
+        if cls.addr not in self._paths:
+            payload, wanted = schema_of(bt2, cls.payload_field_class), self.payloads[cls.name or ""]
+            in_context = columns.paths_of(_CONTEXT, context_of(bt2, cls))
+            self._paths[cls.addr] = in_context, columns.paths_of(wanted, payload)
+        context = value_of(bt2, event.specific_context_field) or {}
+        context |= value_of(bt2, event.common_context_field) or {}
+        payload = value_of(bt2, event.payload_field)
+        in_context, in_payload = self._paths[cls.addr]
+        values = [columns.first_inner_value(context, paths) for paths in in_context]
+        values[:2] = [-1 if value is None else value for value in values[:2]]
+        return values + [columns.first_inner_value(payload, paths) for paths in in_payload]
+
+    def _flush(self, progress: Report | None) -> Iterator[EventBatch]:
+        self._number()
+        for name, rows in self._rows.items():
+            schema = pa.schema([*COMMON_SCHEMA, *self.payloads[name]])
+            yield EventBatch(name, columns.batch_of(rows, schema), self._round)
+        if self._packets:
+            batch = pa.RecordBatch.from_pylist(self._packets, schema=PACKET_SCHEMA)
+            yield EventBatch(PACKET, batch, self._round)
+        self._rows, self._packets = {}, []
+        self._round += 1
+        if progress is not None:
+            fraction = (self._time_ns - self._begin_ns) / ((self._end_ns - self._begin_ns) or 1)
+            progress(Progress(self._event_count, min(max(fraction, 0.0), 1.0), self._time_ns))

@@ -1,43 +1,13 @@
-"""Rows of Python values to Arrow record batches."""
+"""Columns of events: which field fills which column, and Arrow batches from Python values."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-
-
-class Field(Protocol):
-    """A field that a trace declares: its name, and the Arrow type that holds its values."""
-
-    @property
-    def name(self) -> str:
-        """As declared."""
-
-    @property
-    def type(self) -> pa.DataType:
-        """The Arrow type."""
-
-
-AnyField = TypeVar("AnyField", bound=Field)
-
-
-@dataclass(frozen=True)
-class InnerField:
-    """A field inside a structure or variant: names from the outermost on, and Arrow type."""
-
-    path: tuple[str, ...]
-    type: pa.DataType
-
-    @property
-    def name(self) -> str:
-        """The names with dots in between."""
-        return ".".join(self.path)
+    from collections.abc import Iterable, Mapping, Sequence
 
 
 ALIASES = b"aliases"
@@ -75,18 +45,6 @@ def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
     return None
 
 
-def in_hexadecimal(schema: pa.Schema, names: Collection[str]) -> pa.Schema:
-    """Return the schema with these columns marked as to be shown in base 16."""
-    return pa.schema(
-        [
-            field.with_metadata({**(field.metadata or {}), BASE: b"16"})
-            if field.name in names
-            else field
-            for field in schema
-        ]
-    )
-
-
 def complete_schemas(
     wanted: Mapping[str, pa.Schema | None] | None, declared: Mapping[str, pa.Schema]
 ) -> Mapping[str, pa.Schema]:
@@ -99,21 +57,24 @@ def complete_schemas(
     }
 
 
-def merged_schema(declared: Iterable[Iterable[Field]]) -> pa.Schema:
-    """Return the payload columns of several declarations of one event.
+def merged_schemas(declared: Iterable[tuple[str, pa.Schema]]) -> dict[str, pa.Schema]:
+    """Return event name to payload columns, from one or more declarations of each event.
 
     Integers of different types become int64; a field of types that do not go together keeps
     the first one and is NULL where it is declared otherwise.
     """
-    types: dict[str, pa.DataType] = {}
-    for fields in declared:
-        for field in fields:
-            known = types.setdefault(field.name, field.type)
-            types[field.name] = union_type(known, field.type) or known
-    return pa.schema(list(types.items()))
+    events: dict[str, dict[str, pa.Field]] = {}
+    for event, schema in declared:
+        merged = events.setdefault(event, {})
+        for field in schema:
+            known = merged.setdefault(field.name, field)
+            joint = union_type(known.type, field.type) or known.type
+            metadata = known.metadata or field.metadata
+            merged[field.name] = pa.field(field.name, joint, metadata=metadata)
+    return {event: pa.schema(list(merged.values())) for event, merged in events.items()}
 
 
-def matching(columns: Iterable[pa.Field], fields: Iterable[AnyField]) -> dict[str, AnyField]:
+def matching(columns: Iterable[pa.Field], fields: Iterable[pa.Field]) -> dict[str, pa.Field]:
     """Return column to the field that fills it, for those columns that a field can fill."""
     by_name = {field.name: field for field in fields}
     found = {}
@@ -127,28 +88,39 @@ def matching(columns: Iterable[pa.Field], fields: Iterable[AnyField]) -> dict[st
 
 
 def inner_matching(
-    columns: Iterable[pa.Field], fields: Iterable[Field]
-) -> dict[str, tuple[InnerField, ...]]:
-    """Return column to the fields inside others that fill it, for columns named by such.
+    columns: Iterable[pa.Field], fields: Iterable[pa.Field]
+) -> dict[str, tuple[tuple[str, ...], ...]]:
+    """Return column to the paths of the fields inside others that fill it.
 
-    The name of such a field has dots: those of the structures, variants and options around it come
-    before its own. Options of one variant may fill the same column, each in the events that have
-    it.
+    A path is the names from the outermost structure, variant or option to the field itself; the
+    name of such a column has dots between them. Options of one variant may fill the same column,
+    each in the events that have it.
     """
     by_name = {field.name: field.type for field in fields}
     found = {}
     for column in columns:
-        inner = []
+        paths = []
         for name in names_of(column):
             path = tuple(name.split("."))
             declared = by_name.get(path[0]) if len(path) > 1 else None
             for member in path[1:]:
                 declared = _member_type(declared, member)
             if declared is not None and can_hold(column.type, declared):
-                inner.append(InnerField(path, declared))
-        if inner:
-            found[column.name] = tuple(inner)
+                paths.append(path)
+        if paths:
+            found[column.name] = tuple(paths)
     return found
+
+
+def paths_of(
+    columns: Iterable[pa.Field], fields: Iterable[pa.Field]
+) -> list[list[tuple[str, ...]]]:
+    """Return for each column the paths of names of the fields that fill it; none: no field does."""
+    plain, inner = matching(columns, fields), inner_matching(columns, fields)
+    return [
+        [(plain[column.name].name,)] if column.name in plain else list(inner.get(column.name, ()))
+        for column in columns
+    ]
 
 
 def first_inner_value(fields: Any, paths: Iterable[Sequence[str]]) -> Any:
@@ -183,29 +155,11 @@ def to_array(values: Sequence[Any], data_type: pa.DataType) -> pa.Array:
         return pa.array([_wrapped(value, data_type) for value in values], data_type)
 
 
-def record_batch(
-    schema: pa.Schema,
-    columns: Mapping[str, Sequence[Any]],
-    constants: Mapping[str, Any],
-    row_count: int,
-) -> pa.RecordBatch:
-    """Build a batch; a column that is neither given nor constant is NULL."""
-    arrays = []
-    for field in schema:
-        if field.name in columns:
-            arrays.append(to_array(columns[field.name], field.type))
-        elif constants.get(field.name) is not None:
-            arrays.append(pa.repeat(pa.scalar(constants[field.name], field.type), row_count))
-        else:
-            arrays.append(pa.nulls(row_count, field.type))
+def batch_of(rows: Sequence[Sequence[Any]], schema: pa.Schema) -> pa.RecordBatch:
+    """Build a batch from one or more rows of Python values."""
+    filled = zip(zip(*rows, strict=True), schema.types, strict=True)
+    arrays = [to_array(values, data_type) for values, data_type in filled]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
-
-
-def renumber(rows: list[list[Any]], new_ids: Mapping[int, int]) -> list[list[Any]]:
-    """Replace the first value of each row by its new number and sort by it."""
-    changed = [[new_ids.get(row[0], row[0]), *row[1:]] for row in rows]
-    changed.sort(key=itemgetter(0))
-    return changed
 
 
 def _plain(data_type: pa.DataType) -> pa.DataType:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from msgflow.errors import TraceError
 from msgflow.trace import metadata
 from msgflow.trace.archive import is_archive
-from msgflow.trace.files import irregular, read_regular, unreadable_error
 from msgflow.trace.model import TraceLocation
+from msgflow.trace.regular_file import irregular, read_regular, unreadable_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -83,7 +83,7 @@ def _check_exists(path: Path) -> None:
     if kind is not None:
         raise TraceError(
             f"not a trace but {kind} — {path}",
-            hint="give the directory that `ros2 trace` or `lttng` wrote",
+            hint=metadata.DIRECTORY_HINT,
         )
     if not path.exists():
         raise TraceError(f"no such file or directory — {path}", hint=f"ls {path.parent}")
@@ -168,7 +168,7 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
             )
     return TraceError(
         f"no CTF trace (no file `metadata`) in this directory or below — {path}",
-        hint="give the directory that `ros2 trace` or `lttng` wrote",
+        hint=metadata.DIRECTORY_HINT,
     )
 
 
@@ -195,4 +195,4 @@ def _hint_for(path: Path) -> str:
         return "give the directory of the trace that it was converted from"
     if "recording" in kind:
         return f"messages are not traces, record one: {_RECORD_HINT}"
-    return "give the directory that `ros2 trace` or `lttng` wrote"
+    return metadata.DIRECTORY_HINT

@@ -10,12 +10,15 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.trace.files import read_regular
+from msgflow.trace.regular_file import read_regular
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 FILE_NAME = "metadata"
+
+DIRECTORY_HINT = "give the directory that `ros2 trace` or `lttng` wrote"
+"""Hint for those who gave something that is no trace."""
 
 BYTE_ORDER_OF_MAGIC = {b"\x57\x1d\xd1\x75": "<", b"\x75\xd1\x1d\x57": ">"}
 # Of a metadata packet: magic, uuid, checksum, content size and packet size in bits, then five
@@ -66,7 +69,7 @@ def kind_of(directory: Path) -> MetadataKind:
         return MetadataKind.TSDL
     raise TraceError(
         f"not a CTF trace, its `metadata` is something else — {directory}",
-        hint="give the directory that `ros2 trace` or `lttng` wrote",
+        hint=DIRECTORY_HINT,
     )
 
 

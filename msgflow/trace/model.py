@@ -93,7 +93,7 @@ class EventBatch:
     """Consecutive events of one name, or packets.
 
     Attributes:
-        name: the event's full name such as 'ros2:rcl_publish', or `PACKET` for packets.
+        name: the full name of the event, or `PACKET` for packets.
         batch: `COMMON_SCHEMA` and the payload columns; `PACKET_SCHEMA` for packets.
         round: number of the stretch of the total order that the batch belongs to, never falling:
             all events of a round come before all events of later rounds.

@@ -39,7 +39,7 @@ def open(paths: Sequence[str | Path], *, reader: str = "auto", strict: bool = Fa
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
     if not any(is_archive(Path(path)) for path in paths):
         return _open(discover(paths), reader, strict)
-    from msgflow.trace.unpacked import Unpacked, UnpackedTraceSet
+    from msgflow.trace.archived_traces import Unpacked, UnpackedTraceSet
 
     unpacked = Unpacked(paths)
     try:

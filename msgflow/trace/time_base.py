@@ -9,10 +9,31 @@ every other reader shows. That a clock was set is undone: times of one host have
 
 from __future__ import annotations
 
+from typing import Protocol
+
 GIGA = 1_000_000_000
 # LTTng reads the two clocks next to each other, several times, and takes the best: some ns, or some
 # hundred where reading a clock needs the kernel.
 GREATEST_ERROR_NS = 1_000
+
+
+class DeclaredClock(Protocol):
+    """A clock as the metadata of a trace declares it."""
+
+    @property
+    def uuid(self) -> str | None:
+        """Its uuid."""
+
+    @property
+    def name(self) -> str | None:
+        """Its name."""
+
+    @property
+    def frequency(self) -> int:
+        """How often it counts [Hz]."""
+
+    def to_ns(self, value: int) -> int:
+        """Return the time of a value of it [ns since the epoch]."""
 
 
 class TimeBase:
@@ -21,18 +42,14 @@ class TimeBase:
     def __init__(self) -> None:
         self._offsets: dict[tuple[str, str | None], int] = {}
 
-    def correction_ns(
-        self, uuid: str | None, name: str | None, frequency: int, offset_ns: int
-    ) -> int:
-        """Return what to add to the times of a trace, so that they fit those of the first one.
+    def correction_ns(self, clock: DeclaredClock) -> int:
+        """Return what to add to the times of a trace [ns], so that they fit those of the first one.
 
-        Args:
-            uuid: of the trace's clock, or None, which is a clock of its own.
-            name: of the clock, or None.
-            frequency: of the clock [Hz]; only clocks that count nanoseconds are corrected.
-            offset_ns: what the trace says that its clock is ahead of the epoch.
+        Only a clock that has a uuid and counts nanoseconds is corrected: without a uuid it is a
+        clock of its own.
         """
-        if uuid is None or frequency != GIGA:
+        if clock.uuid is None or clock.frequency != GIGA:
             return 0
-        correction = self._offsets.setdefault((uuid, name), offset_ns) - offset_ns
+        offset_ns = clock.to_ns(0)
+        correction = self._offsets.setdefault((clock.uuid, clock.name), offset_ns) - offset_ns
         return 0 if abs(correction) <= GREATEST_ERROR_NS else correction

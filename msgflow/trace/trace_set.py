@@ -1,20 +1,28 @@
-"""The interface that every reader fulfils."""
+"""Sets of traces: the interface that every reader fulfils, and what the readers share."""
 
 from __future__ import annotations
 
+import weakref
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from msgflow.errors import UsageError
+from msgflow.trace.model import Progress
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Generator, Iterator, Mapping, Sequence
     from types import TracebackType
 
     import pyarrow as pa
 
-    from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo
+    from msgflow.trace.model import Damage, EventBatch, TraceInfo
 
 DEFAULT_BATCH_ROWS = 65_536
+
+Report = Callable[[Progress], None]
+"""What a reader calls now and then to say how far it has come."""
 
 
 class TraceSet(ABC):
@@ -44,7 +52,7 @@ class TraceSet(ABC):
         self,
         wanted: Mapping[str, pa.Schema | None] | None = None,
         *,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Report | None = None,
         batch_rows: int = DEFAULT_BATCH_ROWS,
     ) -> Iterator[EventBatch]:
         """Read everything once; may be called again, which reads again from the start.
@@ -79,3 +87,53 @@ class TraceSet(ABC):
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+class ExclusiveTraceSet(TraceSet):
+    """Traces of which one iteration at a time can be under way."""
+
+    def __init__(self) -> None:
+        self.event_counts: Mapping[tuple[int, str], int] = {}
+        self.duplicate_packet_count = 0
+        self.repeated_packet_counts: Mapping[int, int] = {}
+        # Weak, so that an iteration which its consumer has dropped is over.
+        self._running: weakref.ref[Generator[EventBatch, None, None]] | None = None
+        self._closed = False
+
+    @abstractmethod
+    def _batches(
+        self,
+        wanted: Mapping[str, pa.Schema | None] | None,
+        progress: Report | None,
+        batch_rows: int,
+    ) -> Generator[EventBatch, None, None]:
+        """Read everything; sets `event_counts` and `duplicate_packet_count` at its end."""
+
+    def batches(
+        self,
+        wanted: Mapping[str, pa.Schema | None] | None = None,
+        *,
+        progress: Report | None = None,
+        batch_rows: int = DEFAULT_BATCH_ROWS,
+    ) -> Iterator[EventBatch]:
+        """Read everything once; see `TraceSet.batches`."""
+        if self._closed:
+            raise UsageError("the traces have been closed", hint="msgflow.trace.open(paths)")
+        if self._under_way() is not None:
+            raise UsageError(
+                "these traces are being read already", hint="open them a second time to read twice"
+            )
+        iteration = self._batches(wanted, progress, batch_rows)
+        self._running = weakref.ref(iteration)
+        return iteration
+
+    def close(self) -> None:
+        """End an iteration under way."""
+        self._closed = True
+        iteration = self._under_way()
+        if iteration is not None:
+            iteration.close()
+        self._running = None
+
+    def _under_way(self) -> Generator[EventBatch, None, None] | None:
+        return None if self._running is None else self._running()

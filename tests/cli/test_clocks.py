@@ -15,7 +15,7 @@ from msgflow.cli.app import app
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.sim import Host, Simulation, simulate
-from msgflow.sim.builtin import scenarios
+from msgflow.sim.scenario import scenarios
 
 Msgflow = Callable[..., Result]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.ingest.load import ImplausibleValues
-from msgflow.numpy_arrow import to_arrow
+from msgflow.trace.numpy_arrow import to_arrow
 
 LATEST = (1 << 62) - 1
 

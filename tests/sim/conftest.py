@@ -84,7 +84,7 @@ def _truth(directory: Path) -> duckdb.DuckDBPyConnection:
 def bt2() -> ModuleType:
     """Babeltrace 2's bindings, also from outside a virtual environment."""
     try:
-        return bt2_library.load().bt2
+        return bt2_library.load()
     except TraceError as error:
         pytest.skip(error.message)
 

@@ -15,10 +15,9 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import TraceError, UsageError
-from msgflow.trace import TraceSet
-from msgflow.trace import unpack as unpack_module
+from msgflow.trace import TraceSet, extraction
 from msgflow.trace.archive import stem
-from msgflow.trace.unpack import unpack
+from msgflow.trace.extraction import unpack
 
 Open = Callable[..., TraceSet]
 KINDS = (".tar", ".tar.gz", ".tgz", ".tar.xz", ".txz", ".tar.zst", ".tzst", ".zip")
@@ -143,7 +142,7 @@ def test_an_interrupt_leaves_nothing(
     def interrupt(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("msgflow.trace.unpack._Target.make_links", interrupt)
+    monkeypatch.setattr("msgflow.trace.extraction.Target.make_links", interrupt)
     with pytest.raises(error):
         msgflow.trace.open([pack(session, tmp_path / "packed.tar")])
 
@@ -316,7 +315,7 @@ class TestBounds:
         return archive
 
     def test_ratio(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(unpack_module, "_MOST_UNPACKED", 1 << 20)
+        monkeypatch.setattr(extraction, "MOST_UNPACKED", 1 << 20)
         archive = self.bomb(tmp_path / "bomb.tar.gz", 2 << 20)
         with pytest.raises(TraceError, match=r"than 1,048,576 bytes unpacked, .* packed") as caught:
             msgflow.trace.open([archive])
@@ -334,12 +333,12 @@ class TestBounds:
         def write(*_: object) -> None:
             raise AssertionError("it is written")
 
-        monkeypatch.setattr("msgflow.trace.unpack._Target.write", write)
+        monkeypatch.setattr("msgflow.trace.extraction.Target.write", write)
         with pytest.raises(TraceError, match="bytes unpacked"):
             msgflow.trace.open([archive])
 
     def test_the_limit_can_be_raised(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(unpack_module, "_MOST_UNPACKED", 1 << 20)
+        monkeypatch.setattr(extraction, "MOST_UNPACKED", 1 << 20)
         archive = self.bomb(tmp_path / "bomb.tar.gz", 2 << 20)
         monkeypatch.setenv("MSGFLOW_UNPACK_LIMIT", "3 MB")
         with pytest.raises(TraceError, match="no CTF trace"):
@@ -354,7 +353,7 @@ class TestBounds:
     def test_a_usual_ratio_is_no_bomb(
         self, session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(unpack_module, "_MOST_UNPACKED", 0)
+        monkeypatch.setattr(extraction, "MOST_UNPACKED", 0)
         with msgflow.trace.open([pack(session, tmp_path / "session.tar.gz")]) as traces:
             assert traces.traces
 

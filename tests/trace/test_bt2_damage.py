@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import struct
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import pytest
@@ -13,8 +14,7 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import ExitCode, TraceError, UsageError
-from msgflow.trace import PACKET, EventBatch, TraceSet, bt2_graph, bt2_library
-from msgflow.trace.model import undeclared
+from msgflow.trace import PACKET, EventBatch, TraceSet
 
 Open = Callable[..., TraceSet]
 
@@ -24,7 +24,7 @@ HEADER_SIZE = 84
 
 
 @pytest.fixture
-def open_traces(bt2_bindings: bt2_library.Bt2Library) -> Open:
+def open_traces(bt2_bindings: Any) -> Open:
     return lambda *paths: msgflow.trace.open(paths, reader="bt2")
 
 
@@ -58,7 +58,9 @@ def read(traces: TraceSet) -> tuple[list[EventBatch], TraceError]:
 
 def test_stream_cut_off(trace: Path, open_traces: Open) -> None:
     change(trace, lambda content: content[:-70])
-    with pytest.raises(TraceError, match=f"damaged or incomplete: .* — {trace}\n") as caught:
+    with pytest.raises(
+        TraceError, match=f"damaged or incomplete: .* — {trace}/channel_0\n"
+    ) as caught:
         open_traces(trace)
     assert caught.value.exit_code is ExitCode.TRACE
     assert "copy it again" in (caught.value.hint or "")
@@ -107,9 +109,8 @@ def test_damaged_packet_header(trace: Path, open_traces: Open) -> None:
 
 def test_file_that_does_not_belong_there(trace: Path, open_traces: Open) -> None:
     (trace / "notes.txt").write_text("what I did that day")
-    with pytest.raises(TraceError, match=r"not part of the trace .* — .*/notes.txt") as caught:
+    with pytest.raises(TraceError, match=f"damaged or incomplete: .* — {trace}/notes.txt\n"):
         open_traces(trace)
-    assert (caught.value.hint or "").startswith(f"mv {trace}/notes.txt ")
 
 
 def test_metadata_that_ends_early(trace: Path, open_traces: Open) -> None:
@@ -120,14 +121,13 @@ def test_metadata_that_ends_early(trace: Path, open_traces: Open) -> None:
 
 
 def test_ctf2_needs_a_newer_library(
-    trace: Path, bt2_bindings: bt2_library.Bt2Library, monkeypatch: pytest.MonkeyPatch
+    trace: Path, bt2_bindings: Any, open_traces: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (trace / "metadata").write_bytes(b'\x1e{"type": "preamble", "version": 2}\n')
-    old = dataclasses.replace(bt2_bindings, version=(2, 0, 4))
-    monkeypatch.setattr(bt2_library, "load", lambda: old)
+    monkeypatch.setattr(bt2_bindings, "__version__", "2.0.4")
     message = f"the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is 2.0.4 — {trace}"
     with pytest.raises(TraceError, match=message) as caught:
-        msgflow.trace.open([trace], reader="bt2")
+        open_traces(trace)
     assert "--trace-format=ctf-1.8" in (caught.value.hint or "")
 
 
@@ -160,34 +160,25 @@ def test_the_trace_is_not_touched(trace: Path, open_traces: Open) -> None:
 class TestInterrupt:
     """Ctrl-C arrives wherever Python happens to be."""
 
-    def test_while_babeltrace_calls_us(
-        self, trace: Path, bt2_bindings: bt2_library.Bt2Library, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_while_babeltrace_calls_us(self, trace: Path, open_traces: Open) -> None:
         calls = 0
 
-        class Native:
-            def __getattr__(self, name: str) -> Any:
-                return getattr(bt2_bindings.native, name)
+        def interrupt(frame: FrameType, event: str, argument: Any) -> None:
+            nonlocal calls
+            # Babeltrace calls the method of this name for each message.
+            calls += event == "call" and frame.f_code.co_name == "_user_consume"
+            if calls == 20:
+                raise KeyboardInterrupt
 
-            def bt2_self_component_port_input_get_msg_range(self, iterator: Any) -> Any:
-                nonlocal calls
-                calls += 1
-                if calls == 20:
-                    raise KeyboardInterrupt
-                return bt2_bindings.native.bt2_self_component_port_input_get_msg_range(iterator)
-
-        library = dataclasses.replace(bt2_bindings, native=Native())
-        graph = bt2_graph.Bt2Graph(library, [undeclared(trace, 0)])
-
-        def read_all() -> None:
-            for step in graph.steps():
-                for message in step:
-                    bt2_bindings.native.message_put_ref(message)
-
-        with pytest.raises(KeyboardInterrupt):
-            read_all()
-        graph.close()
-        assert calls == 20
+        with open_traces(trace) as traces:
+            sys.setprofile(interrupt)
+            try:
+                with pytest.raises(KeyboardInterrupt):
+                    list(traces.batches())
+            finally:
+                sys.setprofile(None)
+            assert calls == 20
+            assert sum(b.batch.num_rows for b in traces.batches({})) == PACKET_COUNT
 
     def test_in_the_consumer(self, trace: Path, open_traces: Open) -> None:
         def interrupted(traces: TraceSet) -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,14 +26,13 @@ def no_bt2(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
                 raise ModuleNotFoundError("No module named 'bt2'", name="bt2")
 
     monkeypatch.setattr(sys, "meta_path", [Refuse(), *sys.meta_path])
-    monkeypatch.setattr(bt2_library, "ROOTS", (str(tmp_path),))
-    monkeypatch.setattr(bt2_library, "PREFIXES", ())
+    monkeypatch.setattr(bt2_library, "PREFIXES", (str(tmp_path),))
     return tmp_path
 
 
 def package(root: Path, suffix: str, init: str = "") -> Path:
-    directory = root / "bt2"
-    directory.mkdir()
+    directory = root / "python3/dist-packages/bt2"
+    directory.mkdir(parents=True)
     (directory / "__init__.py").write_text(init)
     (directory / f"_native_bt{suffix}").touch()
     return directory
@@ -48,8 +48,8 @@ def test_not_installed(no_bt2: Path) -> None:
     ("tag", "version", "hint"),
     [
         ("399", r"3\.99", "uv tool install --python /usr/bin/python3.99 msgflow"),
-        ("310", r"3\.10", "msgflow needs Python 3.11 or newer"),
-        ("36m", r"3\.6", "msgflow needs Python 3.11 or newer"),
+        ("310", r"3\.10", "if that is 3.11 or newer"),
+        ("36m", r"3\.6", "if that is 3.11 or newer"),
     ],
 )
 def test_installed_for_another_python(no_bt2: Path, tag: str, version: str, hint: str) -> None:
@@ -66,26 +66,17 @@ def test_broken(no_bt2: Path) -> None:
     assert "bt2" not in sys.modules
 
 
-def test_found_without_touching_the_path(bt2_bindings: bt2_library.Bt2Library) -> None:
+def test_found_without_touching_the_path(bt2_bindings: Any) -> None:
     script = (
         "import sys; before = list(sys.path); from msgflow.trace import bt2_library; "
-        "library = bt2_library.load(); assert library.version >= (2, 0), library.version; "
+        "assert bt2_library.load().__version__ >= '2'; "
         "assert sys.path == before"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
-def test_twice_is_the_same(bt2_bindings: bt2_library.Bt2Library) -> None:
-    assert bt2_library.load().bt2 is bt2_bindings.bt2
-
-
-@pytest.mark.parametrize(
-    ("version", "stale", "ctf2"),
-    [((2, 0, 4), True, False), ((2, 0, 5), False, False), ((2, 1, 0), False, True)],
-)
-def test_what_a_version_can_do(version: tuple[int, ...], stale: bool, ctf2: bool) -> None:
-    library = bt2_library.Bt2Library(None, None, version)
-    assert (library.has_stale_empty_strings, library.reads_ctf2) == (stale, ctf2)
+def test_twice_is_the_same(bt2_bindings: Any) -> None:
+    assert bt2_library.load() is bt2_bindings
 
 
 def test_importing_the_package_is_cheap() -> None:

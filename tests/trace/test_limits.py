@@ -10,7 +10,7 @@ import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
-from msgflow.trace import metadata, unpack
+from msgflow.trace import extraction, metadata
 
 KIB = 1 << 10
 BLOCK = 4 * KIB
@@ -71,4 +71,4 @@ def test_archives_of_a_gibibyte_or_64_times_their_size(
     archive = tmp_path / "robot.tar.gz"
     archive.touch()
     os.truncate(archive, packed)
-    assert unpack._limit(archive) == limit
+    assert extraction.limit_of(archive) == limit

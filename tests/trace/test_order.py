@@ -11,25 +11,9 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from msgflow.trace.order import new_numbers
-
 Read = Callable[..., dict[str, list[dict[str, Any]]]]
 
 EVENTS = {"ros2:a": {"stream": "u32", "position": "u32"}, "ros2:b": {"stream": "u32"}}
-
-
-@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=1, max_size=12))
-def test_groups_are_numbered_by_time_stream_and_arrival(keys: list[tuple[int, int]]) -> None:
-    group = [(time, rank, 100 + i) for i, (time, rank) in enumerate(keys)]
-    changed = new_numbers([group])
-    by_new = sorted(group, key=lambda entry: changed.get(entry[2], entry[2]))
-    assert by_new == sorted(group)
-    assert sorted(changed.get(entry[2], entry[2]) for entry in group) == [e[2] for e in group]
-    assert all(old != new for old, new in changed.items())
-
-
-def test_a_group_in_order_changes_nothing() -> None:
-    assert new_numbers([[(5, 0, 7), (5, 0, 8), (5, 1, 9)]]) == {}
 
 
 Streams = list[list[int]]

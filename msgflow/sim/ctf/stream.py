@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from struct import Struct
 from typing import TYPE_CHECKING, Protocol
 
-from msgflow.sim.ctf.packet_memory import Entry, PacketMemory, PacketNumbers
 from msgflow.sim.ctf.tracepoint import Tracepoint, extended
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from pathlib import Path
     from uuid import UUID
 
@@ -27,6 +26,12 @@ _INDEX_ENTRY = Struct(">QQQQQQQQQ")
 _FOR_EVER = 1 << 62
 # How long before the first packet of the next chunk the last ones of a chunk end.
 _ROTATION_NS = 10_000
+
+Entry = tuple[Tracepoint, int, bytes]
+"""Tracepoint, time and context of an event."""
+
+PacketNumbers = tuple[int, int, int, int, int, int]
+"""Begin, end, bits of content, bits in all, sequence number, discarded events."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,48 @@ class Ending:
 
     is_last_packet_missing: bool = False
     is_last_packet_cut: bool = False
+
+
+@dataclass(slots=True)
+class _Kept:
+    """A packet in memory."""
+
+    content: bytes
+    numbers: PacketNumbers
+    events: list[Entry]
+    is_written: bool = False
+
+
+class PacketMemory:
+    """The newest packets of one stream."""
+
+    def __init__(self, capacity: int, overwritten: Callable[[list[Entry]], None]) -> None:
+        """Keep `capacity` packets; `overwritten` gets the events of those that no file has."""
+        self._capacity = capacity
+        self._overwritten = overwritten
+        self._packets: deque[_Kept] = deque()
+
+    def keep(self, content: bytes, numbers: PacketNumbers, events: list[Entry]) -> None:
+        """Add a packet, in the place of the oldest one if there is no room."""
+        if len(self._packets) == self._capacity:
+            self._forget()
+        self._packets.append(_Kept(content, numbers, events))
+
+    def write(self, write: Callable[[bytes, PacketNumbers], None]) -> None:
+        """Write all packets that are there, which stay there: they may be in several snapshots."""
+        for packet in self._packets:
+            write(packet.content, packet.numbers)
+            packet.is_written = True
+
+    def close(self) -> None:
+        """Give up what no snapshot has."""
+        while self._packets:
+            self._forget()
+
+    def _forget(self) -> None:
+        packet = self._packets.popleft()
+        if not packet.is_written:
+            self._overwritten(packet.events)
 
 
 class StreamWriter:
@@ -184,24 +231,6 @@ class StreamWriter:
         if self._faults is not None:
             self._entries.append((tracepoint, time, context))
             self._faults.emitted(self._cpu, time, context)
-        self._size = size
-        self._last = cycles
-
-    def emit_all(self, tracepoint: Tracepoint, time: int, context: bytes, *values: object) -> None:
-        """As `emit`, for a stream without breaks and faults."""
-        pack = tracepoint.pack
-        if pack is None:
-            return
-        cycles = time + self._origin
-        record = pack(tracepoint.id, cycles & _LOW, context, *values)
-        if cycles - self._last > _LOW:
-            record = extended(record, tracepoint.id, cycles)
-        size = self._size + len(record)
-        if size > self._packet_bytes:
-            self._write_packet(cycles, self._packet_bytes, is_full=True)
-            size = _HEADER.size + len(record)
-        tracepoint.count += 1
-        self._records.append(record)
         self._size = size
         self._last = cycles
 

@@ -1,1 +1,74 @@
-"""Systems to simulate, as data: each module has those that show one idea."""
+"""Scenarios that come with msgflow: systems to simulate, as data.
+
+Each module has those that show one idea.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from msgflow.sim.scenario import (
+    annotated,
+    autoware,
+    bursts,
+    container,
+    delivery,
+    executors,
+    intra_process,
+    layers,
+    lives,
+    nested,
+    pipeline,
+    robot,
+    rtabmap,
+    services,
+    stamps,
+    starvation,
+    traffic,
+    transforms,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from msgflow.sim.system import Scenario
+
+
+def scenarios() -> Mapping[str, Scenario]:
+    """Every built-in scenario by name."""
+    built_in = (
+        pipeline.pipeline(),
+        pipeline.fan_out(),
+        pipeline.two_hosts(),
+        pipeline.quiet(),
+        robot.demo(),
+        executors.multi_threaded(),
+        executors.executors(),
+        nested.nested(),
+        intra_process.intra_process(),
+        intra_process.mixed_intra_process(),
+        container.container(),
+        container.container_multi_threaded(),
+        delivery.overload(),
+        delivery.losses(),
+        starvation.starved(),
+        starvation.overwritten_copies(),
+        transforms.transforms(),
+        services.services(),
+        lives.restarts(),
+        lives.container_restarts(),
+        stamps.equal_stamps(),
+        traffic.host_chain(),
+        bursts.bursts(),
+        bursts.bursts_two_hosts(),
+        layers.python(),
+        layers.layers(),
+        annotated.periodic_async(),
+        annotated.partial_sync(),
+        annotated.reentrant(),
+        autoware.autoware(),
+        autoware.autoware_two_threads(),
+        rtabmap.rtabmap(),
+    )
+    return MappingProxyType({scenario.name: scenario for scenario in built_in})

@@ -14,7 +14,9 @@ from msgflow.sim.entity import (
 from msgflow.sim.system import Executor, Group, Host, Node, Process, Scenario
 
 _INPUTS = ("/a", "/b", "/c")
-_PERIODS = (7, 11, 16)
+_PERIODS_MS = (7, 11, 16)
+_REENTRANT_PERIODS_MS = (9, 14, 6)
+_GROUP = "any_time"
 _SIZES = ((1, 1), (1, 3), (2, 1), (2, 2), (3, 1), (3, 3))
 
 
@@ -26,7 +28,7 @@ def periodic_async() -> Scenario:
         description="Timers publish what they make of the latest message of up to three inputs.",
         hosts=(Host("alpha", cpu_count=8),),
         processes=(
-            *_sources(),
+            *_sources(_PERIODS_MS),
             *_one_each(nodes),
             # Two links of one node that share an input and an output.
             Process("sharing", "alpha", 2001, (_sharing(),), start_ns=70 * MILLISECOND),
@@ -50,7 +52,7 @@ def partial_sync() -> Scenario:
         description="Callbacks publish once there is a new message of each of up to three inputs.",
         hosts=(Host("alpha", cpu_count=8),),
         processes=(
-            *_sources(),
+            *_sources(_PERIODS_MS),
             *_one_each(nodes),
             # Its callbacks run on two threads, one at a time.
             Process(
@@ -64,7 +66,36 @@ def partial_sync() -> Scenario:
     )  # fmt: skip
 
 
-def _sources() -> tuple[Process, ...]:
+def reentrant() -> Scenario:
+    """Callbacks in reentrant groups of four threads, which keep and use messages early or late."""
+    nodes = (
+        _sync("sync_early", ("/a", "/b"), is_late=False),
+        _sync("sync_late", ("/a", "/b"), is_late=True),
+        _sync("sync_three", _INPUTS, is_late=True),
+        _overlapping("periodic_early", is_late=False),
+        _overlapping("periodic_late", is_late=True),
+    )
+    return Scenario(
+        name="reentrant",
+        description="Annotated nodes whose callbacks overlap on four threads.",
+        hosts=(Host("alpha", cpu_count=24),),
+        processes=(
+            *_sources(_REENTRANT_PERIODS_MS),
+            *(
+                Process(
+                    node.name, "alpha", 1501 + 100 * number, (node,),
+                    executors=(Executor("multi_threaded", 4),), start_ns=(3 + 5 * number) * 10**6,
+                )
+                for number, node in enumerate(nodes)
+            ),
+            _sink(nodes),
+        ),
+        duration_ns=4 * SECOND,
+        layout="rolling",
+    )  # fmt: skip
+
+
+def _sources(periods_ms: tuple[int, ...]) -> tuple[Process, ...]:
     return tuple(
         Process(
             f"source_{number}", "alpha", 1101 + 100 * number,
@@ -72,12 +103,12 @@ def _sources() -> tuple[Process, ...]:
                 Node(
                     f"source_{number}",
                     publishers=(Publisher(topic),),
-                    timers=(Timer(period * MILLISECOND, (topic,)),),
+                    timers=(Timer(period_ms * MILLISECOND, (topic,)),),
                 ),
             ),
             start_ns=number * 4 * MILLISECOND,
         )
-        for number, (topic, period) in enumerate(zip(_INPUTS, _PERIODS, strict=True))
+        for number, (topic, period_ms) in enumerate(zip(_INPUTS, periods_ms, strict=True))
     )  # fmt: skip
 
 
@@ -167,3 +198,33 @@ def _sink(nodes: tuple[Node, ...]) -> Process:
     topics = [publisher.topic for node in nodes for publisher in node.publishers]
     sink = Node("sink", subscriptions=tuple(Subscription(topic) for topic in topics))
     return Process("sink", "alpha", 2201, (sink,), start_ns=30 * MILLISECOND)
+
+
+def _sync(name: str, inputs: tuple[str, ...], *, is_late: bool) -> Node:
+    topics = (f"/{name}/0", f"/{name}/1")
+    slow = Work(5 * MILLISECOND, 6 * MILLISECOND)
+    return Node(
+        name,
+        groups=(Group(_GROUP, is_reentrant=True),),
+        publishers=tuple(Publisher(topic) for topic in topics),
+        subscriptions=tuple(Subscription(topic, topics, slow, group=_GROUP) for topic in inputs),
+        links=(MessageLink("partial_sync", inputs, topics, is_late),),
+    )
+
+
+def _overlapping(name: str, *, is_late: bool) -> Node:
+    topic = f"/{name}"
+    inputs = ("/a", "/b")
+    return Node(
+        name,
+        groups=(Group(_GROUP, is_reentrant=True),),
+        publishers=(Publisher(topic),),
+        subscriptions=tuple(
+            Subscription(each, work=Work(4 * MILLISECOND, 7 * MILLISECOND), group=_GROUP)
+            for each in inputs
+        ),
+        timers=(
+            Timer(10 * MILLISECOND, (topic,), Work(3 * MILLISECOND, 3 * MILLISECOND), group=_GROUP),
+        ),
+        links=(MessageLink("periodic_async", inputs, (topic,), is_late),),
+    )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.numpy_arrow import to_arrow
+from msgflow.trace.columns import BASE
 from msgflow.trace.ctf.field_types import (
     Array,
     Integer,
@@ -20,6 +20,7 @@ from msgflow.trace.ctf.field_types import (
     VariableInteger,
     Variant,
 )
+from msgflow.trace.numpy_arrow import to_arrow
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,13 +56,17 @@ def arrow_type(declared: Type) -> pa.DataType:
 
 
 def declared_schema(structure: Structure) -> pa.Schema:
-    """Return the columns of a payload: one for each field."""
-    return pa.schema([(member.name, arrow_type(member.type)) for member in structure.members])
-
-
-def hexadecimal_names(structure: Structure) -> set[str]:
-    """Return the names of fields to show in base 16: integers, and arrays of them."""
-    return {member.name for member in structure.members if _is_hexadecimal(member.type)}
+    """Return the columns of a payload, one for each field; integers of base 16 are marked."""
+    return pa.schema(
+        [
+            pa.field(
+                member.name,
+                arrow_type(member.type),
+                metadata={BASE: b"16"} if _is_hexadecimal(member.type) else None,
+            )
+            for member in structure.members
+        ]
+    )
 
 
 def _is_hexadecimal(declared: Type) -> bool:

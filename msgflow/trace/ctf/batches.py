@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import complete_schemas, in_hexadecimal, merged_schema
-from msgflow.trace.ctf.arrow import declared_schema, hexadecimal_names
+from msgflow.trace.columns import complete_schemas, merged_schemas
+from msgflow.trace.ctf.arrow import declared_schema
 from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
 from msgflow.trace.ctf.field_types import BYTE
@@ -59,7 +59,10 @@ class Iteration:
         self._classes = [(layout, known) for layout in layouts for known in layout.classes.values()]
         self._counts = np.zeros(len(self._classes), np.int64)
         self._names = ThreadNames()
-        self._plans = self._planned(complete_schemas(wanted, _declared(layouts)))
+        declared = merged_schemas(
+            (known.event.name, declared_schema(known.event.payload)) for _, known in self._classes
+        )
+        self._plans = self._planned(complete_schemas(wanted, declared))
         self.event_count = 0
 
     def event_counts(self) -> dict[tuple[int, str], int]:
@@ -171,17 +174,3 @@ def _rows(batch: Batch, rows: NDArray[np.int64], first_id: int) -> EventRows:
 def _in_order(parts: list[pa.RecordBatch]) -> pa.RecordBatch:
     table = pa.Table.from_batches(parts).unify_dictionaries().sort_by("event_id")
     return table.combine_chunks().to_batches()[0]
-
-
-def _declared(layouts: Sequence[StreamLayout]) -> dict[str, pa.Schema]:
-    declared: dict[str, list[pa.Schema]] = {}
-    hexadecimal: dict[str, set[str]] = {}
-    for layout in layouts:
-        for known in layout.classes.values():
-            name, payload = known.event.name, known.event.payload
-            declared.setdefault(name, []).append(declared_schema(payload))
-            hexadecimal.setdefault(name, set()).update(hexadecimal_names(payload))
-    return {
-        name: in_hexadecimal(merged_schema(schemas), hexadecimal[name])
-        for name, schemas in declared.items()
-    }

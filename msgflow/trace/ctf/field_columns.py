@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msgflow.numpy_arrow import distinct
 from msgflow.trace.ctf.event_body import EventBody, Kind
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

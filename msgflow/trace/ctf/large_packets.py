@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.numpy_arrow import distinct
 from msgflow.trace.ctf.events import find_events, read_events, without_absurd
 from msgflow.trace.ctf.packet_order import PacketEvents
 from msgflow.trace.ctf.stream_layout import GAP
+from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,7 +6,7 @@ import os
 import struct
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from msgflow.trace.files import UnsuitableFileError, read_regular
+from msgflow.trace.regular_file import UnsuitableFileError, read_regular
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 
-from msgflow.numpy_arrow import integers_to_arrow
 from msgflow.trace.model import EventBatch
+from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.schemas import PACKET, PACKET_SCHEMA
 
 if TYPE_CHECKING:

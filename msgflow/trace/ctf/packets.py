@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from msgflow.trace.ctf import packet_index
 from msgflow.trace.ctf.errors import FieldError
 from msgflow.trace.ctf.field_types import BYTE
-from msgflow.trace.files import UnsuitableFileError
+from msgflow.trace.regular_file import UnsuitableFileError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -18,11 +18,11 @@ from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.trace_info import describe
 from msgflow.trace.discovery import irregular_files, stream_files
-from msgflow.trace.exclusive import ExclusiveTraceSet
-from msgflow.trace.files import unreadable_error
 from msgflow.trace.metadata import FILE_NAME
 from msgflow.trace.model import Damage, undeclared
+from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import TimeBase
+from msgflow.trace.trace_set import ExclusiveTraceSet
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Mapping, Sequence

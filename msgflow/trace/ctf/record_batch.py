@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.numpy_arrow import to_arrow
 from msgflow.trace.columns import first_inner_value, inner_matching, matching, to_array
 from msgflow.trace.ctf.arrow import (
     declared_schema,
@@ -20,6 +19,7 @@ from msgflow.trace.ctf.arrow import (
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.field_columns import FieldRows
 from msgflow.trace.ctf.field_types import Scope, Structure, Type
+from msgflow.trace.numpy_arrow import to_arrow
 from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
@@ -98,8 +98,8 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
     payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, wanted)
     declared = declared_schema(layout.event.payload)
     inner = {
-        column: tuple(field.path for field in fields)
-        for column, fields in inner_matching(wanted, declared).items()
+        column: paths
+        for column, paths in inner_matching(wanted, declared).items()
         if column not in payload
     }
     schema = pa.schema([*COMMON_SCHEMA, *wanted])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow, to_numpy
+from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -1,75 +1,9 @@
-"""The scenarios that come with msgflow."""
+"""Pipelines: a source, a relay and a sink, and other systems of a few processes."""
 
 from __future__ import annotations
 
-from types import MappingProxyType
-from typing import TYPE_CHECKING
-
 from msgflow.sim.entity import MILLISECOND, Publisher, Subscription, Timer
-from msgflow.sim.robot import demo
-from msgflow.sim.scenario import (
-    annotated,
-    autoware,
-    bursts,
-    container,
-    delivery,
-    executors,
-    intra_process,
-    layers,
-    lives,
-    nested,
-    reentrant,
-    rtabmap,
-    services,
-    stamps,
-    starvation,
-    traffic,
-    transforms,
-)
 from msgflow.sim.system import Host, Node, Process, Scenario
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-
-def scenarios() -> Mapping[str, Scenario]:
-    """Every built-in scenario by name."""
-    built_in = (
-        _pipeline(),
-        _fan_out(),
-        _two_hosts(),
-        _quiet(),
-        demo(),
-        executors.multi_threaded(),
-        executors.executors(),
-        nested.nested(),
-        intra_process.intra_process(),
-        intra_process.mixed_intra_process(),
-        container.container(),
-        container.container_multi_threaded(),
-        delivery.overload(),
-        delivery.losses(),
-        starvation.starved(),
-        starvation.overwritten_copies(),
-        transforms.transforms(),
-        services.services(),
-        lives.restarts(),
-        lives.container_restarts(),
-        stamps.equal_stamps(),
-        traffic.host_chain(),
-        bursts.bursts(),
-        bursts.bursts_two_hosts(),
-        layers.python(),
-        layers.layers(),
-        annotated.periodic_async(),
-        annotated.partial_sync(),
-        reentrant.reentrant(),
-        autoware.autoware(),
-        autoware.autoware_two_threads(),
-        rtabmap.rtabmap(),
-    )
-    return MappingProxyType({scenario.name: scenario for scenario in built_in})
-
 
 _SOURCE = Node(
     "source",
@@ -84,7 +18,8 @@ _RELAY = Node(
 _SINK = Node("sink", subscriptions=(Subscription("/topic_b", logs=True),))
 
 
-def _pipeline() -> Scenario:
+def pipeline() -> Scenario:
+    """A source with a timer, a relay and a sink, on one host."""
     return Scenario(
         name="pipeline",
         description="A source with a timer of 5 ms, a relay and a sink: three processes, one host.",
@@ -97,7 +32,8 @@ def _pipeline() -> Scenario:
     )
 
 
-def _two_hosts() -> Scenario:
+def two_hosts() -> Scenario:
+    """The pipeline with its relay on another host."""
     return Scenario(
         name="two_hosts",
         description="The pipeline with the relay on a second host that uses the same process id.",
@@ -110,7 +46,8 @@ def _two_hosts() -> Scenario:
     )
 
 
-def _quiet() -> Scenario:
+def quiet() -> Scenario:
+    """A source with a slow timer and a sink."""
     source = Node(
         "source",
         publishers=(Publisher("/topic_a"),),
@@ -128,7 +65,8 @@ def _quiet() -> Scenario:
     )
 
 
-def _fan_out() -> Scenario:
+def fan_out() -> Scenario:
+    """One callback publishes on two topics."""
     topics = ("/topic_a", "/topic_b")
     source = Node(
         "source",

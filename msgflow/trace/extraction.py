@@ -1,4 +1,4 @@
-"""Unpacks archives of traces, trusting nothing that stands in them.
+"""Extraction of archives, which trusts nothing that stands in them.
 
 Nothing is written through a link: regular files come first, links are made when all files are
 there, and removed again if they lead nowhere. Owners, modes and times are not restored.
@@ -27,8 +27,10 @@ _FREE_PART_LEFT = 20
 LIMIT_VARIABLE = "MSGFLOW_UNPACK_LIMIT"
 """Environment variable: most bytes that an archive may have unpacked, such as 20GB."""
 
+MOST_UNPACKED = 1 << 30
+"""Every archive may have so many bytes unpacked."""
+
 # Traces are packed ten to thirty times smaller, with the zeros at the ends of packets up to fifty.
-_MOST_UNPACKED = 1 << 30
 _MOST_RATIO = 64
 _UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 _SIZE = re.compile(r"(\d{1,15})\s*([KMGT]?)B?", re.IGNORECASE | re.ASCII)
@@ -51,10 +53,10 @@ def unpack(archive: Path, directory: Path) -> None:
     Raises:
         TraceError: it is damaged, encrypted, too large for the disk or for what it is packed, or
             has a member that is a device or would lie, or lead, outside of the directory.
-        UsageError: the limit in the environment is none.
+        UsageError: the environment variable `LIMIT_VARIABLE` holds no amount.
     """
     try:
-        target = _Target(archive, directory)
+        target = Target(archive, directory)
         with archive.open("rb") as file:
             if file.peek(len(_ZIP)).startswith(_ZIP):
                 _unpack_zip(file, target)
@@ -78,10 +80,15 @@ def unpack(archive: Path, directory: Path) -> None:
         ) from error
 
 
-def _limit(archive: Path) -> int:
+def limit_of(archive: Path) -> int:
+    """Return how much an archive may have unpacked [bytes].
+
+    Raises:
+        UsageError: the environment variable holds no amount.
+    """
     text = os.environ.get(LIMIT_VARIABLE)
     if text is None:
-        return max(_MOST_UNPACKED, _MOST_RATIO * archive.stat().st_size)
+        return max(MOST_UNPACKED, _MOST_RATIO * archive.stat().st_size)
     match = _SIZE.fullmatch(text.strip())
     if match is None:
         raise UsageError(f"not an amount of bytes: {text} — {LIMIT_VARIABLE}", "give one like 20GB")
@@ -93,7 +100,7 @@ def _reason(error: Exception) -> str:
 
 
 @dataclass
-class _Target:
+class Target:
     """A directory that is being filled, never beyond its borders nor those of the disk."""
 
     archive: Path
@@ -106,7 +113,7 @@ class _Target:
     def __post_init__(self) -> None:
         free = shutil.disk_usage(self.directory).free
         self.room = free - free // _FREE_PART_LEFT
-        self.limit = _limit(self.archive)
+        self.limit = limit_of(self.archive)
 
     def take(self, size: int) -> None:
         """Use up some bytes of the disk."""
@@ -238,7 +245,7 @@ class _Member(tarfile.TarInfo):
             raise tarfile.ReadError(str(error)) from error
 
 
-def _unpack_tar(file: IO[bytes], target: _Target) -> None:
+def _unpack_tar(file: IO[bytes], target: Target) -> None:
     with (
         open_plain(file) as content,
         tarfile.open(fileobj=content, mode="r|", tarinfo=_Member) as tar,
@@ -262,7 +269,7 @@ def _unpack_tar(file: IO[bytes], target: _Target) -> None:
             pass
 
 
-def _unpack_zip(file: IO[bytes], target: _Target) -> None:
+def _unpack_zip(file: IO[bytes], target: Target) -> None:
     with zipfile.ZipFile(file) as archive:
         for member in archive.infolist():
             kind = stat.S_IFMT(member.external_attr >> 16)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.sim.objects import Message
-from msgflow.sim.publish import publish, write_publication
+from msgflow.sim.publication import publish, write_publication
 
 if TYPE_CHECKING:
     from msgflow.sim.callback_instance import CallbackInstance
@@ -27,13 +27,13 @@ def publish_intra(
     """Publish to the subscriptions in the process, then to the others, if there are any."""
     intra = publisher.intra
     assert intra is not None
-    world, machine = thread.world, thread.machine
-    random = world.random
+    scheduler, machine = thread.scheduler, thread.machine
+    random = scheduler.random
     thread.emit(
         machine.tracepoints.rclcpp_intra_publish, time, thread.context,
         publisher.handle, publisher.message,
     )  # fmt: skip
-    publication_id = next(world.publication_ids)
+    publication_id = next(scheduler.publication_ids)
     message = Message(
         publication_id, publisher, thread.tid, instance,
         intra=time, intra_ns=time + machine.epoch,

@@ -17,7 +17,7 @@ Action = Callable[[int, Any], None]
 _GRACE_NS = 1_000_000_000
 
 
-class World:
+class Scheduler:
     """The agenda, the dice and the truth.
 
     Time is in ns since the begin of tracing, the same on all hosts.

@@ -11,7 +11,8 @@ import pyarrow as pa
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from msgflow.numpy_arrow import (
+from msgflow.sim import simulate
+from msgflow.trace.numpy_arrow import (
     distinct,
     empty_batch,
     integers_to_arrow,
@@ -22,7 +23,6 @@ from msgflow.numpy_arrow import (
     to_numpy,
     without,
 )
-from msgflow.sim import simulate
 
 TYPES = ["bool", "int8", "int32", "int64", "uint16", "uint64", "float32", "float64", ">u4", ">i8"]
 
@@ -115,7 +115,7 @@ def test_each_value_once() -> None:
     assert distinct(np.array([3, 1, 3, 2, 1])).tolist() == [1, 2, 3]
     assert distinct(np.empty(0, np.int64)).size == 0
     script = (
-        "import sys, numpy; from msgflow.numpy_arrow import distinct\n"
+        "import sys, numpy; from msgflow.trace.numpy_arrow import distinct\n"
         "distinct(numpy.array([3, 1, 3]))\n"
         "assert 'numpy.ma' not in sys.modules"
     )

@@ -1,4 +1,4 @@
-"""Traces in archives: unpacked to a temporary directory, shown as lying in the archive."""
+"""Traces in archives: unpacked to a temporary directory, shown as if they lay in the archive."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.archive import is_archive
+from msgflow.trace.extraction import unpack
 from msgflow.trace.trace_set import DEFAULT_BATCH_ROWS, TraceSet
-from msgflow.trace.unpack import unpack
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Mapping, Sequence

@@ -41,7 +41,7 @@ class Written:
         """Write down the `dds:*` events of a publication."""
         machine = thread.machine
         for event, time in self.dds:
-            thread.world.truth.dds_event.add(
+            thread.scheduler.truth.dds_event.add(
                 publication_id, machine.hostname, thread.process.pid, thread.tid, event,
                 time + machine.epoch,
             )  # fmt: skip
@@ -55,7 +55,7 @@ def entity_of(rmw_handle: int) -> int:
 def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: int = 0) -> Written:
     """Publish a message in the middleware layer, called at `time`."""
     machine = thread.machine
-    random, layout = thread.world.random, machine.layout
+    random, layout = thread.scheduler.random, machine.layout
     tracepoints, emit, context = machine.tracepoints, thread.emit, thread.context
     pace = machine.publish_pace
     duration = int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * random()))
@@ -72,7 +72,7 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     entered = rmw + int((150 + int(random() * 400)) * pace)
     stamp = entered + int((200 + int(random() * 800)) * pace)
     if not layout.is_stamped_early:
-        stamp += duration + int(thread.world.tail(1_500) * pace)
+        stamp += duration + int(thread.scheduler.tail(1_500) * pace)
         if random() < _HELD_UP:
             stamp += int(random() * _LONGEST_HOLD_UP_NS)
     stamp_ns = machine.stamp_ns(stamp)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.sim.objects import Message
-from msgflow.sim.write import write
+from msgflow.sim.rmw import write
 
 if TYPE_CHECKING:
     from msgflow.sim.callback_instance import CallbackInstance
@@ -27,8 +27,8 @@ def publish(
     Without `instance` it happens outside any callback. `message` is one that has been published
     to the subscriptions of the process already.
     """
-    world = thread.world
-    random = world.random
+    scheduler = thread.scheduler
+    random = scheduler.random
     machine = thread.machine
     pace = machine.publish_pace
     tracepoints = machine.tracepoints
@@ -36,7 +36,7 @@ def publish(
     emit = thread.emit
     context = thread.context
     if message is None:
-        message = Message(next(world.publication_ids), publisher, thread.tid, instance)
+        message = Message(next(scheduler.publication_ids), publisher, thread.tid, instance)
 
     if publisher.is_silent:
         message.rmw, message.stamp_ns = time + 600, machine.stamp_ns(time + 500)
@@ -67,7 +67,7 @@ def write_publication(
 ) -> None:
     """Write down a publication and what has caused it."""
     hostname, pid, tid = thread.machine.hostname, thread.process.pid, thread.tid
-    truth, topic, is_internal = thread.world.truth, publisher.topic, publisher.is_internal
+    truth, topic, is_internal = thread.scheduler.truth, publisher.topic, publisher.is_internal
     truth.publication.add(
         message.publication_id, hostname, pid, tid, publisher.node, topic,
         publisher.init_handle, publisher.rmw_handle, message.rclcpp_ns, message.rcl_ns,

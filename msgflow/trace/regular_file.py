@@ -1,4 +1,4 @@
-"""Regular files of bounded size: what else bears the name of one must not hang or fill a reader."""
+"""Regular files of bounded size; pipes, devices and the like must not hang or fill a reader."""
 
 from __future__ import annotations
 

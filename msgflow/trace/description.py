@@ -1,0 +1,75 @@
+"""Descriptions of traces: what the metadata declares, put into one form for every reader."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from msgflow.trace.model import TraceInfo
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence, Set
+    from pathlib import Path
+
+    from msgflow.trace.time_base import DeclaredClock, TimeBase
+
+_PROCESS_CONTEXT = {"vpid", "vtid"}
+
+
+def description(
+    path: Path,
+    index: int,
+    base: TimeBase,
+    *,
+    uuid: str | None,
+    environment: Mapping[str, int | str],
+    clock: DeclaredClock,
+    begins: Sequence[int],
+    ends: Sequence[int],
+    events: Sequence[tuple[str, Set[str]]],
+    has_time: bool = True,
+) -> TraceInfo:
+    """Describe a trace, and put its clock on a time base.
+
+    Args:
+        path: the directory of the trace.
+        index: its place among the traces opened together.
+        base: the time base of these traces.
+        uuid: the uuid that the metadata declares.
+        environment: the `env` of the metadata.
+        clock: the clock of the events.
+        begins: when the streams begin, by this clock [ns since the epoch].
+        ends: when the streams end, likewise.
+        events: the name of each event class and the names of its contexts.
+        has_time: the events have times.
+    """
+    correction_ns = base.correction_ns(clock)
+    return TraceInfo(
+        index=index,
+        path=path,
+        uuid=uuid,
+        domain=_text(environment, "domain"),
+        hostname=_text(environment, "hostname"),
+        tracer=_tracer(environment),
+        clock_uuid=clock.uuid,
+        clock_name=clock.name,
+        clock_offset_ns=clock.to_ns(0),
+        clock_correction_ns=correction_ns,
+        begin_ns=min(begins) + correction_ns if begins else None,
+        end_ns=max(ends) + correction_ns if ends else None,
+        has_process_context=all(contexts >= _PROCESS_CONTEXT for _, contexts in events),
+        event_names=tuple(sorted({name for name, _ in events})),
+        has_time=has_time,
+    )
+
+
+def _text(environment: Mapping[str, int | str], name: str) -> str | None:
+    return str(environment[name]) if name in environment else None
+
+
+def _tracer(environment: Mapping[str, int | str]) -> str | None:
+    name = _text(environment, "tracer_name")
+    if name is None:
+        return None
+    parts = ("tracer_major", "tracer_minor", "tracer_patchlevel", "tracer_patch")
+    version = ".".join(str(environment[part]) for part in parts if part in environment)
+    return f"{name} {version}".rstrip()
