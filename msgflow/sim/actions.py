@@ -1,4 +1,4 @@
-"""What callbacks do besides publishing: call services, spin, take by themselves, change state."""
+"""Actions of callbacks besides publishing: call a service, spin, take a message, change state."""
 
 from __future__ import annotations
 

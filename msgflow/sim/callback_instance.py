@@ -1,4 +1,4 @@
-"""A run of a callback that goes on, and where the flows that lead to it began."""
+"""Callback instances that are under way, and where the flows that lead to them began."""
 
 from __future__ import annotations
 

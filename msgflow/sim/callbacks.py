@@ -1,4 +1,4 @@
-"""What happens once an executor has chosen: take and callback."""
+"""Callbacks that an executor has chosen: the take, then the run."""
 
 from __future__ import annotations
 

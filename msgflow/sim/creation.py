@@ -1,4 +1,4 @@
-"""Objects of a process come into being: the events of their initialisation, in order.
+"""Creation of the objects of a process: the events of their initialisation, in order.
 
 What DDS and the middleware layer do for each is in `Creator` too.
 """
@@ -351,7 +351,7 @@ class Creator:
         self.emit("rmw_subscription_init", rmw_handle, gid)
 
     def _entity(self, event: str, handle: int, dds_topic: str, gid: bytes) -> None:
-        """DDS creates a writer or reader and says so with a writer that nobody has created."""
+        """DDS creates a writer or reader, and announces it with a writer of its own."""
         stamp_ns = self.thread.machine.stamp_ns(self.time + 250)
         writer = self._discovery_writers[1 if event == "create_writer" else 2]
         self.emit("dds_write", writer, 0, stamp_ns)
@@ -360,7 +360,7 @@ class Creator:
         self.emit(f"dds_{event}", handle, dds_topic, gid[:12], gid[12:16], gid[:16])
 
     def _add_write_to_truth(self, stamp_ns: int) -> None:
-        """DDS has published for itself, of which nothing but its own event tells."""
+        """DDS has published for itself; only its own event tells."""
         thread = self.thread
         truth = thread.scheduler.truth
         place = (thread.machine.hostname, thread.process.pid, thread.tid)

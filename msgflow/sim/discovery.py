@@ -1,4 +1,4 @@
-"""The middleware's own traffic: ros_discovery_info, published without rcl and taken by a thread.
+"""Discovery traffic of the middleware: ros_discovery_info, which passes no layer of rcl.
 
 Whenever an object is created, its process publishes what it has; a listener thread of every
 process takes that. The takes carry no stamp (no message info is asked for), and a process takes

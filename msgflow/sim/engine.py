@@ -1,4 +1,4 @@
-"""Runs a scenario: builds its hosts and processes, lets time pass, writes traces and truth."""
+"""Engine of the simulation: builds hosts and processes, lets time pass, writes traces and truth."""
 
 from __future__ import annotations
 

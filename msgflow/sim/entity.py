@@ -1,4 +1,4 @@
-"""What nodes consist of: publishers, subscriptions, timers, services, clients, and what they do.
+"""Entities of nodes: publishers, subscriptions, timers, services, clients, and what they do.
 
 Data only, no behaviour. All durations are nanoseconds.
 """

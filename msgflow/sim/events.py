@@ -23,7 +23,7 @@ _POINTER = "integer { size = 64; align = 8; signed = 0; encoding = none; base = 
 class FieldKind(Enum):
     """Kinds of payload fields: `struct` code and the TSDL of one element.
 
-    PADDED is an array of bytes of which only the first 16 are given, the others are zero. SEQUENCE
+    PADDED is an array of bytes: the first 16 are given, the others are zero. SEQUENCE
     holds as many pointers as it says, its length before it.
     """
 

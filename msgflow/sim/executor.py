@@ -1,4 +1,4 @@
-"""What the threads of one executor share: what they execute, and who of them waits.
+"""Executors: what their threads execute, and which thread waits.
 
 In the order of rclcpp: what is ready is decided when a wait ends, timers first, then subscriptions,
 then services, clients and intra-process buffers; only when nothing of it may be executed comes the

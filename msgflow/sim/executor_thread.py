@@ -1,4 +1,4 @@
-"""A thread that spins an executor, as rclcpp does it.
+"""Threads that spin an executor, as rclcpp does it.
 
 The loop: get_next_ready; if there was nothing wait_for_work and get_next_ready once more; execute.
 """

@@ -1,4 +1,4 @@
-"""What the clock of a host shows."""
+"""Clock of a host: what it shows at a time of the simulation."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def publish_intra(
     time += 300 + int(random() * 700)
     others = [match for match in publisher.matches if not match.is_intra]
     heard = any(match.since <= time and match.subscription.ended is None for match in others)
-    # Whoever comes late gets what is kept by DDS, which therefore always gets the message, too.
+    # DDS keeps messages for subscriptions that come late, so it always gets the message, too.
     if heard or intra.kept is not None:
         return publish(thread, middleware, publisher, time, instance, message)
     middleware.remember(message)

@@ -1,4 +1,4 @@
-"""How long messages travel between two processes, and how long discovery takes."""
+"""Latency between two processes: of messages, and of discovery."""
 
 from __future__ import annotations
 

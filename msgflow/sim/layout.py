@@ -1,7 +1,7 @@
 """Trace layouts as data: which events a release of ROS 2 declares, with which fields.
 
-Releases are told as differences from the one before. Layouts named after a DDS implementation have
-its `dds:*` events as well, which only forks of Fast DDS and Cyclone DDS have.
+Each release is described by its differences from the one before. Layouts named after a DDS
+implementation have its `dds:*` events as well, which only forks of Fast DDS and Cyclone DDS have.
 """
 
 from __future__ import annotations

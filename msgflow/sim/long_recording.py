@@ -1,4 +1,4 @@
-"""Half an hour of Humble with a camera: big messages, few of them, and a clock that is slewed."""
+"""Long recording: half an hour of Humble with few, big messages and a clock that is slewed."""
 
 from __future__ import annotations
 

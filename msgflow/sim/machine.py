@@ -1,4 +1,4 @@
-"""Hosts, processes and threads of a running simulation: who writes into which stream."""
+"""Machines, processes and threads of a running simulation: which stream each writes."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class AddressSpace:
         return self._thread_stack - _ALIGNMENT * self._random.randrange(1, 500)
 
     def garbage(self, size: int) -> bytes:
-        """Bytes that nobody initialised."""
+        """Bytes that were never initialised."""
         return self._random.randbytes(size)
 
 

@@ -1,4 +1,4 @@
-"""What exists in running processes: publishers, subscriptions, timers, buffers, and messages.
+"""Objects of running processes: publishers, subscriptions, timers, buffers, and messages.
 
 They refer to each other; what happens to them lies above: `transport`, `publish`, `take`,
 `callbacks`.

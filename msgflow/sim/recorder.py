@@ -1,4 +1,4 @@
-"""Records what happens on a host: which traces there are, and what is missing from them."""
+"""Recorder of a host: which traces it has, and what is missing from them."""
 
 from __future__ import annotations
 

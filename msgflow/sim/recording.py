@@ -1,4 +1,4 @@
-"""How a system is recorded: data only, no behaviour. The default recording is perfect."""
+"""Recording: how a system is recorded, as data without behaviour. The default is perfect."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What the middleware layer and DDS do with a message: stamp it and write it, or read it.
+"""The middleware layer (rmw) and DDS: they stamp and write a message, or read it.
 
-Who makes the source stamp and when, and which `dds:*` events tell of it, is the layout's.
+The layout says which of them makes the source stamp and when, and which `dds:*` events there are.
 """
 
 from __future__ import annotations

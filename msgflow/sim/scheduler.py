@@ -1,4 +1,4 @@
-"""The heart of the simulation: what happens next, in the order of time."""
+"""Scheduler of the simulation: what happens next, in the order of time."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ class ServiceNetwork:
         self._services[service.name] = service
 
     def send_request(self, time: int, request: Request) -> None:
-        """Send a request, to nobody if there is no such service."""
+        """Send a request; without such a service it is lost."""
         self._requests.append(request)
         service = self._services.get(request.client.name)
         if service is not None and not service.process.is_stopped:

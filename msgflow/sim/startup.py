@@ -1,4 +1,4 @@
-"""From rcl_init to spin: the events of a starting process, in the order of its release of ROS 2.
+"""Startup of a process, from rcl_init to spin: its events, in the order of its release of ROS 2.
 
 The steps are separate, so that other processes start meanwhile.
 """

@@ -1,4 +1,4 @@
-"""What a simulated ROS 2 system consists of: data only, no behaviour.
+"""Systems to simulate: hosts, processes, nodes and executors, as data without behaviour.
 
 All durations are nanoseconds. A scenario is immutable; `dataclasses.replace` makes variants of one.
 """
@@ -46,7 +46,7 @@ class Executor:
     Attributes:
         kind: 'single_threaded', 'multi_threaded', 'static_single_threaded' (without executor
             events), 'wait_set' (user code that waits and takes by itself: neither executor events
-            nor callbacks), 'nested' (nobody spins it but callbacks that wait for something).
+            nor callbacks), 'nested' (only callbacks spin it, which wait for something).
         thread_count: its threads; the first one of the first executor is the main thread.
     """
 

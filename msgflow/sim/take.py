@@ -1,4 +1,4 @@
-"""One message is handed over to a subscription: the layers of a take, and the truth about it."""
+"""Takes: the layers that hand a message over to a subscription, and the truth about it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Taken:
         take_id: of the truth.
         message: what was taken.
         time: when it was (rmw_take or dequeue, or when it would have been emitted).
-        rmw_ns: its events; None where there is none.
+        rmw_ns: time of its event, None without one; likewise `rcl_ns`, `rclcpp_ns`, `dequeue_ns`.
         is_copy: the same message comes through an intra-process buffer; this one is ignored.
         is_replay: kept by the publisher from before the subscription was there.
     """

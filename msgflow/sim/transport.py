@@ -1,4 +1,4 @@
-"""The middleware: who has discovered whom, and where messages wait."""
+"""Transport of messages by the middleware: who has discovered whom, and where messages wait."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Middleware:
                     publisher.history = None
 
     def send(self, time: int, message: Message) -> None:
-        """Send a message at `time` to whom the publisher knows."""
+        """Send a message at `time` to the subscriptions that the publisher knows."""
         scheduler, publisher = self._scheduler, message.publisher
         self.remember(message)
         if publisher.history is not None:
@@ -114,7 +114,7 @@ class Middleware:
             publisher.sent.append(message)
 
     def miss(self, message: Message, match: Match, time: int) -> None:
-        """A message was published at `time` for somebody who does not listen then."""
+        """A message was published at `time` for a subscription that does not listen then."""
         subscription = match.subscription
         if subscription.ended is not None:
             self.drop(message, subscription, "subscription_ended")

@@ -1,4 +1,4 @@
-"""What really happened in a simulation, written as it happens: one Parquet file per table.
+"""Truth about a simulation, written as it happens: one Parquet file per table.
 
 See the docstring of `msgflow.sim` for the columns.
 """

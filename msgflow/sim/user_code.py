@@ -1,4 +1,4 @@
-"""What user code does in a callback, or instead of one."""
+"""User code in a callback, or instead of one."""
 
 from __future__ import annotations
 

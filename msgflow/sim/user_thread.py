@@ -1,4 +1,4 @@
-"""A thread of the user that creates and destroys subscriptions while executors spin."""
+"""User threads: they create and destroy subscriptions while executors spin."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which files are archives of traces, by their names."""
+"""Archives of traces, recognised by the names of their files."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SUFFIXES = (".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst", ".tar.xz", ".txz", ".zip")
-"""Ends of the names of archives that can be read."""
+"""How the names of archives end that can be read."""
 
 
 def is_archive(path: Path) -> bool:
-    """Tell whether this is a file whose name says that it is an archive which can be read."""
+    """Tell whether this is a file with the name of an archive that can be read."""
     return path.name.lower().endswith(SUFFIXES) and path.is_file()
 
 

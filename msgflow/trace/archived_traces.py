@@ -29,7 +29,7 @@ _PREFIX = "msgflow-"
 class Unpacked:
     """Directories in place of archives, in the temporary directory (TMPDIR).
 
-    They are gone after `remove`, or when nobody holds this any more.
+    They are removed by `remove`, or when this object is dropped.
 
     Attributes:
         paths: the paths given, archives replaced by the directories they were unpacked to.

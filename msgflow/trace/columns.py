@@ -37,7 +37,7 @@ def can_hold(wanted: pa.DataType, declared: pa.DataType) -> bool:
 
 
 def union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
-    """Return the type that holds values of both, None if there is none."""
+    """Return the type that holds values of both, None if no type does."""
     if first.equals(second):
         return first
     if pa.types.is_integer(first) and pa.types.is_integer(second):

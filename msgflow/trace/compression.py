@@ -1,4 +1,4 @@
-"""Reads compressed files, whichever of the usual compressions they have."""
+"""Compressed files: gzip, xz and Zstandard, recognised by their first bytes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ UNPACKABLE = (RuntimeError, NotImplementedError)
 
 
 def open_plain(file: IO[bytes]) -> Any:
-    """Return the content of a file without its compression, of which the first bytes tell.
+    """Return the content of a file, decompressed as its first bytes say.
 
     It has a method `read`, which raises one of `CORRUPT` where the file is damaged.
     """

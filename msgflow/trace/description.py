@@ -38,7 +38,7 @@ def description(
         environment: the `env` of the metadata.
         clock: the clock of the events.
         begins: when the streams begin, by this clock [ns since the epoch].
-        ends: when the streams end, likewise.
+        ends: when the streams end, by this clock [ns since the epoch].
         events: the name of each event class and the names of its contexts.
         has_time: the events have times.
     """

@@ -1,4 +1,4 @@
-"""Finds the CTF traces below given paths."""
+"""Discovery of the CTF traces below given paths."""
 
 from __future__ import annotations
 

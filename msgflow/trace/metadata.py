@@ -1,6 +1,6 @@
-"""What kind of metadata a trace has, and whether its frame is whole.
+"""Metadata of a trace: its kind, and whether its frame is whole.
 
-Only the frame is looked at, so that no reader meets a file that is something else or cut off.
+This module looks only at the frame, so that no reader meets a file that is cut off or no metadata.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def content_of(directory: Path) -> bytes:
     """Return the metadata file of the trace in this directory.
 
     Raises:
-        OSError: it cannot be read, or is none that a tracer could have written.
+        OSError: it cannot be read, or no tracer could have written it.
     """
     return read_regular(directory / FILE_NAME, _MOST_BYTES)
 

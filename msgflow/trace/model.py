@@ -1,4 +1,4 @@
-"""What a trace is to the rest of msgflow: where it lies, what it says of itself, what it yields."""
+"""Traces as the rest of msgflow sees them: location, description, batches, progress, damage."""
 
 from __future__ import annotations
 

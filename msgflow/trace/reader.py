@@ -1,4 +1,4 @@
-"""Opens traces: finds them, unpacks archives and chooses the reader."""
+"""Reader of traces, chosen by name; finds the traces and unpacks archives first."""
 
 from __future__ import annotations
 

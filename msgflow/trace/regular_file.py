@@ -32,7 +32,7 @@ def read_regular(path: Path, most_bytes: int | None, size: int = -1) -> bytes:
         UnsuitableFileError: it is a pipe, a device or the like, or longer than `most_bytes`.
         OSError: it cannot be read.
     """
-    # A pipe that nobody writes to would keep a blocking `open` waiting.
+    # A blocking `open` of a pipe without a writer would wait for ever.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
@@ -57,7 +57,7 @@ def irregular(path: Path) -> str | None:
 
 
 def unreadable_error(error: OSError, directory: Path) -> TraceError:
-    """Return the error for a trace of which a file cannot be read, with what helps."""
+    """Return the error for a trace with a file that cannot be read, and a hint."""
     if isinstance(error, UnsuitableFileError):
         hint = "put the file there that was recorded: copy the trace again, with cp -rL"
     elif error.errno in {errno.EACCES, errno.EPERM}:

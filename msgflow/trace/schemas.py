@@ -1,4 +1,4 @@
-"""The columns that every reader delivers."""
+"""Schemas of the batches that every reader delivers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One time base for the traces of one boot.
+"""Time base of the traces of one boot.
 
 A tracer measures how far its clock is from the epoch for every trace anew, with buffers per process
 for every process. The clock itself is the same for all traces of a boot, as its uuid says: what the

@@ -90,7 +90,7 @@ class TraceSet(ABC):
 
 
 class ExclusiveTraceSet(TraceSet):
-    """Traces of which one iteration at a time can be under way."""
+    """A set that allows one iteration at a time."""
 
     def __init__(self) -> None:
         self.event_counts: Mapping[tuple[int, str], int] = {}

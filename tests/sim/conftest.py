@@ -169,7 +169,7 @@ def read(bt2: ModuleType) -> Callable[[Simulation], Recording]:
 
 @pytest.fixture
 def quiet() -> Scenario:
-    """Two processes of which hardly anything is heard: one message in ten seconds."""
+    """Two processes that hardly say anything: one message in ten seconds."""
     talker = Node(
         "talker",
         publishers=(Publisher("/seldom"),),

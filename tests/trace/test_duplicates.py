@@ -93,7 +93,7 @@ def test_losses_of_a_skipped_packet_do_not_count(tmp_path: Path, open_traces: Op
         write_trace(tmp_path / name, TraceContent({"ros2:x": {"n": "u64"}}, streams))
     with open_traces(tmp_path) as traces:
         rows = [r for b in traces.batches() if b.name == PACKET for r in b.batch.to_pylist()]
-    # Which of the five were in the packets that are missing, nobody counted.
+    # Nothing tells how many of the five were in the packets that are missing.
     assert [row["discarded_event_count"] for row in rows] == [0, None]
     assert [row["lost_packet_count"] for row in rows] == [0, 2]
 

@@ -1,4 +1,4 @@
-"""Values, types and counts of events, on traces of which every byte is known."""
+"""Values, types and counts of events, on traces whose every byte is known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A small writer of CTF 1.8 as LTTng-UST writes it on x86-64: packed, little endian.
+"""Writer of CTF 1.8 as LTTng-UST writes it on x86-64: packed, little endian.
 
 It knows layouts and bytes, nothing of ROS 2 or of the simulation.
 """

@@ -1,4 +1,4 @@
-"""The metadata file: TSDL 1.8 text in packets.
+"""Metadata file: TSDL 1.8 text in packets.
 
 The text declares what LTTng declares, the unused compact event header included, so that readers of
 our traces meet what they meet in recorded ones.

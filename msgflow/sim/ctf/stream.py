@@ -1,4 +1,4 @@
-"""The events of one CPU in packets: stream files and their index files."""
+"""Streams: the events of one CPU in packets, with their index files."""
 
 from __future__ import annotations
 

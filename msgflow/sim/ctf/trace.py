@@ -1,4 +1,4 @@
-"""A whole trace: directory, metadata, one stream per CPU."""
+"""Traces: directory, metadata, one stream per CPU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One event class, ready to make records: large event header, thread context, payload."""
+"""Tracepoints: event classes that make records of header, thread context and payload."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why messages do not arrive."""
+"""Messages that do not arrive, for every reason."""
 
 from __future__ import annotations
 

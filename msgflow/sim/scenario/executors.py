@@ -26,7 +26,7 @@ _WORKER = Node(
 
 
 def multi_threaded() -> Scenario:
-    """Four threads, of which several run the same reentrant callback."""
+    """Four threads; several of them run the same reentrant callback."""
     return Scenario(
         name="multi_threaded",
         description="Four threads of one executor, a reentrant callback on several at once.",

@@ -19,7 +19,7 @@ _FILTER = Node(
         Subscription("/image_info", intra_process=True),
     ),
 )
-# Too slow for what it gets: its buffer holds three messages, of which old ones are overwritten.
+# Too slow for what it gets: its buffer holds three messages and overwrites old ones.
 _SLOW = Node(
     "slow",
     executor=1,
