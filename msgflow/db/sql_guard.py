@@ -1,9 +1,11 @@
 """The guard of SQL that users write: one query, or EXPLAIN of one, which cannot change anything.
 
-DuckDB's parser tells what kind of statement a text is. That is not enough: `WITH x AS (COPY … TO
-'file') FROM x` is a SELECT, and DuckDB lets it write to the log beside a read-only database. DuckDB
-allows such a WITH at the top of a statement only. Hence a query runs as a subquery. Which files a
-query can read is up to the sandbox of its connection (`msgflow/db/sandbox.py`).
+DuckDB's parser tells what kind of statement a text is. That is not enough: `WITH x AS (DELETE FROM
+…) FROM x` is a SELECT, and so is the same with COPY. The first changes a database in memory, which
+`fleet sql` reads; the second can write to the log and the spill directory of a read-only file,
+depending on the version of DuckDB. DuckDB allows such a WITH at the top of a statement only. Hence
+a query runs as a subquery. Which files a query can read is up to the sandbox of its connection
+(`msgflow/db/sandbox.py`).
 """
 
 from __future__ import annotations

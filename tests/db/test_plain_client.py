@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,10 @@ FILL = (
 
 
 @pytest.fixture(scope="module")
-def filled(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def filled(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    # Of tables without rows, DuckDB expects no row of anything.
     path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
-    shutil.copyfile(empty_database, path)
+    shutil.copyfile(simulated("demo", 0.05), path)
     with duckdb.connect(str(path)) as con:
         for statement in FILL:
             con.execute(statement)

@@ -53,9 +53,6 @@ def test_chains_are_no_more_than_their_limits(
     explain = f"EXPLAIN (FORMAT json) SELECT path_id FROM derive.flow_chain({chains})"
     (plan,) = json.loads(con.execute(explain).fetchall()[0][1])
     con.close()
-    expected = [
-        int(node["extra_info"]["Estimated Cardinality"])
-        for node in nodes(plan)
-        if "LIMIT" in node["name"].upper()
-    ]
-    assert expected == [most]
+    (limit,) = [node["extra_info"] for node in nodes(plan) if "LIMIT" in node["name"].upper()]
+    assert int(limit["Limit"]) == most
+    assert int(limit["Estimated Cardinality"]) <= most
