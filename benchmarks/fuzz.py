@@ -12,7 +12,7 @@ Counted are, by kind of input:
 - traceback: one is printed; mistake: an error says "mistake of msgflow"; crash: the process ends by
   a signal; hang: it takes longer, or more output, than it may;
 - damage: a failed ingest changed the database, or a stored run does not pass `db check`;
-- unreported: a query answers otherwise than without the change, and no diagnostic, warning or error
+- unreported: a query answers otherwise than without the change, and no finding, warning or error
   says that anything was wrong.
 
 Bytes of a payload, and names in the metadata, are protected by nothing in the format: such changes
@@ -198,12 +198,10 @@ def commands(database: Path, traces: Sequence[Path], options: Sequence[str]) -> 
     found["damaged"] = False
     try:
         with open_db(database) as opened:
-            found["reports"] = [str(opened.findings()), written(opened, "info-diagnostics")]
+            found["reports"] = [str(opened.findings()), written(opened, "info-findings")]
             results = [written(opened, query) for query in QUERIES]
             if traces:
-                found["damaged"] = any(
-                    check.row_count and check.severity == "error" for check in opened.check()
-                )
+                found["damaged"] = bool(opened.check())
         found["results"] = results
     except MsgflowError as error:
         print(f"error: {error}", file=sys.stderr)

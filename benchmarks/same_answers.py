@@ -6,7 +6,8 @@
 Each checkout ingests the same traces into a new database: those that `msgflow simulate NAME` of
 BEFORE writes, with the options given there, and the recorded ones in ../shared/traces where that
 folder exists. Then every public view, every table macro of whole runs or of a few messages, and
-every named query are read in both, and findings and audits. AFTER is this checkout when left out.
+every named query are read in both, findings, and the rules that are broken. AFTER is this checkout
+when left out.
 
 Prints a line for each difference: what it is of, and rows that only one of them has. Rows of views
 are compared in any order, those of queries in theirs. What the versions say of themselves does not
@@ -202,7 +203,7 @@ def read_all() -> None:
             result.to_parquet(folder / f"query {header.name}.parquet")
         told: dict[str, Sequence[Any]] = {
             "findings": opened.findings(run=1),
-            "audits": opened.check(),
+            "broken rules": opened.check(),
         }
     for name, items in told.items():
         rows = pyarrow.array([json.dumps(asdict(item)) for item in items], pyarrow.string())

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from types import TracebackType
 
-    from msgflow.db.check import CheckResult
     from msgflow.db.finding import Finding
     from msgflow.export.flow import Flow
     from msgflow.export.graph import Graph
@@ -713,24 +712,26 @@ class Database:
         connection = self.connection
         return self._ask(lambda: read_runs(connection))
 
-    def check(self) -> list[CheckResult]:
-        """Audit the content: one result per check below `schema/health/check`."""
-        from msgflow.db.check import run_checks
+    def check(self) -> list[Finding]:
+        """Return the rules of the database that are broken; none in a sound one."""
+        from msgflow.db.finding import audit
 
         connection = self.connection
-        return self._ask(lambda: run_checks(connection))
+        return self._ask(lambda: audit(connection))
 
     def findings(self, *, run: str | int | None = None) -> list[Finding]:
-        """Return the findings of a recording: errors first, each with cause and cure.
+        """Return what is wrong with a recording: errors, then warnings, with cause and cure.
+
+        The view `main.finding` has those of severity 'info' too.
 
         Args:
             run: 'all', a name or an id; the latest run when None.
         """
-        from msgflow.db.finding import find
+        from msgflow.db.finding import read_findings
 
         connection = self.connection
         runs = self._ask(lambda: Slice(run).runs(connection))
-        return self._ask(lambda: find(connection, [one.run_id for one in runs]))
+        return self._ask(lambda: read_findings(connection, [one.run_id for one in runs]))
 
     def export_parquet(
         self,

@@ -206,9 +206,9 @@ CREATE TABLE store.gap (
     run_id BIGINT NOT NULL, trace_id BIGINT NOT NULL, cpu INTEGER, kind VARCHAR NOT NULL,
     start_ns BIGINT, end_ns BIGINT, event_count BIGINT
 );
-CREATE TABLE store.diagnostic (
-    run_id BIGINT NOT NULL, trace_id BIGINT, name VARCHAR NOT NULL, severity VARCHAR NOT NULL,
-    count BIGINT, detail VARCHAR
+CREATE TABLE store.finding (
+    run_id BIGINT NOT NULL, trace_id BIGINT, name VARCHAR NOT NULL, subject VARCHAR, count BIGINT,
+    detail VARCHAR
 );
 CREATE TABLE store.publisher (
     publisher_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL,

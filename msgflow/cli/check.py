@@ -2,49 +2,49 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import textwrap
 from dataclasses import asdict
-from enum import StrEnum
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from msgflow.cli.options import DatabaseOption, MemoryLimitOption, RunOption, format_option
+from msgflow.cli.options import (
+    DatabaseOption,
+    FormatOption,
+    MemoryLimitOption,
+    OutputOption,
+    RunOption,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from msgflow.db.finding import Finding
+    from msgflow.export.formats import Format
 
 _WIDTH = 100
-_PLACES_SHOWN = 10
-
-
-class CheckFormat(StrEnum):
-    """Formats of findings."""
-
-    TABLE = "table"
-    JSON = "json"
+PLACES_SHOWN = 10
 
 
 def command(
     run: RunOption = None,
-    form: Annotated[CheckFormat, format_option("How to write it")] = CheckFormat.TABLE,
+    form: FormatOption = None,
+    output: OutputOption = None,
     memory_limit: MemoryLimitOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
-    With warnings only, the exit code is 0. An audit of the database that failed
-    when the run was ingested (msgflow db check) is a finding too. Of a run with
-    several clocks it is said how far their times can be compared.
+    With warnings only, the exit code is 0. A rule of the database that was broken
+    when the run was ingested (msgflow db check) is shown too. If a run has several
+    clocks, the last line says how far their times can be compared. What is worth
+    knowing, but not wrong, is in the query info-findings.
     """
-    from msgflow.cli.output import count, print_lines, print_status
     from msgflow.database import Database
     from msgflow.query.clock_notes import clock_verdicts
 
@@ -54,25 +54,51 @@ def command(
         verdicts = clock_verdicts(opened.connection, runs, only_several=True)
         names = {known.run_id: known.title for known in opened.runs()}
     labels = names if run == "all" and len(names) > 1 else {}
-    print_lines(_json(findings) if form is CheckFormat.JSON else _text(findings, labels))
+    report(findings, form, output, run_labels=labels, notes=verdicts, of="recording")
+
+
+def report(
+    findings: Sequence[Finding],
+    form: Format | None,
+    output: Path | None,
+    *,
+    run_labels: Mapping[int, str],
+    notes: Sequence[str] = (),
+    of: str,
+) -> None:
+    """Print findings and how many they are, and end with exit code 1 on errors.
+
+    Args:
+        findings: errors first, those of one kind together.
+        form: what to write; chosen by the suffix of `output`, else numbered text, when None.
+        output: file to write; stdout when None.
+        run_labels: what to call each run; empty: runs are not named.
+        notes: lines to print before how many they are.
+        of: what they are about: 'recording' or 'database'.
+    """
+    import pyarrow as pa
+
+    from msgflow.cli.output import count, print_lines, print_result, print_status
+    from msgflow.db.finding import Finding
+    from msgflow.export.formats import Format
+    from msgflow.query.result import QueryResult
+
+    if output is None and form in (None, Format.TABLE):
+        print_lines(_text(findings, run_labels))
+    else:
+        columns = ["number", *Finding.__dataclass_fields__]
+        rows = [{"number": number, **asdict(finding)} for number, finding in _numbered(findings)]
+        table = pa.table({name: [row[name] for row in rows] for name in columns})
+        print_result(QueryResult(table, when_empty="no findings"), form, output)
+    for note in notes:
+        print_status(note)
     numbers = [
         count(len({f.name for f in findings if f.severity == severity}), severity)
         for severity in ("error", "warning")
     ]
-    for verdict in verdicts:
-        print_status(verdict)
-    print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
+    print_status(", ".join(numbers) if findings else f"nothing is wrong with the {of}")
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)
-
-
-def _json(findings: Sequence[Finding]) -> Iterator[str]:
-    yield "["
-    for position, (number, finding) in enumerate(_numbered(findings), start=1):
-        comma = "," if position < len(findings) else ""
-        row = {"number": number, **asdict(finding)}
-        yield f"  {json.dumps(row, ensure_ascii=False)}{comma}"
-    yield "]"
 
 
 def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
@@ -88,7 +114,7 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
     from msgflow.text.wrapping import wrap
 
     def fitting(text: str, room: int) -> list[str]:
-        # In a pipe each text stays in one line, so that grep finds it.
+        # In a pipe what people search for stays in one line.
         return wrap(text, room) if is_screen() else [text]
 
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)
@@ -100,14 +126,14 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
         head, *more = fitting(f"{first.severity}: {first.title} ({first.name})", width - 4)
         yield f"{number}. {head}"
         yield from (f"   {line}" for line in more)
-        for finding in places[:_PLACES_SHOWN]:
+        for finding in places[:PLACES_SHOWN]:
             run = f"run {run_labels[finding.run_id]}: " if run_labels else ""
             text = f"{format_cell(run + finding.subject)} — {format_cell(finding.detail)}"
             first_line, *more = fitting(text, width - 5)
             yield f"   {first_line}"
             yield from (f"     {line}" for line in more)
-        if len(places) > _PLACES_SHOWN:
-            yield f"   … and {len(places) - _PLACES_SHOWN} more; --format json has them all"
+        if len(places) > PLACES_SHOWN:
+            yield f"   … and {len(places) - PLACES_SHOWN} more; --format json has them all"
         for label, text in (
             ("means", first.description),
             ("cause", first.cause),

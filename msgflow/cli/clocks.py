@@ -45,7 +45,7 @@ def apply(
                     f"by {messages:,} messages and {packets:,} network packets:"
                     " msgflow clocks pairs"
                 )
-            findings = opened.query("info-diagnostics", run=one.run_id).to_arrow().to_pylist()
+            findings = opened.query("info-findings", run=one.run_id).to_arrow().to_pylist()
             for finding in findings:
                 if finding["name"].startswith("clock_"):
                     print_note(f"{finding['name']}: {finding['detail']}")

@@ -6,7 +6,6 @@ import typer
 
 from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
 from msgflow.default_files import DEFAULT_DATABASE
-from msgflow.errors import ExitCode
 
 app = typer.Typer()
 
@@ -29,39 +28,21 @@ def upgrade(database: DatabaseOption = DEFAULT_DATABASE) -> None:
 @app.command("check")
 def check(
     form: FormatOption = None,
-    wide: WideOption = False,
     output: OutputOption = None,
     database: DatabaseOption = DEFAULT_DATABASE,
 ) -> None:
-    """Audit the database itself: whether its tables agree with each other.
+    """Check the database itself: whether its tables agree with each other.
 
     What is wrong with a recording, with cause and cure, is shown by `msgflow check`. The exit code
-    is 1 when an audit finds an error.
+    is 1 when a rule is broken.
     """
-    import pyarrow
-
-    from msgflow.cli.output import is_screen, print_note, print_result
+    from msgflow.cli.check import report
     from msgflow.database import Database
-    from msgflow.query.result import QueryResult
 
     with Database(database) as opened:
-        results = opened.check()
-    table = pyarrow.table(
-        {
-            "check": pyarrow.array([result.name for result in results], "string"),
-            "severity": pyarrow.array([result.severity for result in results], "string"),
-            "offending_rows": pyarrow.array([result.row_count for result in results], "int64"),
-            "description": pyarrow.array([result.description for result in results], "string"),
-        }
-    )
-    is_short = form is None and output is None and not wide and is_screen()
-    columns = "check,severity,offending_rows" if is_short else None
-    print_result(QueryResult(table), form, output, wide=wide, columns=columns)
-    for result in results:
-        if is_short and result.row_count:
-            print_note(f"{result.name} does not hold: {result.description}")
-    if any(result.row_count and result.severity == "error" for result in results):
-        raise typer.Exit(ExitCode.FAILED)
+        findings = opened.check()
+        names = {known.run_id: known.title for known in opened.runs()}
+    report(findings, form, output, run_labels=names, of="database")
 
 
 @app.command("schema")

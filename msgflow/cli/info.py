@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from msgflow.query.result import QueryResult
 
 _PREFIX = "info-"
-SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "diagnostics")
+SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
 
 
 class InfoFormat(StrEnum):

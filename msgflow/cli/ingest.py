@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from msgflow.cli.check import PLACES_SHOWN
 from msgflow.cli.options import (
     DatabaseOption,
     Reader,
@@ -136,9 +138,15 @@ def _print_report(report: IngestReport, database: Path) -> None:
         f"{count(report.event_count, 'event')} read into {database} as run"
         f" {report.run_name} ({report.run_id}) in {report.seconds:.1f} s, {rate:,.0f} events/s"
     )
-    for diagnostic in report.diagnostics:
-        if diagnostic.severity != "info":
-            print_note(f"{diagnostic.name} ({diagnostic.count}): {diagnostic.detail}")
+    notable = (finding for finding in report.findings if finding.severity != "info")
+    for name, group in groupby(notable, key=lambda finding: finding.name):
+        places = list(group)
+        for finding in places[:PLACES_SHOWN]:
+            is_whole = finding.trace_id is not None or finding.subject == f"the {finding.phase}"
+            place = "" if is_whole else f"{finding.subject} — "
+            print_note(f"{name} ({finding.count}): {place}{finding.detail}")
+        if len(places) > PLACES_SHOWN:
+            print_note(f"{name}: {len(places) - PLACES_SHOWN} more places: msgflow check")
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

@@ -35,7 +35,7 @@ def apply(
                 f" {count(one.link_count, 'indirect link')} between messages"
                 f"{traced if one.traced_link_count else ''}"
             )
-            findings = opened.query("info-diagnostics", run=one.run.run_id).to_arrow().to_pylist()
+            findings = opened.query("info-findings", run=one.run.run_id).to_arrow().to_pylist()
             for finding in findings:
                 if finding["name"] == "contradictory_annotations":
                     print_note(f"{finding['name']} ({finding['count']}): {finding['detail']}")

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.db.derive import derive_from_clocks
-from msgflow.db.noted import forget, note
 from msgflow.db.runs import change_runs
 from msgflow.sql.statement import internal_sql
 
@@ -76,7 +75,7 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
     """
     _correct(con, f"({internal_sql().text('clock_as_recorded')})", {"run_id": run_id})
     con.execute("DELETE FROM store.clock_uncertainty WHERE run_id = ?", [run_id])
-    forget(con, run_id, "clocks")
+    con.execute("UPDATE store.run SET clock_sync = ? WHERE run_id = ?", [sync.method, run_id])
     if sync.method == "messages":
         con.execute(
             "CREATE OR REPLACE TEMP TABLE clock_synchronised AS\n"
@@ -85,7 +84,6 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
         )
         _correct(con, "(FROM clock_synchronised WHERE is_connected)")
         con.execute(_BOUNDS, {"run_id": run_id})
-        note(con, run_id, "clocks")
         con.execute("DROP TABLE temp.clock_synchronised")
     elif sync.method == "file":
         _set_given(con, run_id, sync)

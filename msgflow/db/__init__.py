@@ -1,1 +1,1 @@
-"""The database: definition of its tables, connections, migrations, views and audits."""
+"""The database: definition of its tables, connections, migrations, views and findings."""

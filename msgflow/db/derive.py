@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.noted import forget, note
+from msgflow.db.finding import kinds_of, store_findings
 from msgflow.db.tables import STORE
 
 if TYPE_CHECKING:
@@ -45,8 +45,6 @@ def derive(
     if synchronise is not None:
         synchronise()
     derive_from_clocks(con, run_id)
-    forget(con, run_id, "links")
-    note(con, run_id, "links")
     con.execute(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [derivation_hash(), run_id],
@@ -54,10 +52,20 @@ def derive(
 
 
 def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Derive the tables anew that depend on corrected clocks, inside the open transaction."""
+    """Derive anew what depends on corrected clocks, and all findings of the recording.
+
+    This happens inside the open transaction.
+    """
     for name in derived_tables():
         if _reads_clocks(name):
             derive_table(con, name, run_id)
+    derive_findings(con, run_id)
+
+
+def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Find anew what a recording shows, inside the open transaction."""
+    kinds = kinds_of("recording")
+    store_findings(con, run_id, [kind for kind in kinds if _may_have_rows(con, kind, run_id)])
 
 
 @cache
@@ -81,22 +89,20 @@ def _reads_clocks(name: str) -> bool:
 
 @cache
 def derivation_hash() -> str:
-    """Return the SHA-256 of the SQL that derives the stored tables and the learned topics."""
-    names = objects.sources_of([_TOPICS, *(f"derive.{name}" for name in derived_tables())])
-    return objects.hash_of(
-        text
-        for header in objects.views()
-        if header.name in names
-        for text in (header.name, header.body)
-    )
+    """Return the SHA-256 of the SQL that derives stored tables, learned topics and findings."""
+    found = objects.load("health/recording")
+    tables = (f"derive.{name}" for name in derived_tables())
+    needs = (need for header in found for need in header.needs)
+    names = objects.sources_of([_TOPICS, *tables, *needs])
+    headers = [*(header for header in objects.views() if header.name in names), *found]
+    return objects.hash_of(text for header in headers for text in (header.name, header.body))
 
 
 def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None:
     """Derive one of `derived_tables` anew, inside the open transaction."""
     columns = ", ".join(STORE.tables[f"store.{name}"].columns.keys())
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
-    when = _header(f"derive.{name}").when
-    if when and not any(_has_rows(con, each, run_id) for each in when):
+    if not _may_have_rows(con, _header(f"derive.{name}"), run_id):
         return
     con.execute(
         f"INSERT INTO store.{name} ({columns}) SELECT {columns} FROM {_of_run(f'derive.{name}')}",
@@ -104,9 +110,12 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     )
 
 
-def _has_rows(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> bool:
-    """Tell whether a table, view or macro has a row of a run."""
-    return bool(con.execute(f"SELECT 1 FROM {_of_run(name)} LIMIT 1", [run_id]).fetchall())
+def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:
+    """Tell whether an object may have rows of a run, by what `when` of its header says."""
+    return not header.when or any(
+        con.execute(f"SELECT 1 FROM {_of_run(name)} LIMIT 1", [run_id]).fetchall()
+        for name in header.when
+    )
 
 
 def _of_run(name: str) -> str:

@@ -1,82 +1,252 @@
-"""Findings: what is wrong with a recording, where it comes from, and what to do about it.
+"""Findings: what is worth knowing about the input, a recording or the database.
 
-`schema/health/finding` holds one finding per file, a query that returns a row for each place where
-it holds; its header has title, severity, phase, cause and cure.
+Each file of `schema/health` is one kind of finding: an SQL query that returns a row for each place
+where it holds, with title, description, severity, cause and cure in its header. Its folder is its
+phase, which decides when the query runs and what it reads:
+
+| phase | runs | reads |
+| --- | --- | --- |
+| input | once the model of an ingest is built | `staging` |
+| recording | whenever links or clocks of a run change | `store`, `derive`, `main` |
+| database | at the end of an ingest, and for `msgflow db check` | `store` |
+
+A query returns `count` and `detail`, and where it applies `subject` (the place, in words) and
+`trace_id`; those that do not read `staging` return `run_id` too, and may use `$run_id`. The rows
+are stored in `store.finding`. The view `main.finding` adds what the headers say.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
-from msgflow.db import objects
+from msgflow.resources import resource_directory
+from msgflow.sql.header import Header
+from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import duckdb
 
-    from msgflow.sql.header import Header
+PHASES = ("input", "recording", "database")
+SEVERITIES = ("error", "warning", "info")
 
-SEVERITIES = ("error", "warning")
+# Gives the columns that a query may leave out, and the types of all.
+_NO_ROW = (
+    "SELECT NULL::BIGINT AS run_id, NULL::BIGINT AS trace_id, NULL::VARCHAR AS subject, "
+    "NULL::BIGINT AS count, NULL::VARCHAR AS detail WHERE false"
+)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something wrong with the recording, at one place.
+    """Something worth knowing, at one place: a row of the view `main.finding`.
 
     Attributes:
-        name: which of `schema/health/finding`.
-        severity: 'error' where results are wrong or missing, 'warning' where they may be.
-        title: what was found.
         run_id: the run.
+        trace_id: the trace; None: not one trace alone.
+        name: kind of finding, which is its file in `schema/health`.
+        phase: what it is about: 'input', 'recording' or 'database'.
+        severity: 'error' where results are wrong or missing, 'warning' where they may be, or
+            'info'.
         subject: where: a trace, process, host, topic.
         count: how often.
         detail: numbers.
-        description: what it means for results.
         cause: where it comes from, as a rule.
         cure: what to do about it.
+        title: what was found.
+        description: what it means for results.
     """
 
-    name: str
-    severity: str
-    title: str
     run_id: int
+    trace_id: int | None
+    name: str
+    phase: str
+    severity: str
     subject: str
     count: int
     detail: str
-    description: str
     cause: str
     cure: str
+    title: str
+    description: str
 
 
-def find(con: duckdb.DuckDBPyConnection, run_ids: Sequence[int]) -> list[Finding]:
-    """Return all findings in these runs: errors first, those of one kind together."""
-    headers = sorted(
-        objects.load("health/finding"),
-        key=lambda header: (SEVERITIES.index(header.severity or "error"), header.name),
+@cache
+def kinds() -> tuple[Header, ...]:
+    """Return the headers of all kinds of findings, sorted by name."""
+    headers = (_statements().header(name) for name in _statements().names())
+    return tuple(header for header in headers if header.kind != "inline")
+
+
+def kinds_of(phase: str) -> tuple[Header, ...]:
+    """Return the headers of the kinds of a phase, sorted by name."""
+    return tuple(header for header in kinds() if phase_of(header) == phase)
+
+
+def phase_of(header: Header) -> str:
+    """Return the phase of a kind of finding."""
+    return header.path.parent.name
+
+
+def short_name(header: Header) -> str:
+    """Return the name of a kind of finding as people see it."""
+    return header.name.partition(".")[2]
+
+
+def composed(layer: str) -> tuple[Header, ...]:
+    """Return the objects of a layer of `schema/` that are made of all kinds of findings."""
+    if layer == "model":
+        description = "What was found in the input while it was read and the model was built."
+        rows = statement(kinds_of("input"))
+        return (_object("staging.finding", description, "one row per place", rows),)
+    if layer == "stat":
+        rows = "VALUES\n" + ",\n".join(map(_row, kinds()))
+        columns = "name, phase, severity, title, description, cause, cure"
+        return (
+            _object(
+                "derive.finding_kind",
+                "What can be found, and what the headers in `schema/health` say about it.",
+                "one row per kind of finding",
+                f"SELECT {columns}\nFROM (\n{rows}\n) AS kind ({columns})\n",
+            ),
+        )
+    return ()
+
+
+def statement(headers: Sequence[Header]) -> str:
+    """Return the SQL that finds the places of these kinds, with the columns of `store.finding`.
+
+    `run_id` is NULL in those of the phase input.
+    """
+    return "\nUNION ALL\n".join(
+        f"SELECT run_id, trace_id, '{short_name(header)}' AS name, subject, "
+        "count::BIGINT AS count, detail\n"
+        f"FROM (\n{_NO_ROW}\nUNION ALL BY NAME (\n{_statements().text(short_name(header))})\n)"
+        for header in headers
     )
-    return [finding for header in headers for finding in _findings(con, header, list(run_ids))]
 
 
-def _findings(con: duckdb.DuckDBPyConnection, header: Header, run_ids: list[int]) -> list[Finding]:
+def store_findings(con: duckdb.DuckDBPyConnection, run_id: int, headers: Sequence[Header]) -> None:
+    """Store what kinds of the phase recording find, in place of all that this phase had.
+
+    This happens inside the open transaction.
+    """
+    con.execute(
+        "DELETE FROM store.finding WHERE run_id = ? AND list_contains(?, name)",
+        [run_id, [short_name(header) for header in kinds_of("recording")]],
+    )
+    for header in headers:
+        con.execute(
+            f"INSERT INTO store.finding BY NAME FROM (\n{statement([header])}\n) "
+            "WHERE run_id = $run_id",
+            {"run_id": run_id},
+        )
+
+
+def store_audit(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Store the rules of the database that a new run breaks, inside the open transaction."""
+    for finding in audit(con, run_id):
+        con.execute(
+            "INSERT INTO store.finding (run_id, name, subject, count, detail) "
+            "VALUES (?, ?, ?, ?, ?)",
+            [run_id, finding.name, finding.subject, finding.count, finding.detail],
+        )
+
+
+def read_findings(
+    con: duckdb.DuckDBPyConnection, run_ids: Sequence[int], *, info: bool = False
+) -> list[Finding]:
+    """Return the stored findings of runs: errors first, those of one kind together.
+
+    Args:
+        con: connection to a current database.
+        run_ids: the runs.
+        info: those of severity 'info' too.
+    """
     rows = con.execute(
-        f"SELECT run_id, subject, count, detail FROM ({header.body}) "
-        "WHERE list_contains(?, run_id) ORDER BY ALL",
-        [run_ids],
+        f"SELECT {', '.join(Finding.__dataclass_fields__)} FROM main.finding "
+        "WHERE list_contains(?, run_id)",
+        [list(run_ids)],
     ).fetchall()
-    return [
-        Finding(
-            name=header.name.partition(".")[2],
-            severity=header.severity or "error",
-            title=header.title,
-            run_id=run_id,
-            subject=subject,
+    findings = (Finding(*row) for row in rows)
+    return sorted((each for each in findings if info or each.severity != "info"), key=_order)
+
+
+def audit(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
+    """Return the rules of the database that are broken now, in the order of `read_findings`.
+
+    Args:
+        con: connection to a current database.
+        run_id: look at this run only; at all runs when None.
+    """
+    found = (each for header in kinds_of("database") for each in _broken(con, header, run_id))
+    return sorted(found, key=_order)
+
+
+def _broken(
+    con: duckdb.DuckDBPyConnection, header: Header, run_id: int | None
+) -> Iterator[Finding]:
+    from msgflow.db.relation import broken_relations
+
+    values: dict[str, object] = {"run_id": run_id}
+    if header.params:
+        values["broken"] = broken_relations(con, run_id)
+    rows = con.execute(
+        f"FROM (\n{statement([header])}\n) WHERE run_id = coalesce($run_id, run_id)", values
+    ).fetchall()
+    for found_id, trace_id, name, subject, count, detail in rows:
+        yield Finding(
+            run_id=found_id,
+            trace_id=trace_id,
+            name=name,
+            phase="database",
+            severity=header.severity or "",
+            subject=subject or "the database",
             count=count,
             detail=detail,
-            description=header.description,
             cause=header.cause or "",
             cure=header.cure or "",
+            title=header.title,
+            description=header.description,
         )
-        for run_id, subject, count, detail in rows
-    ]
+
+
+def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:
+    severity = SEVERITIES.index(finding.severity)
+    count, detail = finding.count or 0, finding.detail or ""
+    return severity, finding.name, finding.run_id, finding.subject, count, detail
+
+
+def _row(header: Header) -> str:
+    texts = (
+        short_name(header), phase_of(header), header.severity, header.title, header.description,
+        header.cause, header.cure,
+    )  # fmt: skip
+    quoted = ("'" + (text or "").replace("'", "''") + "'" for text in texts)
+    return f"    ({', '.join(quoted)})"
+
+
+def _object(name: str, description: str, grain: str, body: str) -> Header:
+    return Header(
+        name=name,
+        title=name,
+        description=description,
+        grain=grain,
+        kind="view",
+        params=(),
+        columns=(),
+        severity=None,
+        cause=None,
+        cure=None,
+        note=None,
+        body=body,
+        path=_statements().directory,
+    )
+
+
+@cache
+def _statements() -> Statements:
+    return Statements(resource_directory("schema") / "health")

@@ -1,13 +1,15 @@
 """Names in a database, for completion in a shell: few, quick and silent.
 
-A shell asks again at every key. Hence this checks no schema and reports no error: there are just no
-names then.
+A shell asks again at every key. Hence this checks no schema and reports no error. A database that
+cannot be read has no names.
 """
 
 from __future__ import annotations
 
 from threading import Timer
 from typing import TYPE_CHECKING
+
+from msgflow.errors import DatabaseError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,22 +48,12 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
             services.
         prefix: how they begin.
     """
-    # DuckDB would wait for a pipe.
-    if not path.is_file():
-        return ()
     import duckdb
 
+    from msgflow.db.sandbox import open_file
+
     try:
-        connection = duckdb.connect(
-            str(path),
-            read_only=True,
-            config={
-                "enable_external_access": False,
-                "autoload_known_extensions": False,
-                "autoinstall_known_extensions": False,
-                "threads": 1,
-            },
-        )
+        connection = open_file(path, read_only=True)
         # Views of a foreign file could run for ever.
         timer = Timer(_SECONDS, connection.interrupt)
         timer.daemon = True
@@ -74,5 +66,5 @@ def known_names(path: Path, kind: str, prefix: str) -> Sequence[str]:
             connection.close()
             # A timer that outlives the program makes DuckDB's binding write to stderr.
             timer.join()
-    except (duckdb.Error, UnicodeError):
+    except (duckdb.Error, DatabaseError):
         return ()

@@ -12,7 +12,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgflow.db.diagnostic import composed
+from msgflow.db.finding import composed
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
 from msgflow.version import __version__
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 # Folders whose objects are in the database; each may need only itself and those to its left.
 PUBLIC = "public"
-# Diagnostics, which views combine.
-DIAGNOSTICS = "health/diagnostic"
+# Findings, of whose headers a view is made.
+HEALTH = "health"
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Schemas of a database: tables, objects derived from them, and objects for users.
 SCHEMAS = ("store", "derive", "main")
 
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
-_DECLARATION = ("tables/*.py", "table_*.py", "empty_database.py", "diagnostic.py")
+_DECLARATION = ("tables/*.py", "table_*.py", "empty_database.py", "finding.py")
 
 
 @cache
@@ -40,7 +40,7 @@ def load(layer: str) -> tuple[Header, ...]:
     """Return the objects of a folder of `schema/` and its subfolders, each after those it needs.
 
     `public` includes the views that `tables` declares, and takes from there the columns that a
-    header only names. Other folders include the objects that combine diagnostics.
+    header only names. Other folders include the objects that are made of all findings.
 
     Raises:
         ValueError: two objects need each other, or a column is declared nowhere.
@@ -118,7 +118,7 @@ def definition_hash() -> str:
 
     This reads the files without parsing them, so that a database opens quickly.
     """
-    return hash_of([*_texts((*VIEW_LAYERS, DIAGNOSTICS)), *_declaration()])
+    return hash_of([*_texts((*VIEW_LAYERS, HEALTH)), *_declaration()])
 
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.db.finding import Finding, find
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
@@ -33,7 +31,6 @@ QUERIES = (
     "timers",
     "service-latency",
     "data-quality",
-    "info-diagnostics",
 )
 
 
@@ -61,7 +58,7 @@ def answers() -> tuple[Answer, ...]:
             _statement("fleet_distribution"),
             "durations, periods, waits and latencies of transport in buckets that can be added up",
         ),
-        Answer(FINDING, _findings, "what is wrong with the recording, with cause and cure"),
+        Answer(FINDING, _findings, "the view finding: what is worth knowing, with cause and cure"),
         *(Answer(name.replace("-", "_"), _query(name), f"the query {name}") for name in QUERIES),
     )
 
@@ -81,11 +78,5 @@ def _query(name: str) -> Callable[[duckdb.DuckDBPyConnection, int], pa.Table]:
 
 
 def _findings(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
-    import pyarrow as pa
-
-    kinds = {"int": pa.int64(), "str": pa.string()}
-    schema = pa.schema(
-        [(field.name, kinds[str(field.type)]) for field in dataclasses.fields(Finding)]
-    )
-    rows = [dataclasses.asdict(finding) for finding in find(con, [run_id])]
-    return pa.Table.from_pylist(rows, schema=schema)
+    statement = "FROM main.finding WHERE run_id = $run_id ORDER BY ALL"
+    return con.sql(statement, params={"run_id": run_id}).to_arrow_table()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
+
+import pyarrow.compute as pc
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
@@ -92,7 +94,9 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
             ),
         )
     result = fleet_query(lake, _FINDINGS, where=where)
-    parts.add("page_finding?", _encoded(result, f"msgflow fleet query {_FINDINGS} {option}"))
+    wrong = result.table.filter(pc.not_equal(result.table["severity"], "info"))
+    command = f"msgflow fleet query {_FINDINGS} {option}"
+    parts.add("page_finding?", _encoded(replace(result, table=wrong), command))
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shlex.quote(lake.store.url)}"
     parts.add("page_failure?", encode(_with_time(failures), meta={"command": failed}))

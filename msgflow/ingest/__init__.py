@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from msgflow.ingest.ingest import Diagnostic, IngestProgress, IngestReport, ingest
+from msgflow.ingest.ingest import IngestProgress, IngestReport, ingest
 
-__all__ = ["Diagnostic", "IngestProgress", "IngestReport", "ingest"]
+__all__ = ["IngestProgress", "IngestReport", "ingest"]

@@ -16,16 +16,15 @@ import duckdb
 from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
 from msgflow.db import migrate
-from msgflow.db.check import run_checks
 from msgflow.db.connection import attach
 from msgflow.db.derive import derivation_hash, derive
+from msgflow.db.finding import read_findings, store_audit
 from msgflow.db.memory import (
     default_limit,
     ingest_memory_errors,
     limit_threads,
     set_memory_limit,
 )
-from msgflow.db.noted import note
 from msgflow.db.runs import require_run_name
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.store import delete, store
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from msgflow.clocks import ClockSync
+    from msgflow.db.finding import Finding
     from msgflow.links import LinksFile
     from msgflow.sql.interrupt import Interrupts
     from msgflow.trace import Progress
@@ -68,23 +68,13 @@ class IngestProgress:
 
 
 @dataclass(frozen=True)
-class Diagnostic:
-    """Something worth knowing about the input: a row of the view `diagnostic`."""
-
-    name: str
-    severity: str
-    count: int
-    detail: str
-
-
-@dataclass(frozen=True)
 class IngestReport:
     """What an ingest did.
 
     Attributes:
         run_id: the new run.
         run_name: its name.
-        diagnostics: what is worth knowing about the input.
+        findings: what is worth knowing about the input and the recording.
         event_count: events read.
         stage_seconds: wall time by stage [s], in the order of the stages.
         warnings: what went wrong after the run was stored, for people.
@@ -92,7 +82,7 @@ class IngestReport:
 
     run_id: int
     run_name: str
-    diagnostics: tuple[Diagnostic, ...]
+    findings: tuple[Finding, ...]
     event_count: int
     stage_seconds: Mapping[str, float]
     warnings: tuple[str, ...] = ()
@@ -245,7 +235,7 @@ def _write(
     keep_staging: Path | None,
     watch: _Watch,
     interrupts: Interrupts,
-) -> tuple[int, str, tuple[Diagnostic, ...]]:
+) -> tuple[int, str, tuple[Finding, ...]]:
     watch.enter("building the model")
     with staging.writing(con), _created_meanwhile(target):
         model.build(con, keep=keep_staging is not None)
@@ -264,7 +254,7 @@ def _write_run(
     given: tuple[LinksFile | None, ClockSync],
     watch: _Watch,
     interrupts: Interrupts,
-) -> tuple[int, str, tuple[Diagnostic, ...]]:
+) -> tuple[int, str, tuple[Finding, ...]]:
     con.begin()
     try:
         watch.enter("storing the run")
@@ -275,15 +265,15 @@ def _write_run(
             declare_links(con, run_id, declared)
         derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks))
         watch.enter("checking the database")
-        _check(con, run_id)
-        diagnostics = _diagnostics(con, run_id)
+        store_audit(con, run_id)
+        findings = tuple(read_findings(con, [run_id], info=True))
         interrupts.make_final()
         con.commit()
     except BaseException:
         with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
             con.rollback()
         raise
-    return run_id, run_name, diagnostics
+    return run_id, run_name, findings
 
 
 def _store(
@@ -332,24 +322,6 @@ def free_name(con: duckdb.DuckDBPyConnection, name: str) -> str:
 
 def _run_names(con: duckdb.DuckDBPyConnection) -> set[str]:
     return {name for (name,) in con.execute("SELECT name FROM store.run").fetchall()}
-
-
-def _check(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    failed = [
-        {"name": result.name, "row_count": result.row_count, "description": result.description}
-        for result in run_checks(con, run_id)
-        if result.row_count
-    ]
-    if failed:
-        note(con, run_id, "database", failed=failed)
-
-
-def _diagnostics(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Diagnostic, ...]:
-    rows = con.execute(
-        "SELECT name, severity, count, detail FROM main.diagnostic WHERE run_id = ? ORDER BY ALL",
-        [run_id],
-    ).fetchall()
-    return tuple(Diagnostic(*row) for row in rows)
 
 
 def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:

@@ -60,7 +60,7 @@ _WORDS = {
     "host": ("info-hosts",),
     "run": ("info-runs",),
     "proces": ("info-processes",),
-    "diagnostic": ("info-diagnostics",),
+    "diagnostic": ("info-findings",),
 }
 
 

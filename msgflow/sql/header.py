@@ -30,9 +30,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
 'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
 column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
-`severity`; findings and diagnostics have the `phase` of an ingest that they come from, and a
-`cause` and a `cure`, or instead of both the `finding` that has them. An object is made after all
-objects that its statement or its `when` names.
+`severity`, a `cause` and a `cure`. An object is made after all objects that its statement or its
+`when` names.
 
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
 steps: other statements stand before its own, each of the form
@@ -69,13 +68,11 @@ _RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
 _MINIMUM = re.compile(r"(-?\d+)\.\.")
 _REPEATABLE = ("param", "column")
 _SINGLE = (
-    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "phase",
-    "finding", "note", "when", "brief", "answer", "heading", "slowest",
+    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
+    "brief", "answer", "heading", "slowest",
 )  # fmt: skip
 _KINDS = ("view", "inline", "macro")
 _NOTES = ("clocks",)
-# Phases of an ingest that findings and diagnostics come from, in their order.
-PHASES = ("reading", "model", "clocks", "links", "database")
 
 
 class HeaderError(ValueError):
@@ -149,7 +146,7 @@ class Header:
             same, but never made a table) or 'macro' (the body is the whole statement).
         params: parameters in the order of the file.
         columns: output columns in the order of the file.
-        severity: severity of a check, finding or diagnostic, else None.
+        severity: severity of a finding, else None.
         cause: cause of a finding, else None.
         cure: remedy for a finding, else None.
         note: 'clocks' where rows compare times of several hosts, else None.
@@ -159,8 +156,6 @@ class Header:
         answer: columns that are shown also where they are 0 or empty throughout.
         heading: columns that stand once above their rows: the first says which rows these are.
         slowest: column by which rows are the slowest, else None.
-        phase: of a finding or diagnostic, one of `PHASES`, else None.
-        finding: of a diagnostic, the finding that has its cause and cure, else None.
         steps: what a query makes before, in order.
         when: tables and macros of a run; if none of them has a row, this has none.
     """
@@ -182,8 +177,6 @@ class Header:
     answer: tuple[str, ...] = ()
     heading: tuple[str, ...] = ()
     slowest: str | None = None
-    phase: str | None = None
-    finding: str | None = None
     steps: tuple[Step, ...] = ()
     when: tuple[str, ...] = ()
 
@@ -252,9 +245,6 @@ def parse(text: str, path: Path) -> Header:
     note = single.get("note")
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
-    phase = single.get("phase")
-    if phase is not None and phase not in PHASES:
-        raise _error(path, 1, f"phase {phase!r} is not one of {', '.join(PHASES)}")
     params = tuple(_param(field, path) for field in fields if field.key == "param")
     columns = tuple(_column(field, path) for field in fields if field.key == "column")
     _check_names(params, path)
@@ -281,8 +271,6 @@ def parse(text: str, path: Path) -> Header:
         answer=_names(single.get("answer", "")),
         heading=_names(single.get("heading", "")),
         slowest=single.get("slowest"),
-        phase=phase,
-        finding=single.get("finding"),
         steps=steps,
         when=_names(single.get("when", "")),
     )

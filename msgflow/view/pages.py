@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 import pyarrow as pa
 
-from msgflow.db.finding import find
+from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.clock_notes import clock_notes
@@ -219,7 +219,7 @@ class Pages:
 
     def _finding(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
-        findings = [asdict(found) for found in find(connection, [extent.run.run_id])]
+        findings = [asdict(found) for found in read_findings(connection, [extent.run.run_id])]
         fields = ("name", "severity", "title", "subject", "count", "detail", "description",
                   "cause", "cure")  # fmt: skip
         table = pa.table({field: [found[field] for found in findings] for field in fields})

@@ -12,6 +12,8 @@ import pytest
 from golden import insert
 from typer.testing import Result
 
+from msgflow.db.derive import derive_findings
+
 Msgflow = Callable[..., Result]
 
 
@@ -28,6 +30,7 @@ def _good(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
         insert(connection, "take", ["take_id", "method"], [["1", "rmw"]])
         insert(connection, "callback_instance", ["callback_instance_id", "end_ns"], [["1", "9"]])
         insert(connection, "executor_state", ["state"], [["wait"]])
+        insert(connection, "link_transport", ["publication_id", "take_id"], [["1", "1"]])
     return path
 
 
@@ -41,6 +44,8 @@ def add(path: Path, table: str, *rows: dict[str, str]) -> None:
     with duckdb.connect(str(path)) as connection:
         for row in rows:
             insert(connection, table, list(row), [list(row.values())])
+        for (run_id,) in connection.execute("SELECT run_id FROM store.run").fetchall():
+            derive_findings(connection, run_id)
 
 
 def pause() -> dict[str, str]:
@@ -123,3 +128,34 @@ def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) ->
     every = msgflow("check", "--run", "all", "--db", database).stdout
     assert "   run case (1): trace — 1 pause, " in every
     assert "   run other (2): everything — nothing was published" in every
+
+
+def test_broken_rules_of_the_database_are_shown_alike(
+    msgflow: Msgflow, fresh_database: Path
+) -> None:
+    sound = msgflow("db", "check", "--db", fresh_database)
+    assert (sound.exit_code, sound.stdout) == (0, "")
+    assert sound.stderr == "nothing is wrong with the database\n"
+    add(fresh_database, "run", {"run_id": "1", "name": "case"})
+    add(fresh_database, "gap", {"kind": "hole"})
+    result = msgflow("db", "check", "--db", fresh_database)
+    assert result.exit_code == 1
+    lines = result.stdout.splitlines()
+    assert lines[0] == "1. error: A row refers to one that does not exist (relation_is_kept)"
+    assert lines[1] == "   run case (1): gap.trace_id — identities that are no row of trace"
+    assert "2. error: A word is not of the vocabulary (vocabulary_is_closed)" in lines
+    assert result.stderr == "2 errors, 0 warnings\n"
+    rows = json.loads(msgflow("db", "check", "--format", "json", "--db", fresh_database).stdout)
+    assert [(row["number"], row["phase"], row["count"]) for row in rows] == [
+        (1, "database", 1),
+        (2, "database", 1),
+    ]
+
+
+def test_findings_are_written_to_a_file(msgflow: Msgflow, database: Path, tmp_path: Path) -> None:
+    add(database, "gap", pause())
+    result = msgflow("check", "-o", tmp_path / "found.csv", "--db", database)
+    assert result.stdout == ""
+    header, row = (tmp_path / "found.csv").read_text().splitlines()
+    assert header.startswith('"number","run_id","trace_id","name","phase","severity","subject"')
+    assert row.startswith('1,1,1,"tracing_paused","recording","warning","trace",1,')

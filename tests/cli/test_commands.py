@@ -164,11 +164,11 @@ def test_info_as_one_json_object(msgflow: Msgflow, small_database: Path) -> None
         "nodes",
         "topics",
         "counts",
-        "diagnostics",
+        "findings",
     ]
     assert [run["name"] for run in result["runs"]] == ["morning", "noon"]
     assert [process["pid"] for process in result["processes"]] == [43]
-    assert result["diagnostics"][0]["count"] == 7
+    assert result["findings"][0]["count"] == 7
 
 
 def test_info_as_markdown(msgflow: Msgflow, small_database: Path) -> None:

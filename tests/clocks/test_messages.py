@@ -15,6 +15,7 @@ from possible_lines import Bound, PossibleLines
 from thorough import examples
 
 from msgflow.clocks import read_clock_sync, set_clocks
+from msgflow.db.derive import derive_findings
 
 SECOND = 1_000_000_000
 MICROSECOND = 1_000
@@ -181,8 +182,9 @@ def test_clocks_are_joined_through_others_by_the_surest_way(
 
 
 def finding(connection: duckdb.DuckDBPyConnection) -> list[tuple[str, str]]:
+    derive_findings(connection, 1)
     return connection.execute(
-        "SELECT name, detail FROM main.diagnostic WHERE name LIKE 'clock%' ORDER BY ALL"
+        "SELECT name, detail FROM main.finding WHERE starts_with(name, 'clock_') ORDER BY ALL"
     ).fetchall()
 
 

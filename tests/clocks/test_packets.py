@@ -67,7 +67,7 @@ def require_truth(network: Network, clock: dict[str, Any]) -> None:
 
 
 def details(database: Path) -> dict[str, str]:
-    return dict(rows(database, "SELECT name, detail FROM diagnostic"))
+    return dict(rows(database, "SELECT name, detail FROM finding"))
 
 
 def links(database: Path) -> list[tuple[Any, ...]]:
@@ -135,7 +135,7 @@ def test_what_is_known_of_ros_does_not_change(make: Make, ingest: Ingest) -> Non
     database = ingest(network.directory, clock_sync="none")
     assert known() == before
     assert rows(database, "SELECT count(*) FROM link_packet") == [(2,)]
-    kinds = rows(database, "SELECT DISTINCT detail FROM diagnostic WHERE name = 'unknown_event'")
+    kinds = rows(database, "SELECT DISTINCT detail FROM finding WHERE name = 'unknown_event'")
     assert kinds == [
         ("events that are not in the catalogue and were not loaded: kernel events of 1 names",)
     ]
@@ -258,7 +258,7 @@ def test_a_kernel_trace_without_packets_is_said(make: Make, ingest: Ingest) -> N
     network.write(with_network=False)
     database = ingest(network.directory)
     assert "enable net_dev_queue and net_if_receive_skb" in details(database)["no_network_packets"]
-    assert rows(database, "SELECT count(*) FROM diagnostic WHERE name = 'no_network_packets'") == [
+    assert rows(database, "SELECT count(*) FROM finding WHERE name = 'no_network_packets'") == [
         (2,)
     ]
 

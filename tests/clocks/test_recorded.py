@@ -38,7 +38,9 @@ def test_a_late_start_and_pauses_do_not_keep_clocks_apart(
     with open_db(tmp_path / "msgflow.duckdb") as database:
         database.ingest(shared_traces / "late_drift", clock_sync="messages")
         rows = database.query("clocks").to_arrow().to_pylist()
-        findings = database.sql("SELECT name FROM diagnostic WHERE name LIKE 'clock%'").to_arrow()
+        findings = database.sql(
+            "SELECT name FROM finding WHERE starts_with(name, 'clock_')"
+        ).to_arrow()
         methods = database.sql(
             "SELECT l.method, count(*) FROM remote_latency JOIN link_transport AS l "
             "USING (publication_id, take_id) GROUP BY l.method"

@@ -73,7 +73,7 @@ def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPa
     now = hashes("none")
     for read in ("derive.link_causal_direct", "derive.process_gap", "derive.topic_group"):
         assert hashes(read) != now, read
-    for not_read in ("derive.executor_busy", "main.flow_edge", "derive.link_diagnostic"):
+    for not_read in ("derive.executor_busy", "main.flow_edge", "derive.finding_kind"):
         assert hashes(not_read) == now, not_read
     derive.derivation_hash.cache_clear()
 

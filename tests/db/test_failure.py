@@ -177,7 +177,7 @@ def test_a_full_disk_after_the_commit_is_a_warning(
     assert "no space left on the disk" in report.warnings[0]
     with msgflow.open_db(path) as database:
         assert [run.name for run in database.runs()] == ["again"]
-        assert all(result.row_count == 0 for result in database.check())
+        assert database.check() == []
     assert sorted(os.listdir(path.parent)) == ["a.duckdb", "a.duckdb.wal"]
 
 

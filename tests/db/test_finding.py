@@ -1,4 +1,4 @@
-"""Findings: together, and where one needs more than its golden case; what headers promise."""
+"""Findings: stored, read and audited; and where one needs more than its golden case."""
 
 from __future__ import annotations
 
@@ -7,12 +7,27 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill
+from golden import SYSTEMS, fill, fill_case
 
-from msgflow.db import objects
-from msgflow.db.derive import derive
-from msgflow.db.finding import SEVERITIES, find
+from msgflow.db.derive import derive, derive_findings
+from msgflow.db.finding import (
+    Finding,
+    audit,
+    kinds_of,
+    read_findings,
+    statement,
+    store_audit,
+)
+from msgflow.sql.header import Header
 
+CASES = Path(__file__).resolve().parents[1] / "schema" / "cases"
+# Two hosts with a clock each, for findings without a golden case.
+HOSTS = SYSTEMS / "two_clocks.case"
+# What leaves these views without a row.
+WITHOUT = {
+    "derive.several_clocks": "DELETE FROM store.clock WHERE clock_id > 1",
+    "derive.clocks_to_synchronise": "UPDATE store.run SET clock_sync = 'none'",
+}
 Tables = dict[str, str]
 PUBLISHED = "publication_id,publisher_id,process_id,start_ns,end_ns,source_timestamp_ns\n"
 TAKEN = "take_id,subscription_id,process_id,taken_ns,source_timestamp_ns,method\n"
@@ -21,6 +36,7 @@ SOUND: Tables = {
     "node": "node_id\n1\n",
     "publication": "publication_id\n1\n",
     "take": "take_id,method\n1,rmw\n",
+    "link_transport": "publication_id,take_id,method\n1,1,exact\n",
     "callback_instance": "callback_instance_id,end_ns\n1,9\n",
     "executor_state": "state\nwait\n",
 }
@@ -33,13 +49,10 @@ def database(empty_database: Path, tmp_path: Path) -> duckdb.DuckDBPyConnection:
     return duckdb.connect(str(path))
 
 
-@pytest.mark.parametrize("header", objects.load("health/finding"), ids=lambda header: header.name)
-def test_a_finding_says_what_it_means_and_what_to_do(header: objects.Header) -> None:
-    assert header.title != header.name
-    assert header.severity in SEVERITIES
-    assert header.phase
-    assert header.cause
-    assert header.cure
+def find(connection: duckdb.DuckDBPyConnection, run_id: int = 1) -> list[Finding]:
+    """Find anew what a run shows, and return all that is stored of it."""
+    derive_findings(connection, run_id)
+    return read_findings(connection, [run_id])
 
 
 def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection) -> None:
@@ -59,7 +72,7 @@ def test_a_whole_recording_has_none(database: duckdb.DuckDBPyConnection) -> None
         },
     )
     derive(database, 1)
-    assert find(database, [1]) == []
+    assert find(database) == []
 
 
 @pytest.mark.parametrize(("step_ms", "is_jump"), [(99, False), (101, True)])
@@ -76,7 +89,7 @@ def test_a_jump_is_more_than_a_tenth_of_a_second(
             "link_transport": "publication_id,take_id,method\n1,1,exact\n2,2,exact\n",
         },
     )
-    assert ("clock_jumps" in {f.name for f in find(database, [1])}) is is_jump
+    assert ("clock_jumps" in {f.name for f in find(database)}) is is_jump
 
 
 @pytest.mark.parametrize(("early_ms", "is_early"), [(490, False), (510, True)])
@@ -93,7 +106,7 @@ def test_a_stream_ends_early_that_ends_half_a_second_before_another(
             f"0,0,0,{hour}\n1,1,0,{hour - early_ms * 10**6}\n",
         },
     )
-    assert [f.name for f in find(database, [1])] == ["stream_ends_early"] * is_early
+    assert [f.name for f in find(database)] == ["stream_ends_early"] * is_early
 
 
 def test_the_chunks_of_a_recording_are_one(database: duckdb.DuckDBPyConnection) -> None:
@@ -110,7 +123,7 @@ def test_the_chunks_of_a_recording_are_one(database: duckdb.DuckDBPyConnection) 
             "2,2,2,5000000000,5000000000\n",
         },
     )
-    assert [(f.name, f.subject, f.detail) for f in find(database, [1])] == [
+    assert [(f.name, f.subject, f.detail) for f in find(database)] == [
         ("stream_ends_early", "second", "1 stream (CPU 2) end up to 5.000 s early")
     ]
 
@@ -127,7 +140,7 @@ def test_events_discarded_in_lost_packets_are_not_counted(
             "packet": "event_count,discarded_event_count\n400,82\n400,\n",
         },
     )
-    assert [(f.name, f.count, f.detail) for f in find(database, [1])] == [
+    assert [(f.name, f.count, f.detail) for f in find(database)] == [
         (
             "discarded_events",
             82,
@@ -147,17 +160,16 @@ def test_a_packet_that_was_cut_off_is_no_full_buffer(
             **SOUND,
             "gap": f"kind,cpu,start_ns,end_ns,event_count\nloss,0,20,29,{count}\n",
             "packet": "event_count\n100\n",
-            "diagnostic": "trace_id,name,severity,count,detail\n"
-            "1,damaged_trace,data_loss,1,cut off\n",
+            "finding": "trace_id,name,count,detail\n1,damaged_trace,1,cut off\n",
         },
     )
-    assert {f.name for f in find(database, [1])} == {"damaged_trace", name}
+    assert {f.name for f in find(database)} == {"damaged_trace", name}
 
 
 def test_a_run_in_which_nothing_happened(database: duckdb.DuckDBPyConnection) -> None:
     """Not even what one part would call for of another."""
     fill(database, {"node": "node_id\n1\n"})
-    assert [(f.name, f.subject) for f in find(database, [1])] == [("missing_layer", "everything")]
+    assert [(f.name, f.subject) for f in find(database)] == [("missing_layer", "everything")]
 
 
 def test_errors_come_first(database: duckdb.DuckDBPyConnection) -> None:
@@ -169,5 +181,75 @@ def test_errors_come_first(database: duckdb.DuckDBPyConnection) -> None:
             "packet": "event_count\n100\n",
         },
     )
-    assert [f.severity for f in find(database, [1])] == ["error", "warning"]
-    assert find(database, [2]) == []
+    assert [f.severity for f in find(database)] == ["error", "warning"]
+    assert find(database, 2) == []
+
+
+def test_those_of_a_recording_are_found_anew_and_others_stay(
+    database: duckdb.DuckDBPyConnection,
+) -> None:
+    fill(
+        database,
+        {
+            **SOUND,
+            "finding": "name,subject,count\npath_cut,,1\nempty_trace,,1\n"
+            "interval_is_ordered,take,1\n",
+            "gap": "kind,cpu,start_ns,end_ns\npause,,0,9\n",
+        },
+    )
+    for _ in range(2):
+        names = [finding.name for finding in find(database)]
+        assert names == ["interval_is_ordered", "empty_trace", "tracing_paused"]
+
+
+@pytest.mark.parametrize(
+    "header",
+    [header for header in kinds_of("recording") if header.when],
+    ids=lambda header: header.name,
+)
+def test_without_the_rows_that_when_names_nothing_is_found(
+    database: duckdb.DuckDBPyConnection, header: Header
+) -> None:
+    """So that the query need not run."""
+    for path in sorted((CASES / header.name).glob("*.case")) or [HOSTS]:
+        database.begin()
+        fill_case(database, path)
+        rows = f"SELECT count(*) FROM ({statement([header])}) WHERE run_id = $run_id"
+        if path != HOSTS:
+            assert database.execute(rows, {"run_id": 1}).fetchall() > [(0,)]
+        for name in header.when:
+            database.execute(WITHOUT.get(name, f"DELETE FROM {name}"))
+            assert database.execute(f"FROM {name}").fetchall() == []
+        assert database.execute(rows, {"run_id": 1}).fetchall() == [(0,)]
+        database.rollback()
+
+
+def test_what_is_not_wrong_is_read_on_request(database: duckdb.DuckDBPyConnection) -> None:
+    fill(database, {"finding": "name,count\nunknown_event,3\nempty_trace,1\n"})
+    assert [finding.name for finding in read_findings(database, [1])] == ["empty_trace"]
+    every = read_findings(database, [1], info=True)
+    assert [(finding.name, finding.severity) for finding in every] == [
+        ("empty_trace", "warning"),
+        ("unknown_event", "info"),
+    ]
+
+
+def test_an_audit_names_the_run_and_the_place(database: duckdb.DuckDBPyConnection) -> None:
+    fill(
+        database,
+        {
+            "run": "run_id,name\n1,first\n2,second\n",
+            "publication": "publication_id,run_id,start_ns,end_ns\n1,1,1,2\n2,2,2,1\n",
+            "thread": "thread_id,run_id,process_id\n1,1,1\n2,2,7\n",
+        },
+    )
+    assert audit(database, 1) == []
+    broken = [("interval_is_ordered", 2, "publication", 1), ("relation_is_kept", 2, "thread", 1)]
+    for found in (audit(database), audit(database, 2)):
+        assert [
+            (each.name, each.run_id, each.subject.partition(".")[0], each.count) for each in found
+        ] == broken
+        assert all(each.phase == "database" and each.severity == "error" for each in found)
+    for run_id in (1, 2):
+        store_audit(database, run_id)
+    assert read_findings(database, [1, 2]) == audit(database)

@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
@@ -15,7 +14,6 @@ import pytest
 
 from msgflow.db import derive, migrate, objects
 from msgflow.db.connection import connect, recorded_revision
-from msgflow.db.definition_check import expected_definitions
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
 from msgflow.errors import DatabaseError
@@ -146,73 +144,65 @@ def test_a_file_with_tables_that_its_revision_does_not_have_is_refused(
         assert recorded_revision(con) == revision
 
 
-@pytest.fixture
-def next_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """A msgflow of one revision more, made up: it adds the labels of runs."""
-    head = objects.head_revision()
-    revision = f"{int(head) + 1:04}"
-    later = tmp_path / "later"
-    shutil.copytree(resource_directory("migrations"), later)
-    (later / "versions" / f"{revision}_labels.py").write_text(
-        "from alembic import op\n"
-        f"revision, down_revision = '{revision}', '{head}'\n"
-        "branch_labels = depends_on = None\n"
-        "def upgrade():\n"
-        "    op.execute('ALTER TABLE store.run ADD COLUMN labels VARCHAR[]')\n"
-    )
+def older(path: Path) -> dict[int, str]:
+    """Make a file with runs one of the baseline, as ingests of that time left it.
 
-    def directory(name: str) -> Path:
-        return later if name == "migrations" else resource_directory(name)
-
-    caches = (objects.head_revision, objects.known_revisions, expected_definitions)
-    with monkeypatch.context() as patched:
-        patched.setattr(objects, "resource_directory", directory)
-        patched.setattr(migrate, "resource_directory", directory)
-        for cache in caches:
-            cache.cache_clear()
-        yield revision
-    for cache in caches:
-        cache.cache_clear()
-
-
-def test_an_older_file_keeps_its_runs(
-    small_database: Path, tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    before = objects.head_revision()
-    kept = "run_id, name, created_at, start_ns, end_ns, event_count"
-    with duckdb.connect(str(small_database)) as con:
+    Returns:
+        How the clocks of each run were to be brought together.
+    """
+    with duckdb.connect(str(path)) as con:
         objects.drop(con)
-        con.execute("ALTER TABLE store.run DROP COLUMN labels")
-        runs = con.execute(f"SELECT {kept} FROM store.run ORDER BY run_id").fetchall()
-        counted = con.execute("SELECT count(*) FROM store.publication").fetchall()
-    assert len(runs) == 2
+        con.execute("ALTER TABLE store.run DROP COLUMN clock_sync")
+        con.execute("UPDATE store.alembic_version SET version_num = '0001'")
+        con.execute("DELETE FROM store.run WHERE run_id > 2")
+        con.execute(
+            "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
+            "SELECT 2 + n, 'run ' || n, now(), '', '' FROM range(1, 4) AS _(n)"
+        )
+        con.execute(
+            "INSERT INTO store.clock (clock_id, run_id, offset_ns, drift_ppb, reference_ns, method)"
+            " VALUES (91, 2, 0, 0, 0, 'none'), (92, 3, 0, 0, 0, 'file'),"
+            " (93, 4, 0, 0, 0, 'packets'), (94, 5, 0, 0, 0, 'none')"
+        )
+        con.execute("INSERT INTO store.finding (run_id, name) VALUES (5, 'clock_not_synchronised')")
+    return {1: "none", 2: "none", 3: "file", 4: "messages", 5: "messages"}
 
-    now = request.getfixturevalue("next_revision")
-    told_so = f"has schema revision {before}, .* needs {now}"
-    with pytest.raises(DatabaseError, match=told_so) as told:
+
+def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> None:
+    """And the migration tells from clocks and findings how clocks were brought together."""
+    synchronised = older(small_database)
+    kept = "SELECT run_id, name, created_at, start_ns, end_ns, event_count, labels FROM store.run"
+    with duckdb.connect(str(small_database)) as con:
+        runs = con.execute(f"{kept} ORDER BY run_id").fetchall()
+        counted = con.execute("SELECT count(*) FROM store.publication").fetchall()
+    assert len(runs) == len(synchronised)
+
+    head = objects.head_revision()
+    with pytest.raises(DatabaseError, match=f"has schema revision 0001, .* needs {head}") as told:
         connect(small_database, read_only=True)
     assert told.value.hint == f"msgflow db upgrade --db {small_database}"
     done = migrate.upgrade(small_database)
-    assert (done.before, done.after, done.views_changed) == (before, now, True)
+    assert (done.before, done.after, done.views_changed) == ("0001", head, True)
+    assert len(done.rederived_runs) == len(runs)
 
     new = tmp_path / "new.duckdb"
     migrate.create(new)
     assert schema_of(small_database) == schema_of(new)
     with connect(small_database, read_only=True) as con:
-        assert con.execute(f"SELECT {kept} FROM store.run ORDER BY run_id").fetchall() == runs
+        assert con.execute(f"{kept} ORDER BY run_id").fetchall() == runs
         assert con.execute("SELECT count(*) FROM main.publication").fetchall() == counted
+        found = con.execute("SELECT run_id, clock_sync FROM store.run").fetchall()
+    assert dict(found) == synchronised
 
 
-def test_a_failing_migration_leaves_the_file_as_it_was(
-    small_database: Path, request: pytest.FixtureRequest
-) -> None:
+def test_a_failing_migration_leaves_the_file_as_it_was(small_database: Path) -> None:
     """It adds a column that is there already."""
-    before = objects.head_revision()
-    request.getfixturevalue("next_revision")
-    with pytest.raises(duckdb.CatalogException, match="labels"):
+    with duckdb.connect(str(small_database)) as con:
+        con.execute("UPDATE store.alembic_version SET version_num = '0001'")
+    with pytest.raises(duckdb.CatalogException, match="clock_sync"):
         migrate.upgrade(small_database)
     with duckdb.connect(str(small_database), read_only=True) as con:
-        assert recorded_revision(con) == before
+        assert recorded_revision(con) == "0001"
         assert con.execute("SELECT count(*) FROM main.run").fetchall() == [(2,)]
 
 
@@ -297,8 +287,8 @@ for path in map(Path, sys.argv[1:]):
 """
     files = [
         "msgflow/db/tables/__init__.py", "msgflow/db/tables/call.py", "msgflow/db/table_ddl.py",
-        "msgflow/db/table_view.py", "msgflow/db/diagnostic.py", "schema/public/run.sql",
-        "schema/health/diagnostic/lost_packets.sql",
+        "msgflow/db/table_view.py", "msgflow/db/finding.py", "schema/public/run.sql",
+        "schema/health/recording/lost_packets.sql",
     ]  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-c", program, *files],

@@ -71,6 +71,18 @@ def test_one_run_is_what_its_database_says(
     assert rows(found.table, shared) == rows(expected, shared)
 
 
+def test_findings_of_one_run_are_added_up(night: Lake, databases: tuple[Path, Path]) -> None:
+    found = fleet_query(night, "findings", where="name = 'second'").table.to_pylist()
+    with Database(databases[1]) as database:
+        rows = database.query("info-findings").to_arrow().to_pylist()
+    assert len(rows) >= len(found) > 0
+    for row in found:
+        places = [each["count"] for each in rows if each["name"] == row["name"]]
+        assert (row["places"], row["count"]) == (len(places), sum(places))
+        assert row["cause"]
+        assert row["cure"]
+
+
 def test_latencies_of_several_runs_are_those_of_all_their_flows(night: Lake) -> None:
     for case, is_counted in (("first", "is_first"), ("every_pair", "true")):
         found = fleet_query(night, "e2e-latency", case=case).table

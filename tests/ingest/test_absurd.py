@@ -26,12 +26,10 @@ def directories(root: Path) -> list[Path]:
     return sorted(path.parent for path in root.rglob("metadata"))
 
 
-def diagnostics(database: Path) -> dict[str, tuple[str, int, str]]:
+def findings(database: Path) -> dict[str, tuple[str, int, str]]:
     with open_db(database) as opened:
-        rows = opened.sql("SELECT name, severity, count, detail FROM diagnostic").to_arrow()
-        # Whatever looks at all that was found.
-        opened.findings()
-        for name in ("e2e-latency", "data-quality", "info-runs"):
+        rows = opened.sql("SELECT name, severity, count, detail FROM finding").to_arrow()
+        for name in ("info-findings", "e2e-latency", "data-quality", "info-runs"):
             opened.query(name)
     return {row["name"]: (row["severity"], row["count"], row["detail"]) for row in rows.to_pylist()}
 
@@ -65,8 +63,8 @@ def test_stamps(trace: Path, tmp_path: Path, database: Path, stamp: int) -> None
     replace(changed, struct.pack("<q", max(stamps)), struct.pack("<q", latest))
     with open_db(database) as opened:
         opened.ingest(changed, name="changed", replace=True)
-    severity, count, detail = diagnostics(database)["implausible_value"]
-    assert severity == "data_loss"
+    severity, count, detail = findings(database)["implausible_value"]
+    assert severity == "error"
     assert 1 <= count <= wrong
     assert "that cannot be times: left out" in detail
     left = [stamp for (stamp,) in rows(database, taken)]
@@ -91,7 +89,7 @@ def test_counters_of_lost_events(
         struct.pack_into("<Q", content, packet_begins(bytes(content))[-1] + 72, counter)
         path.write_bytes(content)
     ingest([changed], new_database)
-    found = diagnostics(new_database)
+    found = findings(new_database)
     assert found["damaged_trace"][1] == 1
     assert paths[0].name in found["damaged_trace"][2]
     assert "discarded_events" in found
@@ -107,7 +105,7 @@ def test_a_stream_copied_beside_itself_and_a_pipe(
     ingest([changed], new_database)
     counts = "SELECT count(*), sum(event_count)::BIGINT FROM publication CROSS JOIN trace"
     assert rows(new_database, counts) == rows(database, counts)
-    found = diagnostics(new_database)
+    found = findings(new_database)
     severity, count, detail = found["repeated_packet"]
     assert (severity, count) == ("warning", len(packet_begins(path.read_bytes())))
     assert "copied beside" in detail
@@ -138,8 +136,8 @@ def test_a_stream_that_is_missing(trace: Path, tmp_path: Path, new_database: Pat
         (path.parent / "index" / f"{path.name}.idx").write_bytes(b"")
     path.unlink()
     ingest([changed], new_database)
-    severity, _, detail = diagnostics(new_database)["damaged_trace"]
-    assert severity == "data_loss"
+    severity, _, detail = findings(new_database)["damaged_trace"]
+    assert severity == "error"
     assert f"the stream {path.name} is missing, only its index is there" in detail
 
 
@@ -163,10 +161,10 @@ def test_names_that_are_too_long(tmp_path: Path, new_database: Path, length: int
     packets = sim.Recording(start_ns=1, packet_bytes=1 << 23)
     trace = sim.simulate(scenario, tmp_path / "out", recording=packets).directory
     ingest([trace], new_database)
-    found = diagnostics(new_database)
+    found = findings(new_database)
     assert rows(new_database, "SELECT count(*) > 800 FROM link_transport") == [(True,)]
     severity, count, detail = found["implausible_value"]
-    assert (severity, count) == ("data_loss", 1)
+    assert (severity, count) == ("error", 1)
     assert "names: too long: left out" in detail
     long = "SELECT length(topic_name) AS long FROM publisher WHERE long >= 100"
     assert rows(new_database, long) == [(1024,)]

@@ -8,13 +8,13 @@ from pathlib import Path
 from ingested import contents
 
 from msgflow.db.connection import connect
-from msgflow.db.finding import find
+from msgflow.db.finding import read_findings
 from msgflow.ingest import ingest
 
 
 def empty_traces(database: Path) -> list[str]:
     with connect(database, read_only=True) as connection:
-        return [f.subject for f in find(connection, [1]) if f.name == "empty_trace"]
+        return [f.subject for f in read_findings(connection, [1]) if f.name == "empty_trace"]
 
 
 def test_metadata_alone_and_a_copy(
@@ -25,7 +25,7 @@ def test_metadata_alone_and_a_copy(
     alone.mkdir()
     shutil.copy(next(trace.rglob("metadata")), alone)
     report = ingest([trace, shutil.copytree(trace, tmp_path / "copy"), alone], new_database)
-    found = {d.name: d for d in report.diagnostics}
+    found = {d.name: d for d in report.findings}
     assert (found["empty_trace"].severity, found["empty_trace"].count) == ("warning", 1)
     assert empty_traces(new_database) == [str(alone)]
     assert found["duplicate_packet"].count > 0

@@ -54,7 +54,7 @@ def test_events_may_be_ignored(
         new_database, "SELECT source_timestamp_ns, dds_ns IS NOT NULL FROM publication"
     ) == [(stamp, is_layer)]
     assert rows(new_database, "SELECT event_count FROM trace") == [(len(EVENTS),)]
-    (unknown,) = (d for d in report.diagnostics if d.name == "unknown_event")
+    (unknown,) = (d for d in report.findings if d.name == "unknown_event")
     assert (unknown.severity, unknown.count) == ("info", 3)
     assert "my_app:started (1), ros2:from_the_future (2)" in unknown.detail
 
@@ -66,9 +66,9 @@ def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
         new_database,
         ignore=("dds:*", "dds:write", "dsd:*", "ros2:rcl_take"),
     )
-    told = {d.name: (d.severity, d.count, d.detail) for d in report.diagnostics}
+    told = {d.name: (d.severity, d.count, d.detail) for d in report.findings}
     assert told["ignored_events"] == (
-        "info",
+        "warning",
         2,
         "events that were left out on request: dds:* (2), dds:write (1)",
     )
@@ -77,9 +77,7 @@ def test_what_was_ignored_is_told(make_trace: Make, new_database: Path) -> None:
         2,
         "patterns of events to leave out that match none: dsd:*, ros2:rcl_take",
     )
-    assert rows(new_database, "SELECT count(*) FROM diagnostic WHERE name LIKE 'ignored_%'") == [
-        (2,)
-    ]
+    assert rows(new_database, "SELECT count(*) FROM finding WHERE name LIKE 'ignored_%'") == [(2,)]
 
 
 def test_staging_can_be_kept_and_progress_is_told(
@@ -118,7 +116,7 @@ def test_staging_can_be_kept_and_progress_is_told(
     assert all(0 <= fraction <= 1 for fraction in fractions)
     assert max(state.events for state in seen) <= report.event_count
     assert report.seconds == pytest.approx(sum(report.stage_seconds.values()))
-    assert [d for d in report.diagnostics if d.name == "check_failed"] == []
+    assert [d for d in report.findings if d.phase == "database"] == []
     assert rows(new_database, "SELECT run_id, name, event_count FROM store.run") == [
         (report.run_id, report.run_name, report.event_count)
     ]

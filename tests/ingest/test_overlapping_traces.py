@@ -15,7 +15,7 @@ from msgflow.trace import open as open_traces
 
 OTHER = UUID(int=0x2A)
 # What says which trace something comes from, and ids that follow from the number of events.
-PER_TRACE = {"trace", "packet", "run", "diagnostic", "gap", "stamp_clock"}
+PER_TRACE = {"trace", "packet", "run", "finding", "gap", "stamp_clock"}
 
 
 @pytest.fixture
@@ -41,9 +41,9 @@ def test_nothing_is_counted_twice(database: Path, twice: Path, tmp_path: Path) -
     once = contents(database)
     for table in once.keys() - PER_TRACE:
         assert len(both[table]) == len(once[table]), table
-    (found,) = (d for d in report.diagnostics if d.name == "overlapping_traces")
+    (found,) = (d for d in report.findings if d.name == "overlapping_traces")
     with duckdb.connect(str(database), read_only=True) as connection:
         ((loaded,),) = connection.execute("SELECT event_count FROM store.run").fetchall()
     assert found.severity == "warning"
     assert 0 < found.count <= loaded
-    assert not [d for d in report.diagnostics if d.name == "check_failed"]
+    assert not [d for d in report.findings if d.phase == "database"]

@@ -58,7 +58,7 @@ def test_links_are_derived_anew(database: Path) -> None:
     with Database(database) as opened:
         (applied,) = opened.apply_links(write(database, BOTH))
         assert (applied.annotation_count, applied.known_count, applied.link_count) == (1, 0, 8)
-        assert all(not check.row_count for check in opened.check())
+        assert opened.check() == []
     assert rows(database, KINDS) == [("direct", 4), ("periodic_async", 8)]
     assert rows(database, DECLARED) == [("periodic_async", "file", ["/a", "/b"], ["/c", "/d"])]
 
@@ -152,7 +152,7 @@ def test_what_does_not_exist_changes_nothing(
 
 def test_contradictory_entries_are_named(database: Path) -> None:
     """Both are in force; the finding goes with the file."""
-    found = "SELECT count, detail FROM diagnostic WHERE name = 'contradictory_annotations'"
+    found = "SELECT count, detail FROM finding WHERE name = 'contradictory_annotations'"
     entry = BOTH.partition("links:\n")[2]
     other = entry.replace("periodic_async", "partial_sync").replace("[/c, /d]", "/d")
     with Database(database) as opened:

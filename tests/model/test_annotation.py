@@ -27,7 +27,7 @@ def annotations(analysis: Analysis) -> list[tuple[str, list[str], list[str]]]:
 
 def findings(analysis: Analysis) -> list[tuple[str, int]]:
     return analysis.rows(
-        "SELECT name, count FROM diagnostic WHERE name LIKE '%annotation%' ORDER BY ALL"
+        "SELECT name, count FROM finding WHERE name LIKE '%annotation%' ORDER BY ALL"
     )
 
 

@@ -73,9 +73,7 @@ def test_a_lost_end(system: RosSystem, analyse: Analyse) -> None:
     end = system.end(MAIN, 0xC1)
     model = analyse(system)
     assert model.rows(RUNS) == [(lost, None, 1, None), (start, end, 1, None)]
-    assert model.rows(
-        "SELECT severity, count FROM store.diagnostic WHERE name = 'open_callback'"
-    ) == [("info", 1)]
+    assert model.rows("SELECT count FROM store.finding WHERE name = 'open_callback'") == [(1,)]
 
 
 def test_a_lost_start(system: RosSystem, analyse: Analyse) -> None:
@@ -85,9 +83,7 @@ def test_a_lost_start(system: RosSystem, analyse: Analyse) -> None:
     system.end(MAIN, 0xC2)
     model = analyse(system)
     assert model.rows(RUNS) == [(start, end, 1, None)]
-    assert (
-        model.value("SELECT count FROM store.diagnostic WHERE name = 'unmatched_callback_end'") == 2
-    )
+    assert model.value("SELECT count FROM store.finding WHERE name = 'unmatched_callback_end'") == 2
 
 
 def test_open_at_the_end_of_the_trace(system: RosSystem, analyse: Analyse) -> None:

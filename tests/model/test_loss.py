@@ -7,8 +7,6 @@ from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
 
-from msgflow.db.finding import find
-
 MS = 1_000_000
 GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM gap ORDER BY start_ns, cpu"
 Gaps = list[tuple[str, int | None, int, int, int | None]]
@@ -42,9 +40,9 @@ def test_events_are_lost_behind_the_last_event_of_their_packet(
     model = analyse(system)
     assert model.rows(GAPS) == [("loss", 0, 120, 200, 7)]
     assert model.rows("SELECT discarded_event_count, event_count FROM trace") == [(7, 4)]
-    assert model.rows(
-        "SELECT severity, count FROM store.diagnostic WHERE name = 'discarded_events'"
-    ) == [("data_loss", 7)]
+    assert model.rows("SELECT severity, count FROM finding WHERE name = 'discarded_events'") == [
+        ("error", 7)
+    ]
 
 
 def test_events_are_lost_before_a_packet_that_waited_for_room(
@@ -64,9 +62,9 @@ def test_events_are_lost_before_a_packet_that_waited_for_room(
         ("loss", 0, 480, 500, 2),
     ]
     assert model.rows("SELECT start_ns, end_ns FROM callback_instance") == [(start, None)]
-    assert model.rows(
-        "SELECT severity, count FROM store.diagnostic WHERE name = 'discarded_events'"
-    ) == [("data_loss", 9)]
+    assert model.rows("SELECT severity, count FROM finding WHERE name = 'discarded_events'") == [
+        ("error", 9)
+    ]
 
 
 def test_packets_are_lost_before_one_that_counts_a_loss(
@@ -114,9 +112,7 @@ def test_lost_packets_lie_between_those_around_them(system: RosSystem, analyse: 
     system.add_packet(0, 500, cpu=1)
     model = analyse(system)
     assert model.rows(GAPS) == [("packets", 0, 100, 400, None)]
-    assert model.rows("SELECT severity FROM store.diagnostic WHERE name = 'lost_packets'") == [
-        ("data_loss",)
-    ]
+    assert model.rows("SELECT severity FROM finding WHERE name = 'lost_packets'") == [("error",)]
 
 
 def test_a_pause_is_a_silence_of_all_streams(system: RosSystem, analyse: Analyse) -> None:
@@ -125,7 +121,7 @@ def test_a_pause_is_a_silence_of_all_streams(system: RosSystem, analyse: Analyse
         system.add_packet(50 * MS - cpu, 60 * MS, cpu=cpu)
     model = analyse(system)
     assert model.rows(GAPS) == [("pause", None, 10 * MS + 1, 50 * MS - 1, None)]
-    assert model.rows("SELECT severity, count FROM store.diagnostic WHERE name = 'pause'") == [
+    assert model.rows("SELECT severity, count FROM finding WHERE name = 'tracing_paused'") == [
         ("warning", 1)
     ]
 
@@ -686,8 +682,4 @@ def test_sums_of_what_packets_say_that_they_lost_fit(system: RosSystem, analyse:
         system.add_packet(begin, begin + 100, discarded=(1 << 63) - 1)
     model = analyse(system)
     assert model.rows("SELECT discarded_event_count FROM trace") == [(1 << 53,)]
-    assert model.rows("SELECT count FROM store.diagnostic WHERE name = 'discarded_events'") == [
-        (1 << 53,)
-    ]
-    found = find(model.connection, [1])
-    assert [f.count for f in found if f.name == "discarded_events"] == [1 << 53]
+    assert model.rows("SELECT count FROM finding WHERE name = 'discarded_events'") == [(1 << 53,)]

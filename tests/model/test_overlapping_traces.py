@@ -8,12 +8,12 @@ from ros_system import RosSystem
 from staged_events import Thread
 from thorough import few
 
-from msgflow.db.check import run_checks
+from msgflow.db.finding import audit
 
 MILLISECOND = 1_000_000
 PERIOD = 2 * MILLISECOND
 FOUND = (
-    "SELECT trace_id, severity, count, detail FROM store.diagnostic "
+    "SELECT trace_id, count, detail FROM store.finding "
     "WHERE name = 'overlapping_traces' "
     "ORDER BY trace_id"
 )
@@ -78,7 +78,7 @@ def counts(model: Analysis) -> tuple[int, int, int, int]:
 
 
 def failed_checks(model: Analysis) -> list[str]:
-    return [r.name for r in run_checks(model.connection, 1) if r.row_count]
+    return [finding.name for finding in audit(model.connection, 1)]
 
 
 def test_a_second_session_counts_nothing_twice(system: RosSystem, analyse: Analyse) -> None:
@@ -91,8 +91,8 @@ def test_a_second_session_counts_nothing_twice(system: RosSystem, analyse: Analy
     assert counts(model) == (5, 5, 5, 5)
     for table in ("node", "publisher", "subscription", "callback"):
         assert model.value(f"SELECT count(*) FROM {table}") == 1, table
-    ((trace, severity, count, detail),) = model.rows(FOUND)
-    assert (trace, severity, count) == (2, "warning", 9 + 5 * 8)
+    ((trace, count, detail),) = model.rows(FOUND)
+    assert (trace, count) == (2, 9 + 5 * 8)
     assert detail.endswith("left out because the trace trace-0 has them too")
     assert failed_checks(model) == []
 
@@ -112,7 +112,7 @@ def test_the_usable_rest_of_both_is_kept(system: RosSystem, analyse: Analyse, lo
         cycle(system, number, threads[1])
     model = analyse(system)
     assert counts(model) == (11, 11, 11, 11)
-    ((trace, _, count, _),) = model.rows(FOUND)
+    ((trace, count, _),) = model.rows(FOUND)
     assert (trace, count) == (2 - longer, 3 * 8)
     assert failed_checks(model) == []
 

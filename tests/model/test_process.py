@@ -8,7 +8,7 @@ from staged_events import Thread
 
 MAIN = Thread(100)
 LIVES = "SELECT pid, life, name, first_seen_ns, last_seen_ns FROM store.process ORDER BY process_id"
-RESTARTS = "SELECT severity, count FROM store.diagnostic WHERE name = 'process_restart'"
+RESTARTS = "SELECT count FROM store.finding WHERE name = 'process_restart'"
 
 
 def test_a_process_is_named_after_its_main_thread(system: RosSystem, analyse: Analyse) -> None:
@@ -79,7 +79,7 @@ def test_a_pid_used_again(system: RosSystem, analyse: Analyse) -> None:
         "ORDER BY publication_id"
     ) == ["/old", "/new"]
     assert model.column("SELECT first_seen_ns FROM thread ORDER BY 1") == [first, second]
-    assert model.rows(RESTARTS) == [("info", 1)]
+    assert model.rows(RESTARTS) == [(1,)]
 
 
 def test_initialising_again_is_no_new_life_while_an_old_object_goes_on(

@@ -99,8 +99,8 @@ def test_handles_never_initialised_are_placeholders(system: RosSystem, analyse: 
         (200, 0x10, True, 1),
     ]
     assert model.rows(
-        "SELECT severity, count FROM store.diagnostic WHERE name = 'inferred_publisher'"
-    ) == [("warning", 3)]
+        "SELECT count FROM store.finding WHERE name = 'inferred_object' AND subject = 'publishers'"
+    ) == [(3,)]
 
 
 def test_rosout_by_its_rmw_handle(system: RosSystem, analyse: Analyse) -> None:
@@ -209,7 +209,7 @@ def test_one_of_several_rosout_of_a_process_is_not_guessed(
         "SELECT topic_name, is_internal, is_inferred FROM publication "
         "JOIN publisher USING (publisher_id)"
     ) == [("/rosout", True, True)]
-    assert model.rows("SELECT * FROM store.diagnostic WHERE name = 'inferred_publisher'") == []
+    assert model.rows("SELECT * FROM store.finding WHERE subject = 'publishers'") == []
 
 
 def test_a_publisher_with_another_rmw_handle_is_not_rosout(

@@ -180,7 +180,7 @@ def test_what_cannot_be_told_is_not_guessed(system: RosSystem, analyse: Analyse)
     assert sorted(analysis.rows(REQUESTS), key=str) == sorted(
         [(1, sent[0], None, None), (1, sent[1], None, None), (1, None, taken, None)], key=str
     )
-    assert analysis.rows("SELECT count FROM store.diagnostic WHERE name = 'ambiguous_request'") == [
+    assert analysis.rows("SELECT count FROM store.finding WHERE name = 'ambiguous_request'") == [
         (1,)
     ]
 
@@ -224,9 +224,9 @@ def test_started_late(system: RosSystem, analyse: Analyse) -> None:
         ("/add", None, "07" + "01" * 15)
     ]
     assert analysis.rows("SELECT kind, service_id FROM callback") == [("service", 1)]
-    names = analysis.column("SELECT name FROM diagnostic ORDER BY name")
-    assert "inferred_client" in names
-    assert "inferred_service" not in names
+    kinds = analysis.column("SELECT subject FROM store.finding WHERE name = 'inferred_object'")
+    assert "clients" in kinds
+    assert "services" not in kinds
 
 
 def test_a_service_learns_its_name(system: RosSystem, analyse: Analyse) -> None:

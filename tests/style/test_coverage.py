@@ -16,7 +16,6 @@ TESTS = Path(__file__).resolve().parents[1]
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
 INTERNAL = [file for file in FILES if file.layer == "internal" and file.header.kind != "inline"]
-FINDINGS = [file for file in FILES if file.layer == "finding"]
 PUBLIC = [file for file in FILES if file.layer == "public"]
 # Those of kind 'inline' are parts of others.
 PAGE_QUERIES = sorted(
@@ -58,11 +57,6 @@ def test_every_public_view_with_logic_has_a_case(file: SqlFile) -> None:
 
 @each(INTERNAL)
 def test_everything_that_the_program_asks_has_a_case(file: SqlFile) -> None:
-    assert cases(TESTS / "schema" / "cases" / file.header.name)
-
-
-@each(FINDINGS)
-def test_every_finding_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 

@@ -1,4 +1,4 @@
-"""What can be wrong is declared once, in `schema/health`; whoever names it elsewhere names that."""
+"""Findings are declared once, in `schema/health`; code and documents use the names from there."""
 
 from __future__ import annotations
 
@@ -8,92 +8,63 @@ from pathlib import Path
 from each import each
 from sql_files import SqlFile, sql_files
 
-from msgflow.db import check, finding
-from msgflow.db.diagnostic import SEVERITIES, diagnostics
+from msgflow.db.finding import PHASES, SEVERITIES, kinds, phase_of, short_name
 from msgflow.sql.header import Header
 
 ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "tests"
-FILES = sql_files()
-FINDINGS = [file.header for file in FILES if file.layer == "finding"]
-AUDITS = [file.header for file in FILES if file.layer == "check"]
 READERS = [
     file
-    for file in FILES
-    if {"main.diagnostic", "store.diagnostic"} & set(file.header.needs)
-    and file.header.name != "main.diagnostic"
+    for file in sql_files()
+    if {"main.finding", "store.finding"} & set(file.header.needs)
+    and file.header.name != "main.finding"
 ]
-NAMES = {header.name.partition(".")[2] for header in diagnostics()}
+NAMES = {short_name(header) for header in kinds()}
 CODE = [*(ROOT / "msgflow").rglob("*.py"), *(ROOT / "schema").rglob("*.sql")]
 
 
-@each(diagnostics(), name=lambda header: header.name)
-def test_a_diagnostic_says_what_it_means_and_what_to_do(header: Header) -> None:
-    """In words of its own, or by the finding that tells it to people."""
+@each(kinds(), name=lambda header: header.name)
+def test_a_finding_says_what_it_means_and_what_to_do(header: Header) -> None:
     assert header.title != header.name
     assert header.severity in SEVERITIES
-    assert header.phase
-    if header.finding is None:
-        assert header.cause
-        assert header.cure
-    else:
-        assert not header.cause
-        assert not header.cure
-        assert f"finding.{header.finding}" in {one.name for one in FINDINGS}
+    assert header.grain
+    assert header.cause
+    assert header.cure
 
 
-@each(diagnostics(), name=lambda header: header.name)
-def test_what_is_stored_of_a_phase_has_a_parameter(header: Header) -> None:
-    """Of what was read and built there is one run; of the others, it has to be named."""
-    if header.phase in ("reading", "model"):
-        assert not header.params
-        assert all(need.startswith("staging.") for need in header.needs)
-    elif header.phase in ("clocks", "database"):
-        assert header.params
-    elif not header.params:
-        assert "WITH" not in header.body, "older clients find no CTE there"
+@each(kinds(), name=lambda header: header.name)
+def test_the_folder_decides_what_a_finding_reads(header: Header) -> None:
+    assert phase_of(header) in PHASES
+    is_input = phase_of(header) == "input"
+    assert all(need.startswith("staging.") == is_input for need in header.needs)
 
 
-def test_diagnostics_are_written_in_one_place() -> None:
-    """By their declared names: nothing else puts rows into their table."""
-    writing = re.compile(r"INSERT INTO (?:store|staging)\.diagnostic\b|CREATE .*\bdiagnostic\b")
+def test_findings_are_written_in_one_place() -> None:
+    """Nothing else puts rows into their table."""
+    writing = re.compile(r"INSERT INTO (?:store|staging)\.finding\b|CREATE .*\bfinding\b")
     found = {path.name for path in CODE if writing.search(path.read_text(encoding="utf-8"))}
-    assert found == {"noted.py"}
+    assert found == {"finding.py"}
 
 
 @each(READERS)
-def test_diagnostics_that_sql_asks_for_are_declared(file: SqlFile) -> None:
+def test_findings_that_sql_asks_for_are_declared(file: SqlFile) -> None:
     body = file.header.body
     lists = re.findall(r"\bname (?:=|IN) \(?('\w+'(?:, '\w+')*)", body)
     assert set(re.findall(r"'(\w+)'", " ".join(lists))) <= NAMES
 
 
-def test_diagnostics_and_findings_that_documents_name_are_declared() -> None:
-    findings = {header.name.partition(".")[2] for header in FINDINGS}
+def test_findings_that_documents_name_are_declared() -> None:
     for path in [*(ROOT / "docs").glob("*.md"), ROOT / "README.md"]:
-        for kind, name in re.findall(
-            r"\b(diagnostic|finding)\s+`(\w+)`", path.read_text(encoding="utf-8")
-        ):
-            assert name in (NAMES if kind == "diagnostic" else findings), path
+        text = path.read_text(encoding="utf-8")
+        assert set(re.findall(r"\bfindings?\s+`(\w+)`", text)) <= NAMES, path
 
 
 @each(sorted(NAMES))
-def test_every_diagnostic_is_tested(name: str) -> None:
+def test_every_finding_is_tested(name: str) -> None:
     """By a golden case of its own, or by a test that tells what leads to it."""
-    cases = TESTS / "schema" / "cases"
     rooms = ("model", "ingest", "clocks", "links", "db")
-    assert list((cases / f"diagnostic.{name}").glob("*.case")) or any(
+    assert list((TESTS / "schema" / "cases" / f"finding.{name}").glob("*.case")) or any(
         re.search(rf"\b{name}\b", path.read_text(encoding="utf-8"))
-        for path in [
-            *(path for room in rooms for path in (TESTS / room).rglob("*.py")),
-            *(cases / "main.diagnostic").glob("*.case"),
-        ]
+        for room in rooms
+        for path in (TESTS / room).rglob("*.py")
     )
-
-
-def test_severities_are_those_that_are_sorted_by() -> None:
-    assert {header.severity for header in FINDINGS} == set(finding.SEVERITIES)
-    # A failed audit is noted as what its diagnostic says.
-    (noted,) = (header for header in diagnostics() if header.name == "diagnostic.check_failed")
-    assert {header.severity for header in AUDITS} == {noted.severity}
-    assert noted.severity == check.RELATION_SEVERITY

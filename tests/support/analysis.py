@@ -94,8 +94,8 @@ class Analysis:
             return
         self._model(needed)
         tables = needed & _DERIVED
-        if tables and "store.diagnostic" in needed:
-            tables = _DERIVED  # some are noted of links
+        if "main.finding" in needed:
+            tables = _DERIVED  # those of a recording come of all that is derived
         if self._has_topics_to_learn():
             self._model(_closure(["derive.topic_learned"]))
             learn_topics(self._connection, 1)

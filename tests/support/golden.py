@@ -20,10 +20,9 @@
 A query is run as `Database.query` runs it; what the program asks for itself (internal.<name>) of
 run 1, likewise over tables of scratch; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
-`main.node`), a finding, an audit or a diagnostic of run 1 (`finding.NAME`, `check.NAME`,
-`diagnostic.NAME`) is read whole, a table macro called with its arguments, all sorted by all
-columns. An empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables
-of BASE that a case leaves out have one row, of key 1.
+`main.node`) or a finding (`finding.NAME`) is read whole, a table macro called with its arguments,
+all sorted by all columns. An empty field is NULL, "" is an empty text. Lines that begin with # are
+comments. Tables of BASE that a case leaves out have one row, of key 1.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ import pytest
 
 from msgflow.db import objects
 from msgflow.db.derive import derive, derive_table, derived_tables
-from msgflow.db.diagnostic import diagnostics, statement
+from msgflow.db.finding import kinds, statement
 from msgflow.db.migrate import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
@@ -70,8 +69,7 @@ _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SLICE = tuple(field.name for field in fields(Slice))
 _PAGE_QUERY = "view."
 _INTERNAL = "internal."
-_HEALTH = ("finding.", "check.")
-_DIAGNOSTIC = "diagnostic."
+_FINDING = "finding."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _BENCH = pytest.StashKey["Bench"]()
 # (name, type, whether it may be NULL) of the columns of each table of the store.
@@ -377,10 +375,8 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
         return QueryResult(_page_rows(connection, case, name.removeprefix(_PAGE_QUERY), given))
     if name.startswith(_INTERNAL):
         return QueryResult(_internal_rows(connection, case, name.removeprefix(_INTERNAL), given))
-    if name.startswith(_HEALTH):
-        return QueryResult(_health_rows(connection, name))
-    if name.startswith(_DIAGNOSTIC):
-        return QueryResult(_diagnostic_rows(connection, case, name, given))
+    if name.startswith(_FINDING):
+        return QueryResult(_finding_rows(connection, name, given))
     if "." in name:
         _make_scratch(connection, case)
         arguments = ", ".join(f"{parameter} := ${parameter}" for parameter in given)
@@ -420,19 +416,13 @@ def _stage(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
         _create(connection, f"TABLE staging.{table}", text)
 
 
-def _diagnostic_rows(
-    connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
+def _finding_rows(
+    connection: duckdb.DuckDBPyConnection, name: str, given: dict[str, Any]
 ) -> pa.Table:
-    (header,) = (header for header in diagnostics() if header.name == name)
+    (header,) = (header for header in kinds() if header.name == name)
     values = {param.name: (_FRAME | given)[param.name] for param in header.params}
-    return connection.sql(
-        f"SELECT * FROM ({statement([header])}) ORDER BY ALL", params=values
-    ).to_arrow_table()
-
-
-def _health_rows(connection: duckdb.DuckDBPyConnection, name: str) -> pa.Table:
-    (header,) = (h for h in objects.load(f"health/{name.partition('.')[0]}") if h.name == name)
-    return connection.sql(f"SELECT * FROM ({header.body}) ORDER BY ALL").to_arrow_table()
+    rows = connection.sql(f"FROM ({statement([header])}) ORDER BY ALL", params=values)
+    return rows.to_arrow_table()
 
 
 def _page_rows(

@@ -12,7 +12,7 @@ from msgflow.sql.header import Header, read
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
     "model", "overlap", "store", "link", "clock", "delivery", "flow", "stat", "public",
-    "check", "finding", "diagnostic", "queries", "internal",
+    "health", "queries", "internal",
 )  # fmt: skip
 # The schema in the database of what lies in a folder below schema/.
 SCHEMAS = {
@@ -24,9 +24,7 @@ SCHEMAS = {
     "flow": "derive",
     "stat": "derive",
     "public": "main",
-    "check": "check",
-    "finding": "finding",
-    "diagnostic": "diagnostic",
+    "health": "finding",
     "internal": "internal",
 }
 
@@ -57,12 +55,7 @@ class SqlFile:
 def sql_paths() -> list[tuple[str, Path]]:
     """Return (layer, path) of every SQL file with a header."""
     schema = resource_directory("schema")
-    folders = [
-        (folder.name, folder)
-        for parent in (schema, schema / "health")
-        for folder in sorted(parent.iterdir())
-        if folder.is_dir() and folder.name != "health"
-    ]
+    folders = [(each.name, each) for each in sorted(schema.iterdir()) if each.is_dir()]
     folders.append(("queries", resource_directory("queries")))
     return [(layer, path) for layer, folder in folders for path in sorted(folder.glob("**/*.sql"))]
 

@@ -257,4 +257,4 @@ def test_executors(trace: Ingested) -> None:
 
 def test_nothing_is_wrong_with_the_input(trace: Ingested) -> None:
     assert trace.rows("SELECT * FROM gap") == []
-    assert trace.rows("SELECT * FROM diagnostic WHERE severity IN ('data_loss', 'error')") == []
+    assert trace.rows("SELECT * FROM finding WHERE severity = 'error'") == []

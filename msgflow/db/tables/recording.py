@@ -1,4 +1,4 @@
-"""Tables of what was read: runs, traces, packets, gaps, and notes on them."""
+"""Tables of what was read: runs, traces, packets, gaps, and findings."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ Table(
         ARRAY(VARCHAR),
         comment="Labels that users gave to the run, KEY=VALUE each, sorted; NULL: no label",
     ),
+    text("clock_sync", "How clocks were to be brought together: 'none', 'messages' or 'file'"),
     comment="One row per ingest of traces that belong together",
 )
 
@@ -89,13 +90,13 @@ Table(
 )
 
 Table(
-    "diagnostic",
+    "finding",
     STORE,
     run_id(),
-    trace_id("Trace it was recorded in; NULL: not one trace alone", required=False),
-    text("name", "What was found", required=True),
-    text("severity", "'info', 'warning', 'data_loss' or 'error'", required=True),
+    trace_id("Trace it is about; NULL: not one trace alone", required=False),
+    text("name", "Kind of finding: its file in `schema/health`", required=True),
+    text("subject", "Where: a trace, process, host, topic; NULL: the trace, or all of the phase"),
     number("count", "How often"),
-    text("detail", "Where, and what it means"),
-    comment="One row per finding",
+    text("detail", "Numbers"),
+    comment="One row per place at which something was found",
 )

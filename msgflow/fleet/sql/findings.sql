@@ -1,11 +1,11 @@
 -- name: fleet.findings
--- title: What is wrong with recordings, and with how many
--- description: What msgflow check says of one run, with cause and cure, and the run that has most of
---     it.
+-- title: What is worth knowing about recordings before trusting a number, and how many have it
+-- description: As the query info-findings says it of one run, with cause and cure, and the run that
+--     has most of it.
 -- grain: one row per kind of finding and group of runs
 -- column: label_group BIGINT  Group of runs
 -- column: severity VARCHAR    'error' where results are wrong or missing, 'warning' where they may
---     be
+--     be, or 'info'
 -- column: name VARCHAR        Name of the finding
 -- column: title VARCHAR       What was found
 -- column: runs BIGINT         Runs in which it was
@@ -13,6 +13,7 @@
 -- column: count BIGINT        How often, in all
 -- column: worst_run VARCHAR   Run with most of it
 -- column: subject VARCHAR     There: where
+-- column: detail VARCHAR      There: numbers, and what they mean
 -- column: cause VARCHAR       Where it comes from, as a rule
 -- column: cure VARCHAR        What to do about it
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
@@ -26,9 +27,11 @@ SELECT
     sum(f.count)::BIGINT AS count,
     arg_max(f.run, (coalesce(f.count, 0), f.run, f.subject)) AS worst_run,
     arg_max(f.subject, (coalesce(f.count, 0), f.run, f.subject)) AS subject,
+    arg_max(coalesce(f.detail, ''), (coalesce(f.count, 0), f.run, f.subject)) AS detail,
     any_value(f.cause) AS cause,
     any_value(f.cure) AS cure
 FROM finding AS f
 JOIN run_group AS g ON f.run = g.run
 GROUP BY g.label_group, f.severity, f.name
-ORDER BY f.severity, runs DESC, f.name, g.label_group
+ORDER BY
+    list_position(['error', 'warning', 'info'], f.severity), runs DESC, f.name, g.label_group

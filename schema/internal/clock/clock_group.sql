@@ -8,7 +8,7 @@
 -- column: hosts VARCHAR  Hosts of the clocks
 -- column: clocks BIGINT  How many
 -- column: greatest_ms DOUBLE [ms]  Most by which two of them can differ; NULL: not known
--- column: is_tried BOOLEAN  Messages did not suffice to bring the clocks of the run together
+-- column: is_tried BOOLEAN  Messages were to bring the clocks of the run together
 WITH known AS (
     SELECT clock_id, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
@@ -30,9 +30,7 @@ SELECT
     count(*) AS clocks,
     CASE WHEN bool_and(bound_ns IS NOT NULL) THEN list_sum(max(bound_ns, 2)) / 1e6 END
         AS greatest_ms,
-    run_id IN (
-        SELECT run_id FROM main.diagnostic WHERE name = 'clock_not_synchronised'
-    ) AS is_tried
+    run_id IN (SELECT run_id FROM store.run WHERE clock_sync = 'messages') AS is_tried
 FROM bound
 GROUP BY run_id, together
 ORDER BY run_id, min(clock_id)

@@ -113,7 +113,7 @@ CASES = {
         "e2e-latency", [*LATENCIES, {**LATENCIES[0], "run_id": 2}], runs=(RUN, OTHER)
     ),
     "hostile": result_of("info-topics", HOSTILE),
-    "finding": result_of("info-diagnostics", FINDING),
+    "finding": result_of("info-findings", FINDING),
 }
 
 

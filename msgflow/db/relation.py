@@ -1,0 +1,86 @@
+"""Relations between tables: identities that are no row of the table that their column refers to.
+
+`tables` declares a relation as a foreign key. Databases do not have it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from msgflow.db.tables import STORE
+
+if TYPE_CHECKING:
+    import duckdb
+    from sqlalchemy import Column
+
+
+def broken_relations(
+    con: duckdb.DuckDBPyConnection, run_id: int | None = None
+) -> list[dict[str, Any]]:
+    """Return the columns with identities that are no row of the table that they refer to.
+
+    Args:
+        con: connection to a current database.
+        run_id: look at this run only; at all runs when None.
+
+    Returns:
+        For each run and column: `run_id`, `child` ('table.column'), `parent` (a table) and `count`.
+    """
+    relations = {
+        table: [
+            (column.name, key.column) for column in table.columns for key in column.foreign_keys
+        ]
+        for table in sorted(STORE.tables.values(), key=lambda table: table.name)
+    }
+    blocks = _blocks(con, {parent for each in relations.values() for _, parent in each})
+    of_run = "" if run_id is None else f" WHERE run_id = {run_id:d}"
+    selects = [
+        f"SELECT '{table.name}', run_id, ["
+        + ", ".join(_broken(column, parent, blocks[parent]) for column, parent in each)
+        + f"] FROM {table.fullname} AS child{of_run} GROUP BY run_id"
+        for table, each in relations.items()
+        if each
+    ]
+    by_name = {table.name: each for table, each in relations.items()}
+    # One statement: each takes longer to plan than its few rows to count.
+    rows = con.execute(" UNION ALL ".join(selects)).fetchall()
+    return [
+        {
+            "run_id": found_id,
+            "child": f"{name}.{column}",
+            "parent": parent.table.name,
+            "count": count,
+        }
+        for name, found_id, counts in rows
+        for (column, parent), count in zip(by_name[name], counts, strict=True)
+        if count
+    ]
+
+
+def _blocks(
+    con: duckdb.DuckDBPyConnection, keys: set[Column[Any]]
+) -> dict[Column[Any], tuple[int, int] | None]:
+    """Return the first and last of the ids that each column holds, None if some are missing."""
+    rows = con.execute(
+        " UNION ALL ".join(
+            f"SELECT '{key}', min({key.name}), max({key.name}), count({key.name}) "
+            f"FROM {key.table.fullname}"
+            for key in keys
+        )
+    ).fetchall()
+    by_name = {
+        name: (first or 1, last or 0) if count == (last or 0) - (first or 1) + 1 else None
+        for name, first, last, count in rows
+    }
+    return {key: by_name[str(key)] for key in keys}
+
+
+def _broken(column: str, key: Column[Any], block: tuple[int, int] | None) -> str:
+    """Return the expression that counts the children without a parent.
+
+    Ingests write whole blocks of ids, for which a comparison is enough. An id that is used twice
+    passes it, but not `identity_is_unique`.
+    """
+    if block is not None:
+        return f"count(*) FILTER (child.{column} < {block[0]} OR child.{column} > {block[1]})"
+    return f"count(*) FILTER (child.{column} NOT IN (SELECT {key.name} FROM {key.table.fullname}))"

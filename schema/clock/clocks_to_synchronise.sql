@@ -1,0 +1,7 @@
+-- name: derive.clocks_to_synchronise
+-- description: Runs with several clocks that messages were to bring together.
+-- grain: one row per run
+SELECT s.run_id
+FROM derive.several_clocks AS s
+JOIN store.run AS r ON s.run_id = r.run_id
+WHERE r.clock_sync = 'messages'

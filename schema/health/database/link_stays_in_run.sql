@@ -1,0 +1,46 @@
+-- name: finding.link_stays_in_run
+-- title: A link leads to another run
+-- description: Nothing is linked across runs: the ids of a run are one block.
+-- cause: A mistake in msgflow, or input that it misunderstands.
+-- cure: Report what msgflow db check prints, together with the trace.
+-- grain: one row per run and table of links
+-- severity: error
+WITH publication AS (
+    SELECT run_id, min(publication_id) AS first_id, max(publication_id) AS last_id
+    FROM store.publication
+    GROUP BY run_id
+),
+take AS (
+    SELECT run_id, min(take_id) AS first_id, max(take_id) AS last_id
+    FROM store.take
+    GROUP BY run_id
+),
+callback_instance AS (
+    SELECT run_id, min(callback_instance_id) AS first_id, max(callback_instance_id) AS last_id
+    FROM store.callback_instance
+    GROUP BY run_id
+)
+SELECT
+    l.run_id,
+    'link_transport' AS subject,
+    count(*) AS count,
+    'links to a row of another run' AS detail
+FROM store.link_transport AS l
+LEFT JOIN publication AS b ON l.run_id = b.run_id
+LEFT JOIN take AS t ON l.run_id = t.run_id
+WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
+    OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, true)
+GROUP BY l.run_id
+UNION ALL
+SELECT l.run_id, 'link_causal', count(*), 'links to a row of another run'
+FROM store.link_causal AS l
+LEFT JOIN publication AS b ON l.run_id = b.run_id
+LEFT JOIN callback_instance AS i ON l.run_id = i.run_id
+LEFT JOIN take AS t ON l.run_id = t.run_id
+WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
+    OR coalesce(
+        l.callback_instance_id NOT BETWEEN i.first_id AND i.last_id,
+        l.callback_instance_id IS NOT NULL
+    )
+    OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, l.take_id IS NOT NULL)
+GROUP BY l.run_id

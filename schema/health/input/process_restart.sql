@@ -1,0 +1,14 @@
+-- name: finding.process_restart
+-- title: Process ids that were used again
+-- description: New processes have the ids of earlier ones. They are told apart.
+-- cause: Processes ended, and others were given their ids.
+-- cure: None needed.
+-- grain: one row, if there are any
+-- severity: info
+SELECT
+    count(*) AS count,
+    'process ids that were used again by a new process: '
+    || string_agg(label, ', ' ORDER BY process_id) AS detail
+FROM process_label
+WHERE life > 1
+HAVING count(*) > 0

@@ -1,0 +1,15 @@
+-- name: finding.unmatched_callback_end
+-- title: Ends of callbacks without a start
+-- description: Callbacks ended of which no start is in the trace. They are left out.
+-- cause: Tracing started inside a callback, or events were lost.
+-- cure: Start the session before the nodes, and see whether events were lost (msgflow check).
+-- grain: one row per trace
+-- severity: warning
+SELECT
+    trace_index + 1 AS trace_id,
+    count(*) AS count,
+    'ends of callbacks without a start: tracing started inside a callback, or events were lost'
+        AS detail
+FROM staging.callback_left_over
+WHERE NOT is_start AND partner_event_id IS NULL
+GROUP BY trace_index

@@ -1,0 +1,29 @@
+-- name: finding.clock_jumps
+-- title: The clock of a host was set while recording
+-- description: The clock that stamps messages jumped against the clock of the trace. Matching by
+--     equal stamps is not affected. Latencies measured by stamps are, and matching by time near the
+--     jump may be.
+-- cause: NTP or a user set the clock of the host (the trace follows a clock that cannot be set).
+-- cure: Let the clock settle before recording (chronyc waitsync), and slew instead of step.
+-- grain: one row per host
+-- severity: warning
+WITH step AS (
+    SELECT
+        run_id, host_id,
+        shift_ns - lag(shift_ns) OVER (PARTITION BY run_id, host_id ORDER BY from_ns) AS step_ns
+    FROM derive.stamp_shift
+)
+SELECT
+    h.run_id,
+    h.hostname AS subject,
+    count(*) AS count,
+    printf(
+        '%s, the largest %.3f s',
+        derive.counted(count(*), 'jump'), max(abs(s.step_ns)) / 1e9
+    ) AS detail
+FROM step AS s
+JOIN main.host AS h ON s.host_id = h.host_id
+-- A clock that is slewed moves by 5 ms in ten seconds (adjtime: 500 ppm); the rest is for stamps of
+-- threads that had to wait for the CPU.
+WHERE abs(s.step_ns) > 100_000_000
+GROUP BY h.run_id, h.host_id, h.hostname

@@ -1,0 +1,57 @@
+-- name: finding.discarded_events
+-- title: The tracer discarded events
+-- description: Events were lost because the buffers were full. What happened in those gaps is
+--     missing, nothing is paired across them, and results near them are marked is_loss_affected.
+--     Events of packets that were cut off are not counted here: that is damage of the trace. If
+--     packets are missing as well, it is not known how many of the discarded events were in them,
+--     and these are not counted either.
+-- cause: The sub-buffers are too small or too few for bursts of events, or the disk is too slow to
+--     empty them.
+-- cure: Record with larger sub-buffers: lttng enable-channel --userspace --subbuf-size=SIZE
+--     --num-subbuf=4 CHANNEL before the events are enabled (ros2 trace: --subbuffer-size-ust), with
+--     the size given above; or enable fewer events, or write to a faster disk.
+-- grain: one row per trace
+-- severity: error
+-- when: store.gap
+WITH damaged AS (
+    SELECT DISTINCT trace_id FROM store.finding WHERE name = 'damaged_trace'
+),
+loss AS (
+    SELECT
+        g.run_id,
+        g.trace_id,
+        count(*) AS places,
+        CASE WHEN count(g.event_count) > 0
+            THEN least(sum(g.event_count), 9007199254740992)::BIGINT END AS events,
+        max(g.event_count) AS largest,
+        sum(g.end_ns - g.start_ns) AS length_ns
+    FROM main.gap AS g
+    LEFT JOIN damaged AS d ON g.trace_id = d.trace_id
+    WHERE g.kind = 'loss' AND (g.event_count IS NOT NULL OR d.trace_id IS NULL)
+    GROUP BY g.run_id, g.trace_id
+),
+fullest AS (
+    SELECT
+        trace_id, max(event_count) AS events, bool_or(discarded_event_count IS NULL) AS is_uncounted
+    FROM store.packet
+    GROUP BY trace_id
+)
+SELECT
+    l.run_id,
+    l.trace_id,
+    coalesce(l.events, l.places) AS count,
+    printf(
+        '%s%s in %s, %.3f s in all; --subbuf-size=%dM would have held the largest '
+        || 'burst',
+        CASE WHEN l.events IS NOT NULL AND f.is_uncounted THEN 'at least ' ELSE '' END,
+        CASE WHEN l.events = 1 THEN '1 event'
+            ELSE coalesce(format('{:,}', l.events), 'unknown') || ' events' END,
+        derive.counted(l.places, 'place'),
+        l.length_ns / 1e9,
+        -- About 100 bytes for an event, the next power of two that holds them, at least 1 MiB.
+        (2 ** greatest(
+            ceil(log2((coalesce(l.largest, 0)::DOUBLE + f.events) * 100 / 1048576)), 0
+        ))::BIGINT
+    ) AS detail
+FROM loss AS l
+JOIN fullest AS f ON l.trace_id = f.trace_id

@@ -1,0 +1,20 @@
+-- name: finding.started_late
+-- title: Tracing started after ROS
+-- description: Objects were used whose creation is not in the trace. They are placeholders with no
+--     name, or with one deduced from messages. So topics and nodes are missing from results. Not
+--     counted: objects of ROS itself (/rosout is published on handles that are never initialised),
+--     and processes that may have lost these events (initialisation_lost).
+-- cause: The session was started after the nodes, or the events of initialisation were not enabled.
+-- cure: Start the session first: ros2 trace, or the Trace action at the head of the launch file; or
+--     record initialisation into a snapshot session that runs all the time, and ingest both.
+-- grain: one row per process
+-- severity: warning
+SELECT
+    p.run_id,
+    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    u.count,
+    u.detail
+FROM derive.unseen_creation AS u
+JOIN main.process AS p ON u.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+WHERE NOT u.is_lossy
