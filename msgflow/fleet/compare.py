@@ -58,7 +58,7 @@ class FleetComparison:
             UsageError: see `msgflow.query.compare.failures`.
         """
         hint = (
-            "--where chooses runs of which all paths were found: is_cut of fleet query e2e-latency"
+            "--where chooses runs whose paths were all found: is_cut of fleet query e2e-latency"
         )
         return failures(self.result, conditions, hint)
 

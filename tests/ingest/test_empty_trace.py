@@ -1,4 +1,4 @@
-"""A trace without events beside others is told; a copy, of which nothing is read, is not one."""
+"""A trace without events beside others is a finding; a copy that is not read is none."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from ros_system import RosSystem
 
 @pytest.fixture
 def system() -> RosSystem:
-    """A system of which nothing is known yet."""
+    """A system without any object yet."""
     return RosSystem()
 
 

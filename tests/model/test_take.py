@@ -72,7 +72,7 @@ def test_rmw_takes_count_where_no_rcl_take_is_traced(system: RosSystem, analyse:
 
 
 def test_a_layer_with_another_message_is_no_part(listener: RosSystem, analyse: Analyse) -> None:
-    """It is a take of its own, of which little is known."""
+    """It is a take of its own, and little is known about it."""
     first = listener.take(MAIN, 0x10, 777, message=0xB, layers="rmw")
     second = listener.take(MAIN, 0x10, 0, message=0xBB, layers="rcl rclcpp")
     assert analyse(listener).rows(TAKES) == [

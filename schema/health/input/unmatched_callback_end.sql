@@ -1,6 +1,6 @@
 -- name: finding.unmatched_callback_end
 -- title: Ends of callbacks without a start
--- description: Callbacks ended of which no start is in the trace. They are left out.
+-- description: Callbacks ended, but their start is not in the trace. They are left out.
 -- cause: Tracing started inside a callback, or events were lost.
 -- cure: Start the session before the nodes, and see whether events were lost (msgflow check).
 -- grain: one row per trace

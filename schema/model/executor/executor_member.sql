@@ -1,8 +1,8 @@
 -- name: staging.executor_member
 -- description: Which threads work for the same executor: those of a process that execute callbacks
 --     of an executor that names itself, else the same callbacks, directly or through others. The
---     smallest thread of such a group stands for it. A thread that serves several executors by
---     name belongs to the one of which it ran most.
+--     smallest thread of such a group stands for it. If a thread serves several named executors,
+--     it belongs to the one whose callbacks it ran most.
 -- grain: one row per thread that runs callbacks or emits executor events
 WITH RECURSIVE served AS (
     SELECT e.callback_id, g.executor_event_id

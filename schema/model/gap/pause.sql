@@ -49,7 +49,7 @@ regular AS (
         ON p.recording_index = c.recording_index AND p.expected_ns + p.slack_ns >= c.end_ns
     WHERE c.end_ns >= p.expected_ns - p.slack_ns
 ),
--- Buffers of which only what was in them at some time is recorded.
+-- Buffers that were recorded once, with what was in them at that moment.
 snapshot AS (
     SELECT recording_index
     FROM staging.stream_packet
