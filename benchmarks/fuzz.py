@@ -152,11 +152,11 @@ def _base(directory: Path, system: str, layout: str) -> Base:
     empty = directory / "empty.duckdb"
 
     def make() -> dict[str, Any]:
-        from msgflow.db import migrate
+        from msgflow.db import migration
         from msgflow.sim import simulate
 
         if not empty.exists():
-            migrate.create(empty)
+            migration.create(empty)
         shutil.copyfile(empty, database)
         simulation = simulate(system, place / "trace", factor=LENGTH, layout=layout)
         shutil.copytree(

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from msgflow.db import derive, objects
+from msgflow.db import derivation, objects
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -164,7 +164,12 @@ def _change(mutant: Mutant) -> None:
 
     Path.read_text = changed  # type: ignore[assignment, method-assign]
     # What collecting the tests has read.
-    for cached in (objects.load, objects.views, objects.definition_hash, derive.derivation_hash):
+    for cached in (
+        objects.load,
+        objects.views,
+        objects.definition_hash,
+        derivation.derivation_hash,
+    ):
         cached.cache_clear()
 
 

@@ -1,4 +1,4 @@
-"""Runs migrations on the connection that msgflow.db.migrate hands over."""
+"""Runs migrations on the connection that msgflow.db.migration hands over."""
 
 from alembic import context
 from alembic.ddl.impl import DefaultImpl

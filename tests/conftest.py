@@ -16,7 +16,7 @@ import thorough
 from hypothesis import settings
 from ingested import made_once
 
-from msgflow.db.migrate import create
+from msgflow.db.migration import create
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 from msgflow.trace import bt2_library

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.db.derive import derive_from_clocks
+from msgflow.db.derivation import derive_from_clocks
 from msgflow.db.runs import change_runs
 from msgflow.sql.statement import internal_sql
 

@@ -44,7 +44,7 @@ def export_parquet(
     Raises:
         UsageError: a view that is there already, or a directory that cannot be written.
     """
-    from msgflow.db.migrate import current_revision
+    from msgflow.db.migration import current_revision
 
     metadata = {
         "msgflow.version": __version__,

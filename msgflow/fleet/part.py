@@ -115,7 +115,7 @@ def write_part(
         TraceError: the run has no packets.
         DatabaseError: the lake cannot be written.
     """
-    from msgflow.db.migrate import current_revision
+    from msgflow.db.migration import current_revision
 
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(
         "SELECT run_id, name, start_ns, end_ns, event_count FROM main.run"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.db.connection import connect
-from msgflow.db.migrate import upgrade
+from msgflow.db.migration import upgrade
 from msgflow.errors import DatabaseError, MsgflowError, UsageError
 from msgflow.fleet.layout import database_path
 from msgflow.fleet.part import run_key

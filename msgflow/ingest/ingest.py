@@ -15,9 +15,9 @@ import duckdb
 
 from msgflow import trace as trace_package
 from msgflow.clocks import read_clock_sync, set_clocks
-from msgflow.db import migrate
+from msgflow.db import migration
 from msgflow.db.connection import attach
-from msgflow.db.derive import derivation_hash, derive
+from msgflow.db.derivation import derivation_hash, derive
 from msgflow.db.finding import read_findings, store_audit
 from msgflow.db.memory import (
     default_limit,
@@ -158,7 +158,7 @@ def ingest(
         with trace_package.open(paths, reader=reader, strict=strict) as traces:
             refusals.require_ros_traces(traces.traces)
             hostnames = hostnames_of(traces.traces, hosts or {})
-            migrate.require_ingestable(database)
+            migration.require_ingestable(database)
             with (
                 contextlib.nullcontext() if database.exists() else creating(database),
                 workspace(database) as directory,
@@ -365,7 +365,7 @@ def _created_meanwhile(target: _Target) -> Iterator[None]:
         yield
         return
     with ThreadPoolExecutor(1, "create the database") as executor:
-        created = executor.submit(migrate.create, target.path)
+        created = executor.submit(migration.create, target.path)
         yield
     created.result()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from msgflow.db.derive import derive
+from msgflow.db.derivation import derive
 from msgflow.db.runs import change_runs
 from msgflow.links.matching import match_links
 from msgflow.sql.statement import internal_sql

@@ -12,7 +12,7 @@ import pytest
 from golden import insert
 from typer.testing import Result
 
-from msgflow.db.derive import derive_findings
+from msgflow.db.derivation import derive_findings
 
 Msgflow = Callable[..., Result]
 

@@ -10,7 +10,7 @@ import duckdb
 from golden import fill_case
 from typer.testing import Result
 
-from msgflow.db.derive import derive
+from msgflow.db.derivation import derive
 
 Msgflow = Callable[..., Result]
 

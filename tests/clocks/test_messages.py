@@ -15,7 +15,7 @@ from possible_lines import Bound, PossibleLines
 from thorough import examples
 
 from msgflow.clocks import read_clock_sync, set_clocks
-from msgflow.db.derive import derive_findings
+from msgflow.db.derivation import derive_findings
 
 SECOND = 1_000_000_000
 MICROSECOND = 1_000

@@ -13,7 +13,7 @@ from thorough import few
 
 import msgflow
 from msgflow.clocks import apply_clocks, read_clock_sync
-from msgflow.db import definition_check, migrate, objects
+from msgflow.db import definition_check, migration, objects
 from msgflow.db.connection import connect
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
@@ -78,9 +78,9 @@ def test_a_changed_database_is_not_written(
         assert small_database.read_bytes() == before
     if name.startswith(LASTING):
         with pytest.raises(DatabaseError, match=name):
-            migrate.upgrade(small_database)
+            migration.upgrade(small_database)
         return
-    assert migrate.upgrade(small_database).views_changed
+    assert migration.upgrade(small_database).views_changed
     assert [run.name for run in msgflow.open_db(small_database).runs()] == ["morning", "noon"]
 
 
@@ -166,14 +166,14 @@ def test_a_database_of_this_msgflow_is_written_and_read(
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path / "none"))
         (tmp_path / "none").write_text("a file")
-        migrate.create(tmp_path / "new.duckdb")
+        migration.create(tmp_path / "new.duckdb")
         connect(tmp_path / "new.duckdb", read_only=False).close()
 
 
 def test_what_is_materialized_is_so_in_a_file_as_well(tmp_path: Path) -> None:
     """Files of a storage version before v1.5.0 lose the word, and with it memory and time."""
     path = tmp_path / "new.duckdb"
-    migrate.create(path)
+    migration.create(path)
     with connect(path, read_only=True) as con:
         macros = con.execute(
             "SELECT schema_name || '.' || function_name, upper(macro_definition) "

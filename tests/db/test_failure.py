@@ -13,7 +13,7 @@ import duckdb
 import pytest
 
 import msgflow
-from msgflow.db import migrate
+from msgflow.db import migration
 from msgflow.db.sandbox import open_file
 from msgflow.errors import DatabaseError, ExitCode
 from msgflow.ingest import ingest
@@ -113,7 +113,7 @@ def test_damage_is_said_by_all_that_meet_it(ingested: Path, tmp_path: Path) -> N
         lambda: msgflow.open_db(path).check(),
         lambda: msgflow.open_db(path).findings(),
         lambda: msgflow.open_db(path).apply_clocks("messages"),
-        lambda: migrate.upgrade(path),
+        lambda: migration.upgrade(path),
     ):
         with contextlib.suppress(DatabaseError):
             messages.append("none")
@@ -140,7 +140,7 @@ def test_a_database_without_a_revision_is_foreign(small_database: Path, statemen
         con.execute(statement)
     for use in (
         lambda: msgflow.open_db(small_database).runs(),
-        lambda: migrate.upgrade(small_database),
+        lambda: migration.upgrade(small_database),
     ):
         with pytest.raises(DatabaseError) as raised:
             use()
@@ -158,7 +158,7 @@ def test_what_is_no_file_is_not_opened(tmp_path: Path, trace: Path, kind: str) -
         path = Path(os.devnull)
     for use in (
         lambda: msgflow.open_db(path).runs(),
-        lambda: migrate.upgrade(path),
+        lambda: migration.upgrade(path),
         lambda: ingest([trace], path),
     ):
         with pytest.raises(DatabaseError, match="not a database file but a "):

@@ -9,7 +9,7 @@ import duckdb
 import pytest
 from golden import SYSTEMS, fill, fill_case
 
-from msgflow.db.derive import derive, derive_findings
+from msgflow.db.derivation import derive, derive_findings
 from msgflow.db.finding import (
     Finding,
     audit,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.db import migrate
+from msgflow.db import migration
 
 OLDEST = "1.5.0"
 
@@ -40,7 +40,7 @@ def old_client(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_public_view_can_be_read(old_client: Path, tmp_path: Path) -> None:
     database = tmp_path / "new.duckdb"
-    migrate.create(database)
+    migration.create(database)
     done = subprocess.run(
         [sys.executable, "-c", READ, str(database)],
         env={"PYTHONPATH": str(old_client)},

@@ -16,7 +16,7 @@ import pytest
 from golden import fill_case
 
 from msgflow import Database, UsageError, __version__
-from msgflow.db.migrate import current_revision
+from msgflow.db.migration import current_revision
 
 CASES = Path(__file__).resolve().parents[1] / "schema" / "cases"
 LARGE = 18_446_744_073_709_551_615

@@ -16,7 +16,7 @@ from ros_system import RosSystem
 from staged_events import Thread
 
 from msgflow.database import Database
-from msgflow.db.derive import derive
+from msgflow.db.derivation import derive
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 

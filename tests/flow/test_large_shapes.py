@@ -11,7 +11,7 @@ from golden import SYSTEMS, fill
 from ros_system import RosSystem
 from staged_events import Thread
 
-from msgflow.db.derive import derive
+from msgflow.db.derivation import derive
 from msgflow.db.sandbox import open_memory
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query

@@ -20,7 +20,7 @@ for name in ("schema", "migrations", "queries"):
     print(resource_directory(name))
 assert load_queries()
 from pathlib import Path
-from msgflow.db.migrate import create
+from msgflow.db.migration import create
 create(Path(sys.argv[1]))
 """
 

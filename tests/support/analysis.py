@@ -14,7 +14,7 @@ from staged_events import StagedEvents
 
 from msgflow.db import objects
 from msgflow.db.connection import attach
-from msgflow.db.derive import derive, derive_table, derived_tables, learn_topics
+from msgflow.db.derivation import derive, derive_table, derived_tables, learn_topics
 from msgflow.db.sandbox import open_memory
 from msgflow.db.store import store
 from msgflow.db.tables import STORE

@@ -41,9 +41,9 @@ import pyarrow as pa
 import pytest
 
 from msgflow.db import objects
-from msgflow.db.derive import derive, derive_table, derived_tables
+from msgflow.db.derivation import derive, derive_table, derived_tables
 from msgflow.db.finding import kinds, statement
-from msgflow.db.migrate import create
+from msgflow.db.migration import create
 from msgflow.export.formats import Format, write_result
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult

@@ -13,7 +13,7 @@ from ingested import Ingested
 from thorough import few
 
 from msgflow.db.connection import connect
-from msgflow.db.derive import derive
+from msgflow.db.derivation import derive
 from msgflow.ingest import ingest
 
 # A link by what both traces say of it: the threads' events are the same, whatever is ignored.

@@ -11,7 +11,7 @@ import pytest
 from golden import SYSTEMS, fill
 
 from msgflow.database import Database
-from msgflow.db.derive import derive
+from msgflow.db.derivation import derive
 from msgflow.verify import Verification
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from msgflow.db import derive, objects
+from msgflow.db import derivation, objects
 from msgflow.db.sandbox import open_file
 from msgflow.ingest import ingest
 from msgflow.sim import Recording, simulate
@@ -35,7 +35,7 @@ def test_a_way_back_by_a_table_is_a_circle() -> None:
 
 
 def test_each_table_is_derived_after_those_that_it_reads() -> None:
-    order = derive.derived_tables()
+    order = derivation.derived_tables()
     assert set(order) == {
         "stamp_clock", "nearest_message", "link_transport", "link_causal", "orphan_take",
         "undelivered", "flow_call", "flow_root", "flow_hop",
@@ -53,14 +53,14 @@ def test_each_table_is_derived_after_those_that_it_reads() -> None:
 
 
 def test_only_what_reads_clocks_waits_for_them() -> None:
-    assert [name for name in derive.derived_tables() if derive._reads_clocks(name)] == [
+    assert [name for name in derivation.derived_tables() if derivation._reads_clocks(name)] == [
         "undelivered"
     ]
 
 
 def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     def hashes(changed: str) -> str:
-        for cached in (derive.derivation_hash, derive.derived_tables):
+        for cached in (derivation.derivation_hash, derivation.derived_tables):
             cached.cache_clear()
         views = [
             objects.replace(one, body=f"{one.body} -- changed") if one.name == changed else one
@@ -68,20 +68,20 @@ def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPa
         ]
         with monkeypatch.context() as patched:
             patched.setattr(objects, "views", lambda: views)
-            return derive.derivation_hash()
+            return derivation.derivation_hash()
 
     now = hashes("none")
     for read in ("derive.link_causal_direct", "derive.process_gap", "derive.topic_group"):
         assert hashes(read) != now, read
     for not_read in ("derive.executor_busy", "main.flow_edge", "derive.finding_kind"):
         assert hashes(not_read) == now, not_read
-    derive.derivation_hash.cache_clear()
+    derivation.derivation_hash.cache_clear()
 
 
 SOMETIMES_EMPTY = {
     header.name: header
     for header in objects.views()
-    if header.when and header.name.removeprefix("derive.") in derive.derived_tables()
+    if header.when and header.name.removeprefix("derive.") in derivation.derived_tables()
 }
 
 
@@ -103,7 +103,7 @@ def test_tables_have_no_row_without_those_of_their_when(tmp_path: Path) -> None:
             for each in header.when:
                 empty(con, each)
             assert count(con, name) == 0, name
-            derive.derive_table(con, name.removeprefix("derive."), 1)
+            derivation.derive_table(con, name.removeprefix("derive."), 1)
             con.rollback()
 
 

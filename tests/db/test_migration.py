@@ -12,7 +12,7 @@ from pathlib import Path
 import duckdb
 import pytest
 
-from msgflow.db import derive, migrate, objects
+from msgflow.db import derivation, migration, objects
 from msgflow.db.connection import connect, recorded_revision
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
@@ -51,7 +51,7 @@ def schema_of(path: Path) -> dict[str, list[object]]:
 @pytest.fixture
 def database(tmp_path: Path) -> Path:
     path = tmp_path / "new.duckdb"
-    migrate.create(path)
+    migration.create(path)
     return path
 
 
@@ -59,13 +59,13 @@ def old_file(path: Path, revision: str) -> Path:
     """Make a file by the migrations up to `revision`, with rows, each table another number."""
     with contextlib.closing(open_file(path, read_only=False)) as con:
         con.execute("CREATE SCHEMA store")
-        with migrate.migrated(con, revision):
+        with migration.migrated(con, revision):
             pass
         for count, (table, columns) in enumerate(tables_of(con).items(), 1):
             values = ", ".join(value(place, kind) for place, kind in enumerate(columns.values()))
             con.execute(f"INSERT INTO store.{table} SELECT {values} FROM range({count}) AS _(n)")
         # Made-up rows cannot be derived anew.
-        con.execute("UPDATE store.run SET derivation_hash = ?", [derive.derivation_hash()])
+        con.execute("UPDATE store.run SET derivation_hash = ?", [derivation.derivation_hash()])
     return path
 
 
@@ -111,7 +111,7 @@ def test_a_file_of_each_revision_becomes_what_a_new_one_is(
     with pytest.raises(DatabaseError) as told:
         connect(path, read_only=True)
     assert told.value.hint == f"msgflow db upgrade --db {path}"
-    done = migrate.upgrade(path)
+    done = migration.upgrade(path)
     assert (done.before, done.after) == (revision, objects.head_revision())
     assert done.views_changed
     assert done.rederived_runs == ()
@@ -138,7 +138,7 @@ def test_a_file_with_tables_that_its_revision_does_not_have_is_refused(
     with duckdb.connect(str(path)) as con:
         con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
     with pytest.raises(DatabaseError, match=r"another table store\.take") as told:
-        migrate.upgrade(path)
+        migration.upgrade(path)
     assert told.value.hint == "ingest the traces into a new file"
     with duckdb.connect(str(path), read_only=True) as con:
         assert recorded_revision(con) == revision
@@ -181,12 +181,12 @@ def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> N
     with pytest.raises(DatabaseError, match=f"has schema revision 0001, .* needs {head}") as told:
         connect(small_database, read_only=True)
     assert told.value.hint == f"msgflow db upgrade --db {small_database}"
-    done = migrate.upgrade(small_database)
+    done = migration.upgrade(small_database)
     assert (done.before, done.after, done.views_changed) == ("0001", head, True)
     assert len(done.rederived_runs) == len(runs)
 
     new = tmp_path / "new.duckdb"
-    migrate.create(new)
+    migration.create(new)
     assert schema_of(small_database) == schema_of(new)
     with connect(small_database, read_only=True) as con:
         assert con.execute(f"{kept} ORDER BY run_id").fetchall() == runs
@@ -200,7 +200,7 @@ def test_a_failing_migration_leaves_the_file_as_it_was(small_database: Path) -> 
     with duckdb.connect(str(small_database)) as con:
         con.execute("UPDATE store.alembic_version SET version_num = '0001'")
     with pytest.raises(duckdb.CatalogException, match="clock_sync"):
-        migrate.upgrade(small_database)
+        migration.upgrade(small_database)
     with duckdb.connect(str(small_database), read_only=True) as con:
         assert recorded_revision(con) == "0001"
         assert con.execute("SELECT count(*) FROM main.run").fetchall() == [(2,)]
@@ -210,7 +210,7 @@ def test_other_tables_without_another_revision_are_refused(database: Path) -> No
     """As databases of between two releases have them."""
     with duckdb.connect(str(database)) as con:
         con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
-    for action in (lambda: connect(database, read_only=False), lambda: migrate.upgrade(database)):
+    for action in (lambda: connect(database, read_only=False), lambda: migration.upgrade(database)):
         with pytest.raises(DatabaseError, match=r"another table store\.take") as told:
             action()
         assert told.value.hint == "ingest the traces into a new file"
@@ -253,9 +253,9 @@ def test_a_new_database_needs_no_alembic(tmp_path: Path) -> None:
     program = """
 import sys
 from pathlib import Path
-from msgflow.db import migrate
-migrate.create(Path(sys.argv[1]))
-assert migrate.upgrade(Path(sys.argv[1])).before is not None
+from msgflow.db import migration
+migration.create(Path(sys.argv[1]))
+assert migration.upgrade(Path(sys.argv[1])).before is not None
 print("alembic" in sys.modules)
 """
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
@@ -330,7 +330,7 @@ def test_upgrade_applies_changed_views(database: Path) -> None:
     con.close()
     with pytest.raises(DatabaseError, match="views of another msgflow version"):
         connect(database, read_only=True)
-    done = migrate.upgrade(database)
+    done = migration.upgrade(database)
     assert done.views_changed
     assert done.before == done.after == objects.head_revision()
     con = connect(database, read_only=True)
@@ -345,9 +345,9 @@ def test_upgrade_derives_stale_runs_anew(database: Path) -> None:
         "VALUES (1, 'stale', now(), '0', 'old')"
     )
     con.close()
-    assert migrate.upgrade(database).rederived_runs == ("stale",)
+    assert migration.upgrade(database).rederived_runs == ("stale",)
     con = connect(database, read_only=True)
-    assert derive.stale_runs(con) == []
+    assert derivation.stale_runs(con) == []
 
 
 def test_upgrade_of_other_tables_is_refused(database: Path) -> None:
@@ -356,7 +356,7 @@ def test_upgrade_of_other_tables_is_refused(database: Path) -> None:
         con.execute("UPDATE store.definition SET hash = 'of before' WHERE name = 'views'")
     before = database.read_bytes()
     with pytest.raises(DatabaseError, match="lacks a table") as raised:
-        migrate.upgrade(database)
+        migration.upgrade(database)
     assert raised.value.hint == "ingest the traces into a new file"
     assert database.read_bytes() == before
 
@@ -364,18 +364,18 @@ def test_upgrade_of_other_tables_is_refused(database: Path) -> None:
 def test_upgrade_of_an_empty_database_file(tmp_path: Path) -> None:
     path = tmp_path / "empty.duckdb"
     duckdb.connect(str(path)).close()
-    assert migrate.upgrade(path).before is None
+    assert migration.upgrade(path).before is None
     assert recorded_revision(connect(path, read_only=True)) == objects.head_revision()
 
 
 def test_create_refuses_a_file_that_is_there(database: Path) -> None:
     with pytest.raises(DatabaseError, match="is there already"):
-        migrate.create(database)
+        migration.create(database)
 
 
 def test_create_needs_a_directory(tmp_path: Path) -> None:
     with pytest.raises(DatabaseError, match="cannot write"):
-        migrate.create(tmp_path / "missing" / "new.duckdb")
+        migration.create(tmp_path / "missing" / "new.duckdb")
 
 
 def test_foreign_database_is_refused(tmp_path: Path) -> None:
@@ -383,7 +383,7 @@ def test_foreign_database_is_refused(tmp_path: Path) -> None:
     con = duckdb.connect(str(path))
     con.execute("CREATE TABLE something (id INTEGER)")
     con.close()
-    for action in (lambda: connect(path, read_only=True), lambda: migrate.upgrade(path)):
+    for action in (lambda: connect(path, read_only=True), lambda: migration.upgrade(path)):
         with pytest.raises(DatabaseError, match="not one of msgflow"):
             action()
 
@@ -393,7 +393,7 @@ def test_a_file_of_another_revision_is_refused(database: Path, revision: str) ->
     with duckdb.connect(str(database)) as con:
         con.execute("UPDATE store.alembic_version SET version_num = ?", [revision])
     told_so = f"{revision}.*newer, or from before the first release"
-    for action in (lambda: connect(database, read_only=True), lambda: migrate.upgrade(database)):
+    for action in (lambda: connect(database, read_only=True), lambda: migration.upgrade(database)):
         with pytest.raises(DatabaseError, match=told_so) as told:
             action()
         assert told.value.hint == "upgrade msgflow, or ingest the traces into a new file"
@@ -419,7 +419,7 @@ def test_a_failing_view_leaves_the_old_ones(
 
     monkeypatch.setattr(objects, "create_statement", broken)
     with pytest.raises(duckdb.Error):
-        migrate.upgrade(database)
+        migration.upgrade(database)
     monkeypatch.undo()
     con = open_file(database, read_only=True)
     assert (

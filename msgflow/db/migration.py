@@ -136,7 +136,7 @@ def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
 
 
 def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
-    from msgflow.db.derive import derive, stale_runs
+    from msgflow.db.derivation import derive, stale_runs
 
     stale = stale_runs(con)
     if stale:
