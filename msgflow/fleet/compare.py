@@ -57,9 +57,7 @@ class FleetComparison:
         Raises:
             UsageError: see `msgflow.query.compare.failures`.
         """
-        hint = (
-            "--where chooses runs whose paths were all found: is_cut of fleet query e2e-latency"
-        )
+        hint = "--where chooses runs whose paths were all found: is_cut of fleet query e2e-latency"
         return failures(self.result, conditions, hint)
 
 
