@@ -44,8 +44,11 @@ def load(layer: str) -> tuple[Header, ...]:
 
     Raises:
         ValueError: two objects need each other, or a column is declared nowhere.
+        FileNotFoundError: there is no such folder.
     """
     directory = resource_directory("schema") / layer
+    if not directory.is_dir():
+        raise FileNotFoundError(directory)
     headers = [read(path) for path in sorted(directory.rglob("*.sql"))]
     if layer == PUBLIC:
         from msgflow.db.table_view import table_views

@@ -92,11 +92,13 @@ def json_rows(result: QueryResult) -> Iterator[str]:
 def _lines(result: QueryResult, form: Format) -> Iterable[str]:
     from msgflow.export.table import markdown_lines, table_lines
 
-    if form is Format.TABLE:
-        return table_lines(result)
-    if form is Format.MARKDOWN:
-        return markdown_lines(result)
-    return json_rows(result) if form is Format.JSONL else _json_array(result)
+    writers = {
+        Format.TABLE: table_lines,
+        Format.MARKDOWN: markdown_lines,
+        Format.JSONL: json_rows,
+        Format.JSON: _json_array,
+    }
+    return writers[form](result)
 
 
 def _json_array(result: QueryResult) -> Iterator[str]:

@@ -39,6 +39,12 @@ def test_the_folder_decides_what_a_finding_reads(header: Header) -> None:
     assert all(need.startswith("staging.") == is_input for need in header.needs)
 
 
+@each(kinds(), name=lambda header: header.name)
+def test_a_finding_about_a_stored_run_says_which(header: Header) -> None:
+    """Without `run_id` it would be found, and not stored."""
+    assert phase_of(header) == "input" or re.search(r"\brun_id\b", header.body)
+
+
 def test_findings_are_written_in_one_place() -> None:
     """Nothing else puts rows into their table."""
     writing = re.compile(r"INSERT INTO (?:store|staging)\.finding\b|CREATE .*\bfinding\b")

@@ -142,9 +142,7 @@ def _sections(text: str) -> Iterator[tuple[str, str]]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--update-golden", action="store_true", help="write expected.csv of golden cases"
-    )
+    parser.addoption("--update-golden", action="store_true", help="write what golden cases expect")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
