@@ -14,11 +14,11 @@ import pyarrow as pa
 
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import load
-from msgflow.ingest.inserter import Inserter
 from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
+from msgflow.trace.prefetch import Prefetch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -101,10 +101,12 @@ def load_traces(
         sequences = Sequences(catalogue, _hosts(sources))
         con.begin()
         try:
-            with Inserter(tables.add_all) as inserter:
-                for batch in _placed(batches, sequences, corrections, implausible):
+            # A thread reads the next round while DuckDB inserts this one.
+            placed = Prefetch(lambda: _placed(batches, sequences, corrections, implausible), 1)
+            with contextlib.closing(placed):
+                for item in placed.items():
                     interrupts.check()
-                    inserter.put(batch)
+                    tables.add_all(item)
             tables.flush()
             con.commit()
         except BaseException:

@@ -1,4 +1,4 @@
-"""Prefetching: an iterator runs ahead of its consumer, in a thread of its own."""
+"""Prefetch: a thread makes the items of an iterator ahead of their use."""
 
 from __future__ import annotations
 

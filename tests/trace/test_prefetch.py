@@ -13,7 +13,7 @@ from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.trace.ctf import batches, event_order
-from msgflow.trace.ctf.prefetch import Prefetch
+from msgflow.trace.prefetch import Prefetch
 
 
 def reading_threads() -> int:
