@@ -6,7 +6,6 @@ import contextlib
 import itertools
 import os
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -237,9 +236,10 @@ def _write(
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Finding, ...]]:
     watch.enter("building the model")
-    with staging.writing(con), _created_meanwhile(target):
+    with staging.writing(con):
         model.build(con, keep=keep_staging is not None)
     if target.is_new:
+        migration.create(target.path)
         attach(con, target.path, is_new=True)
     if keep_staging is not None:
         watch.enter("writing the staged events")
@@ -356,18 +356,6 @@ def _target(database: Path, directory: Path) -> Iterator[_Target]:
         ) from None
     except OSError:
         os.replace(fresh, database)  # a file system without hard links
-
-
-@contextlib.contextmanager
-def _created_meanwhile(target: _Target) -> Iterator[None]:
-    """Create a new database in another thread while DuckDB builds the model."""
-    if not target.is_new:
-        yield
-        return
-    with ThreadPoolExecutor(1, "create the database") as executor:
-        created = executor.submit(migration.create, target.path)
-        yield
-    created.result()
 
 
 class _Watch:
