@@ -17,6 +17,7 @@ import duckdb
 
 from msgflow.db import objects
 from msgflow.db.sandbox import STORAGE_VERSION, open_file
+from msgflow.db.transaction import transaction
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -38,11 +39,10 @@ def write_empty(path: Path) -> None:
         path.write_bytes(content)
         return
     with contextlib.closing(open_file(path, read_only=False)) as con:
-        con.begin()
-        for statement in _statements():
-            con.execute(statement)
-        objects.apply(con)
-        con.commit()
+        with transaction(con):
+            for statement in _statements():
+                con.execute(statement)
+            objects.apply(con)
         con.execute("CHECKPOINT")  # closing would fail silently, and leave a log behind
     _cache(path.read_bytes())
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import duckdb
 
 from msgflow.db import objects
 from msgflow.db.connection import (
@@ -21,6 +19,7 @@ from msgflow.db.connection import (
 from msgflow.db.definition_check import require_ours
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
+from msgflow.db.transaction import transaction
 from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
 from msgflow.resources import resource_directory
@@ -29,6 +28,8 @@ from msgflow.sql.failure import database_errors
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    import duckdb
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     is_older = recorded_revision(con) != objects.head_revision()
-    with migrated(con) if is_older else _transaction(con) as changing:
+    with migrated(con) if is_older else transaction(con) as changing:
         # Views need their tables. Before the first release, others had revisions of the same names.
         require_ours(changing, path, only_tables=True)
         objects.apply(changing)
@@ -140,22 +141,10 @@ def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
 
     stale = stale_runs(con)
     if stale:
-        with _transaction(con):
+        with transaction(con):
             for run_id, _ in stale:
                 derive(con, run_id)
     return tuple(name for _, name in stale)
-
-
-@contextmanager
-def _transaction(con: duckdb.DuckDBPyConnection) -> Iterator[duckdb.DuckDBPyConnection]:
-    con.begin()
-    try:
-        yield con
-        con.commit()
-    except BaseException:
-        with suppress(duckdb.Error):  # an interrupted statement has ended the transaction
-            con.rollback()
-        raise
 
 
 @contextmanager

@@ -6,10 +6,9 @@ import contextlib
 import re
 from typing import TYPE_CHECKING, TypeVar
 
-import duckdb
-
 from msgflow.db.connection import connect
 from msgflow.db.store import delete
+from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
 from msgflow.run.choice import choose_runs, is_run_name, read_runs
 from msgflow.sql.failure import database_errors
@@ -18,6 +17,8 @@ from msgflow.sql.interrupt import interruptible
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
+
+    import duckdb
 
     from msgflow.run.choice import Run
 
@@ -52,19 +53,12 @@ def change_runs(
         runs = choose_runs(read_runs(con), run)
         if not runs:
             raise UsageError(f"the database holds no run — {path}", "msgflow ingest TRACE")
-        return interruptible(con, lambda: _in_transaction(con, lambda: change(con, runs)))
 
+        def changed() -> _T:
+            with transaction(con):
+                return change(con, runs)
 
-def _in_transaction(con: duckdb.DuckDBPyConnection, work: Callable[[], _T]) -> _T:
-    con.begin()
-    try:
-        result = work()
-        con.commit()
-    except BaseException:
-        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
-            con.rollback()
-        raise
-    return result
+        return interruptible(con, changed)
 
 
 def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:

@@ -27,6 +27,7 @@ from msgflow.db.memory import (
 from msgflow.db.runs import require_run_name
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.store import delete, store
+from msgflow.db.transaction import transaction
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import model, refusals, staging
@@ -255,8 +256,7 @@ def _write_run(
     watch: _Watch,
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Finding, ...]]:
-    con.begin()
-    try:
+    with transaction(con):
         watch.enter("storing the run")
         run_id, run_name = _store(con, *names, loaded)
         watch.enter("linking messages")
@@ -268,11 +268,6 @@ def _write_run(
         store_audit(con, run_id)
         findings = tuple(read_findings(con, [run_id], info=True))
         interrupts.make_final()
-        con.commit()
-    except BaseException:
-        with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
-            con.rollback()
-        raise
     return run_id, run_name, findings
 
 

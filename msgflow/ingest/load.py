@@ -9,9 +9,9 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import duckdb
 import pyarrow as pa
 
+from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.raw_tables import RawTables
@@ -22,6 +22,8 @@ from msgflow.trace.prefetch import Prefetch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    import duckdb
 
     from msgflow.ingest.catalogue import Tracepoint
     from msgflow.ingest.overlapping_traces import Corrections
@@ -99,8 +101,7 @@ def load_traces(
         batches = traces.batches(wanted, progress=report)
         implausible = ImplausibleValues()
         sequences = Sequences(catalogue, _hosts(sources))
-        con.begin()
-        try:
+        with transaction(con):
             # A thread reads the next round while DuckDB inserts this one.
             placed = Prefetch(lambda: _placed(batches, sequences, corrections, implausible), 1)
             with contextlib.closing(placed):
@@ -108,11 +109,6 @@ def load_traces(
                     interrupts.check()
                     tables.add_all(item)
             tables.flush()
-            con.commit()
-        except BaseException:
-            with contextlib.suppress(duckdb.Error):  # the transaction may have ended by itself
-                con.rollback()
-            raise
         return implausible
 
     implausible = read(None)

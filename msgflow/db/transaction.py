@@ -1,0 +1,28 @@
+"""Transaction: the changes of a block, all or none."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+import duckdb
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@contextmanager
+def transaction(con: duckdb.DuckDBPyConnection) -> Iterator[duckdb.DuckDBPyConnection]:
+    """Commit what the block changes, or roll it back if the block raises an error.
+
+    Yields:
+        The connection itself.
+    """
+    con.begin()
+    try:
+        yield con
+        con.commit()
+    except BaseException:
+        with suppress(duckdb.Error):  # an interrupted statement has ended the transaction
+            con.rollback()
+        raise

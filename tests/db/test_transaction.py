@@ -1,0 +1,42 @@
+"""Transactions: all changes of a block, or none."""
+
+from __future__ import annotations
+
+import duckdb
+import pytest
+
+from msgflow.db.transaction import transaction
+
+
+@pytest.fixture
+def con() -> duckdb.DuckDBPyConnection:
+    con = duckdb.connect()
+    con.execute("CREATE TABLE one (number INTEGER UNIQUE)")
+    return con
+
+
+def test_the_changes_of_a_block_stay(con: duckdb.DuckDBPyConnection) -> None:
+    with transaction(con):
+        con.execute("INSERT INTO one VALUES (1)")
+    con.begin()
+    con.rollback()
+    assert con.execute("FROM one").fetchall() == [(1,)]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_error_takes_them_back(
+    con: duckdb.DuckDBPyConnection, error: type[BaseException]
+) -> None:
+    with pytest.raises(error), transaction(con):
+        con.execute("INSERT INTO one VALUES (1)")
+        raise error
+    assert con.execute("FROM one").fetchall() == []
+
+
+def test_the_error_of_an_ended_transaction_comes_through(con: duckdb.DuckDBPyConnection) -> None:
+    with pytest.raises(duckdb.ConstraintException), transaction(con):
+        con.execute("INSERT INTO one VALUES (1)")
+        con.execute("INSERT INTO one VALUES (1)")
+    with pytest.raises(ValueError, match="mine"), transaction(con):
+        con.rollback()
+        raise ValueError("mine")
