@@ -12,6 +12,7 @@ from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, require_file
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import database_errors
+from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,11 +60,10 @@ def attach(con: duckdb.DuckDBPyConnection, path: Path, *, is_new: bool = False) 
     """
     if not path.exists():
         raise DatabaseError(f"no database — {path}", "msgflow ingest TRACE")
-    quoted = str(path).replace("'", "''")
     require_file(path)
     with opening(path):
         mode = " (RECOVERY_MODE no_wal_writes)" if is_new else ""
-        con.execute(f"ATTACH '{quoted}' AS target{mode}")
+        con.execute(f"ATTACH {literal(str(path))} AS target{mode}")
     con.execute("USE target")
     if is_new:
         return

@@ -18,6 +18,7 @@ import duckdb
 from msgflow.db import objects
 from msgflow.db.sandbox import STORAGE_VERSION, open_file
 from msgflow.db.transaction import transaction
+from msgflow.sql.quoting import literal
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -89,5 +90,5 @@ def _statements() -> Iterator[str]:
         "CREATE TABLE store.alembic_version (version_num VARCHAR(32) NOT NULL, "
         "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
     )
-    revision = objects.literal(objects.head_revision())
+    revision = literal(objects.head_revision())
     yield f"INSERT INTO store.alembic_version (version_num) VALUES ({revision})"

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header
+from msgflow.sql.quoting import literal
 from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
@@ -225,8 +226,7 @@ def _row(header: Header) -> str:
         short_name(header), phase_of(header), header.severity, header.title, header.description,
         header.cause, header.cure,
     )  # fmt: skip
-    quoted = ("'" + (text or "").replace("'", "''") + "'" for text in texts)
-    return f"    ({', '.join(quoted)})"
+    return f"    ({', '.join(literal(text or '') for text in texts)})"
 
 
 def _object(name: str, description: str, grain: str, body: str) -> Header:

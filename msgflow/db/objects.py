@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.finding import composed
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, HeaderError, read
+from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -201,14 +202,14 @@ def drop(con: duckdb.DuckDBPyConnection) -> None:
         "SELECT schema_name, view_name FROM duckdb_views() WHERE NOT internal "
         "AND database_name = current_database() AND schema_name IN ('main', 'derive')"
     ).fetchall():
-        con.execute(f"DROP VIEW {_quoted(schema)}.{_quoted(name)}")
+        con.execute(f"DROP VIEW {identifier(schema)}.{identifier(name)}")
     for schema, name, kind in con.execute(
         "SELECT DISTINCT schema_name, function_name, function_type FROM duckdb_functions() "
         "WHERE NOT internal AND database_name = current_database() "
         "AND function_type IN ('macro', 'table_macro')"
     ).fetchall():
         table = "TABLE " if kind == "table_macro" else ""
-        con.execute(f"DROP MACRO {table}{_quoted(schema)}.{_quoted(name)}")
+        con.execute(f"DROP MACRO {table}{identifier(schema)}.{identifier(name)}")
 
 
 def _comment(con: duckdb.DuckDBPyConnection, header: Header) -> None:
@@ -221,12 +222,3 @@ def _comment(con: duckdb.DuckDBPyConnection, header: Header) -> None:
             f'COMMENT ON COLUMN {header.name}."{column.name}" IS '
             f"{literal(column.description + unit)}"
         )
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '""') + '"'
-
-
-def literal(text: str) -> str:
-    """Return a text as a literal of SQL."""
-    return "'" + text.replace("'", "''") + "'"

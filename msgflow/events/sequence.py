@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import duckdb
 import pyarrow as pa
 
-from msgflow.events.values import exact, literal, printable, readable
+from msgflow.events.values import exact, printable, readable
+from msgflow.sql.quoting import literal
 from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.columns import BASE
 

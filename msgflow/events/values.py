@@ -7,21 +7,13 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from msgflow.sql.quoting import literal
+
 # Controls, characters without a shape, and line separators: no terminal may obey a trace.
 _UNPRINTABLE = r"[\p{C}\p{Zl}\p{Zp}]"
 # DuckDB needs ten times as long to bind each further lambda inside a lambda.
 _MOST_LAMBDAS = 2
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
-
-
-def literal(text: str) -> str:
-    """Return a text as an SQL literal."""
-    return "'" + text.replace("'", "''") + "'"
-
-
-def identifier(name: str) -> str:
-    """Return a name as an SQL identifier."""
-    return '"' + name.replace('"', '""') + '"'
 
 
 def printable(expression: str) -> str:

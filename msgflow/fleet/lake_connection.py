@@ -24,6 +24,7 @@ from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
 from msgflow.nearest import nearest
 from msgflow.sql.failure import first_line
+from msgflow.sql.quoting import identifier
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -97,11 +98,6 @@ def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
     return [each for each in labels if each.lower() not in taken and lower.count(each.lower()) == 1]
 
 
-def quoted(name: str) -> str:
-    """Return a name in quotes, for SQL."""
-    return '"' + name.replace('"', '""') + '"'
-
-
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
 ) -> pa.Table:
@@ -110,10 +106,10 @@ def _fitting(
 
     con.register("known_run", runs)
     named = label_columns(labels, runs.column_names)
-    columns = [f"labels[$label_{n}] AS {quoted(key)}" for n, key in enumerate(named)]
+    columns = [f"labels[$label_{n}] AS {identifier(key)}" for n, key in enumerate(named)]
     # A comment at the end of the condition ends with the line.
     table = f"SELECT {', '.join(['*', *columns])} FROM known_run"
-    own = ", ".join(map(quoted, runs.column_names))
+    own = ", ".join(map(identifier, runs.column_names))
     text = f"SELECT {own} FROM ({table}) WHERE (\n{where}\n) ORDER BY run"
     try:
         found = con.sql(text, params={f"label_{n}": key for n, key in enumerate(named)})
@@ -200,7 +196,7 @@ class Reading:
         con.register("chosen_run", self.choice.runs)
         con.execute(f"CREATE TABLE {RUN} AS SELECT * EXCLUDE (is_removed) FROM chosen_run")
         con.unregister("chosen_run")
-        con.execute(f"CREATE SCHEMA {quoted(VIEWS)}")
+        con.execute(f"CREATE SCHEMA {identifier(VIEWS)}")
         for table in tables:
             is_view = table.startswith(f"{VIEWS}/")
             key = "view_part" if is_view else "part"
@@ -209,7 +205,7 @@ class Reading:
                 continue
             self.tables.add(table)
             rows = self._scan(table, found)
-            name = ".".join(map(quoted, table.split("/")))
+            name = ".".join(map(identifier, table.split("/")))
             con.execute(
                 f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) FROM {rows} AS t "
                 f"SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = r.{key}"
@@ -255,7 +251,7 @@ class Reading:
         paths = [store.full(part_path(table, part)) for part in parts]
         if store.is_local:
             self._local_files += paths
-            self.connection.execute(f"SET VARIABLE {quoted(name)} = $paths", {"paths": paths})
+            self.connection.execute(f"SET VARIABLE {identifier(name)} = $paths", {"paths": paths})
             return (
                 f"read_parquet(getvariable('{name}'), union_by_name = true,"
                 " hive_partitioning = true, hive_types_autocast = false)"
@@ -283,7 +279,7 @@ class Reading:
             keys = self.choice.runs["run"].combine_chunks()
             dataset = dataset.filter(ds.field("run").isin(keys))
         self.connection.register(name, dataset)
-        return quoted(name)
+        return identifier(name)
 
 
 @contextmanager

@@ -24,7 +24,6 @@ from msgflow.fleet.lake_connection import (
     Reading,
     choose,
     lake_errors,
-    quoted,
     what_there_is,
 )
 from msgflow.fleet.layout import VIEWS
@@ -36,6 +35,7 @@ from msgflow.query.selection import CUT_COLUMN, INTERNAL_COLUMN, make_selection,
 from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, relations_of
 from msgflow.sql.interrupt import interruptible
+from msgflow.sql.quoting import identifier
 from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
@@ -272,7 +272,7 @@ def _group(
     columns: list[Column] = []
     for name in dict.fromkeys(group_by):
         if name in fields:
-            values.append(quoted(name))
+            values.append(identifier(name))
         elif name in choice.labels:
             bound[f"key_{len(values)}"] = name
             values.append(f"labels[$key_{len(values)}]")
@@ -284,7 +284,8 @@ def _group(
         title = f"label_{name}" if name.lower() in taken else name
         columns.append(Column(title, "VARCHAR", None, f"Value of {name}"))
     listed = "".join(
-        f", {value} AS {quoted(column.name)}" for value, column in zip(values, columns, strict=True)
+        f", {value} AS {identifier(column.name)}"
+        for value, column in zip(values, columns, strict=True)
     )
     number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
     rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=_used(bound, number))

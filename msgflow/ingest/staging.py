@@ -19,6 +19,7 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
+from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -102,21 +103,11 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
         directory: where their files are made; None leaves both in memory.
     """
     for name in ("raw", "staging"):
-        path = ":memory:" if directory is None else _quoted(directory / f"{name}.duckdb")
+        path = ":memory:" if directory is None else str(directory / f"{name}.duckdb")
         # Staged tables are of no use after a crash.
-        con.execute(f"ATTACH '{path}' AS {name} (RECOVERY_MODE no_wal_writes)")
+        con.execute(f"ATTACH {literal(path)} AS {name} (RECOVERY_MODE no_wal_writes)")
     for statement in _tables():
         con.execute(statement)
-
-
-def statements() -> tuple[str, ...]:
-    """Return the statements that create the tables and views of events in `raw` and `staging`."""
-    catalogue = load()
-    return (
-        *_tables(),
-        _event_view(catalogue.of_threads),
-        _predecessor_view(catalogue.of_threads),
-    )
 
 
 def _tables() -> tuple[str, ...]:
@@ -222,9 +213,5 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     ).fetchall()
     for (name,) in names:
         if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall():
-            target = _quoted(directory / f"{name}.parquet")
-            con.execute(f"COPY {name} TO '{target}' (FORMAT parquet)")
-
-
-def _quoted(path: Path) -> str:
-    return str(path).replace("'", "''")
+            target = literal(str(directory / f"{name}.parquet"))
+            con.execute(f"COPY {name} TO {target} (FORMAT parquet)")

@@ -27,16 +27,21 @@ def test_the_changes_of_a_block_stay(con: duckdb.DuckDBPyConnection) -> None:
 def test_an_error_takes_them_back(
     con: duckdb.DuckDBPyConnection, error: type[BaseException]
 ) -> None:
-    with pytest.raises(error), transaction(con):
-        con.execute("INSERT INTO one VALUES (1)")
-        raise error
+    def change() -> None:
+        with transaction(con):
+            con.execute("INSERT INTO one VALUES (1)")
+            raise error
+
+    with pytest.raises(error):
+        change()
     assert con.execute("FROM one").fetchall() == []
 
 
 def test_the_error_of_an_ended_transaction_comes_through(con: duckdb.DuckDBPyConnection) -> None:
-    with pytest.raises(duckdb.ConstraintException), transaction(con):
-        con.execute("INSERT INTO one VALUES (1)")
-        con.execute("INSERT INTO one VALUES (1)")
-    with pytest.raises(ValueError, match="mine"), transaction(con):
-        con.rollback()
-        raise ValueError("mine")
+    def change() -> None:
+        with transaction(con):
+            con.rollback()
+            raise ValueError("mine")
+
+    with pytest.raises(ValueError, match="mine"):
+        change()
