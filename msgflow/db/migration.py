@@ -49,11 +49,6 @@ class Upgrade:
     rederived_runs: tuple[str, ...]
 
 
-def current_revision(con: duckdb.DuckDBPyConnection) -> str | None:
-    """Return the schema revision of a database, None if it is not one of msgflow."""
-    return recorded_revision(con)
-
-
 def create(path: Path) -> None:
     """Create a database at `path`, complete or not at all.
 

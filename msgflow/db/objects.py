@@ -29,9 +29,6 @@ PUBLIC = "public"
 HEALTH = "health"
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
-# Schemas of a database: tables, objects derived from them, and objects for users.
-SCHEMAS = ("store", "derive", "main")
-
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
 _DECLARATION = ("tables/*.py", "table_*.py", "empty_database.py", "finding.py")
 

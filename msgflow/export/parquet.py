@@ -44,11 +44,11 @@ def export_parquet(
     Raises:
         UsageError: a view that is there already, or a directory that cannot be written.
     """
-    from msgflow.db.migration import current_revision
+    from msgflow.db.connection import recorded_revision
 
     metadata = {
         "msgflow.version": __version__,
-        "msgflow.schema_revision": current_revision(connection.cursor()) or "",
+        "msgflow.schema_revision": recorded_revision(connection.cursor()) or "",
     }
     counts: dict[str, int] = {}
     with replacing_entries(directory, selection.views, force=force) as aside:

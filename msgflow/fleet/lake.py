@@ -26,7 +26,6 @@ from msgflow.fleet.layout import (
     part_path,
     require_readable,
     run_schema,
-    view_path,
 )
 from msgflow.fleet.parquet import read_parquet
 
@@ -324,11 +323,6 @@ class Lake:
         """
         parts = {part for part in runs["part"].to_pylist() if part is not None}
         return [part_path(table, part) for part in sorted(parts)]
-
-    def view_files(self, view: str, runs: pa.Table) -> list[str]:
-        """Return the files with a public view of some runs, from the root of the lake, sorted."""
-        parts = {part for part in runs["view_part"].to_pylist() if part is not None}
-        return [view_path(view, part) for part in sorted(parts)]
 
 
 def visible(rows: pa.Table, con: duckdb.DuckDBPyConnection | None = None) -> pa.Table:

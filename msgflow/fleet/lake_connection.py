@@ -300,8 +300,3 @@ def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
             f"cannot read the lake: {first_line(error)} — {lake.store.url}",
             "check that it can be reached, and that nobody else than msgflow has written there",
         ) from error
-
-
-def open_runs(lake: Lake, where: str | None = None, tables: Sequence[str] | None = None) -> Reading:
-    """Open the runs of a lake that fit a condition: `choose`, then `Reading`."""
-    return Reading(choose(lake, where), tables)

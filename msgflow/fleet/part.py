@@ -115,14 +115,14 @@ def write_part(
         TraceError: the run has no packets.
         DatabaseError: the lake cannot be written.
     """
-    from msgflow.db.migration import current_revision
+    from msgflow.db.connection import recorded_revision
 
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(
         "SELECT run_id, name, start_ns, end_ns, event_count FROM main.run"
     ).fetchall()
     key = run_key(connection, run_id)
     part = part_name(key, source, options)
-    revision = current_revision(connection.cursor()) or ""
+    revision = recorded_revision(connection.cursor()) or ""
     written = _Writer(store, scratch, key, revision)
     for answer in answers():
         rows = answer.read(connection, run_id).to_reader(_ROWS_AT_ONCE)

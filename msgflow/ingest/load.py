@@ -81,8 +81,8 @@ def load_traces(
     """
     catalogue = load()
     wanted = {
-        name: tracepoint.arrow_schema()
-        for name, tracepoint in catalogue.in_traces.items()
+        name: schema
+        for name, schema in catalogue.arrow_schemas().items()
         if not _is_ignored(name, ignore)
     }
     sources = _sources(traces.traces, hostnames)

@@ -16,7 +16,7 @@ import pytest
 from golden import fill_case
 
 from msgflow import Database, UsageError, __version__
-from msgflow.db.migration import current_revision
+from msgflow.db.connection import recorded_revision
 
 CASES = Path(__file__).resolve().parents[1] / "schema" / "cases"
 LARGE = 18_446_744_073_709_551_615
@@ -50,7 +50,7 @@ def test_every_public_view_becomes_files_that_say_what_they_are(
     with Database(small_database) as database:
         views = {row["view"] for row in database.schema().to_arrow().to_pylist()}
         exported = database.export_parquet(out)
-        revision = current_revision(database.connection.cursor())
+        revision = recorded_revision(database.connection.cursor())
     assert {view.view for view in exported} == views
     assert {path.name for path in out.iterdir()} == views
     for view in exported:

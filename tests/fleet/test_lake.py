@@ -17,7 +17,7 @@ from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import compact
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import run_schema
+from msgflow.fleet.layout import run_schema, view_path
 from msgflow.fleet.part import Content, Part, part_name, write_part
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
@@ -183,7 +183,8 @@ def test_files_say_what_they_are(holding: tuple[Lake, Part, Part]) -> None:
     lake.commit([row(part)])
     (flow,) = lake.files("flow", lake.runs())
     (run,) = lake.run_files()
-    (view,) = lake.view_files("node", lake.runs())
+    (view_part,) = lake.runs()["view_part"].to_pylist()
+    view = view_path("node", view_part)
     for path, table in ((flow, "flow"), (run, "run"), (view, "node")):
         meta = pq.read_schema(lake.store.full(path)).metadata
         assert meta[b"msgflow.table"] == table.encode()

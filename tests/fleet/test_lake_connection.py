@@ -14,7 +14,7 @@ from sql_attack import ALLOWED, SECRET, answered, attack, content
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.lake_connection import choose, open_runs
+from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.lake_query import fleet_query, fleet_sql, fleet_worst
 from msgflow.fleet.run_database import open_run
 from msgflow.query.result import QueryResult
@@ -82,7 +82,7 @@ def test_a_label_called_like_a_column_is_not_mistaken(tmp_path: Path) -> None:
 def test_only_files_of_the_chosen_runs_are_opened(
     night: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with open_runs(night, "robot = 'r2'", ["flow"]) as reading:
+    with Reading(choose(night, "robot = 'r2'"), ["flow"]) as reading:
         (files,) = reading.connection.execute("SELECT getvariable('files of flow')").fetchall()
         assert len(files[0]) == 1
         found = reading.connection.execute("SELECT DISTINCT run FROM flow").fetchall()
@@ -94,7 +94,7 @@ def test_only_files_of_the_chosen_runs_are_opened(
 def test_the_connection_reaches_nothing_else(night: Lake, tmp_path: Path) -> None:
     other = tmp_path / "other.csv"
     other.write_text("a\n1\n")
-    with open_runs(night, tables=["flow"]) as reading:
+    with Reading(choose(night), ["flow"]) as reading:
         con = reading.connection
         for sql in (
             f"FROM read_csv('{other}')",
@@ -123,7 +123,7 @@ def test_sql_on_a_lake_reads_its_tables_and_changes_no_file(night: Lake, tmp_pat
     def sql(text: str, *, limit: int | None) -> QueryResult:
         return fleet_sql(copied, text, limit=limit)
 
-    with open_runs(copied) as reading:
+    with Reading(choose(copied)) as reading:
         ((count,),) = reading.connection.execute("SELECT count(*) FROM flow").fetchall()
         assert count > 0
         for file in (tmp_path / "other.csv", lake / "flow" / "other.csv"):
@@ -136,7 +136,7 @@ def test_sql_on_a_lake_reads_its_tables_and_changes_no_file(night: Lake, tmp_pat
 
 
 def test_all_tables_are_there_and_rows_of_runs_that_count(night: Lake) -> None:
-    with open_runs(night) as reading:
+    with Reading(choose(night)) as reading:
         tables = {
             (schema, name)
             for schema, name in reading.connection.execute(
@@ -155,11 +155,11 @@ def test_a_damaged_file_is_said(tmp_path: Path) -> None:
     lake = Lake.open_or_create(tmp_path / "lake")
     lake.commit([{"run": "1", "generation": 1, "is_removed": False, "part": "1-x"}])
     # A table without files is not there.
-    with open_runs(lake, tables=["flow"]) as reading, pytest.raises(duckdb.CatalogException):
+    with Reading(choose(lake), ["flow"]) as reading, pytest.raises(duckdb.CatalogException):
         reading.connection.execute("FROM flow")
     lake.store.put("flow/part=1-x/data.parquet", b"no parquet")
     with pytest.raises(DatabaseError, match="cannot read the lake"):
-        open_runs(lake, tables=["flow"])
+        Reading(choose(lake), ["flow"])
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +192,7 @@ def test_a_bucket_answers_as_a_folder_does(
     )
     assert len(fleet_worst(lake, "/", limit=3)) == 3
     # The text for DuckDB has no credentials, and DuckDB reaches nothing itself.
-    with open_runs(lake, tables=["flow"]) as reading:
+    with Reading(choose(lake), ["flow"]) as reading:
         said = str(reading.connection.execute("FROM duckdb_settings()").fetchall())
         assert not any(secret in said for secret in KEYS.values() if "-east-" not in secret)
         with pytest.raises(duckdb.Error):
