@@ -713,11 +713,11 @@ class Database:
         return self._ask(lambda: read_runs(connection))
 
     def check(self) -> list[Finding]:
-        """Return the rules of the database that are broken; none in a sound one."""
-        from msgflow.db.finding import audit
+        """Return the broken rules of the database, as findings; a sound database breaks none."""
+        from msgflow.db.finding import broken_rules
 
         connection = self.connection
-        return self._ask(lambda: audit(connection))
+        return self._ask(lambda: broken_rules(connection))
 
     def findings(self, *, run: str | int | None = None) -> list[Finding]:
         """Return what is wrong with a recording: errors, then warnings, with cause and cure.

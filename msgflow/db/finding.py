@@ -147,9 +147,9 @@ def store_findings(con: duckdb.DuckDBPyConnection, run_id: int, headers: Sequenc
         )
 
 
-def store_audit(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
-    """Store the rules of the database that a new run breaks, inside the open transaction."""
-    for finding in audit(con, run_id):
+def store_broken_rules(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+    """Store the broken rules of a new run, inside the open transaction."""
+    for finding in broken_rules(con, run_id):
         con.execute(
             "INSERT INTO store.finding (run_id, name, subject, count, detail) "
             "VALUES (?, ?, ?, ?, ?)",
@@ -176,8 +176,8 @@ def read_findings(
     return sorted((each for each in findings if info or each.severity != "info"), key=_order)
 
 
-def audit(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
-    """Return the rules of the database that are broken now, in the order of `read_findings`.
+def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
+    """Return the broken rules of the database, in the order of `read_findings`.
 
     Args:
         con: connection to a current database.

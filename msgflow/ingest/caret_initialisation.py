@@ -65,7 +65,7 @@ def _insert(again: Tracepoint, first: Tracepoint) -> str:
     columns = ", ".join(f'"{name}"' for name in ("event_id", *_LEADING, *payload))
     values = ", ".join(f'a."{name}"' for name in (*_LEADING, *payload))
     same = " AND ".join(f'a."{name}" IS NOT DISTINCT FROM o."{name}"' for name in payload)
-    told = ", ".join(f'e."{field.name}"' for field in again.fields)
+    reported = ", ".join(f'e."{field.name}"' for field in again.fields)
     process = "p.trace_index AS host, p.pid_ns, p.vpid"
     return f"""
 INSERT INTO raw.{first.table} ({columns})
@@ -75,7 +75,7 @@ FROM (
     FROM raw.{again.table} AS e
     JOIN raw.thread AS p ON e.thread_index = p.thread_index
     QUALIFY row_number() OVER (
-        PARTITION BY p.trace_index, p.pid_ns, p.vpid, {told}
+        PARTITION BY p.trace_index, p.pid_ns, p.vpid, {reported}
         ORDER BY e.event_id
     ) = 1
 ) AS a

@@ -76,7 +76,7 @@ pace AS (
 missing_stretch AS (
     SELECT DISTINCT subscription_id, derive.stretch(arrival_ns) AS stretch FROM missing
 ),
-told AS MATERIALIZED (
+condensed AS MATERIALIZED (
     SELECT
         d.subscription_id, d.publisher_id, min(d.arrival_ns) AS arrival_ns,
         min(d.taken_ns) AS taken_ns
@@ -95,17 +95,17 @@ later_of_publisher AS (
         min(taken_ns) OVER (
             PARTITION BY subscription_id, publisher_id ORDER BY arrival_ns DESC
         ) AS taken_ns
-    FROM told
+    FROM condensed
 ),
 later_of_any AS (
     SELECT
         subscription_id, arrival_ns,
         min(taken_ns) OVER (PARTITION BY subscription_id ORDER BY arrival_ns DESC) AS taken_ns
-    FROM told
+    FROM condensed
 ),
 earliest AS (
     SELECT subscription_id, publisher_id, min(arrival_ns) AS arrival_ns
-    FROM told
+    FROM condensed
     GROUP BY subscription_id, publisher_id
 ),
 -- Takes that could be any message, and those that could be one without a stamp.
@@ -167,7 +167,7 @@ due_stretch AS (
     SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due
 ),
 -- Of a stretch in which no message is due, only the first wait can be the next one after any.
-told_wait AS (
+condensed_wait AS (
     SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
     FROM long_wait AS w
     LEFT JOIN due_stretch AS d
@@ -195,7 +195,7 @@ waiting AS (
             OR k.row_length >= greatest(k.queue_depth, derive.delivery_limit().least_row)
         ) AS is_starved
     FROM due AS k
-    ASOF LEFT JOIN told_wait AS w
+    ASOF LEFT JOIN condensed_wait AS w
         ON k.subscription_id = w.subscription_id AND k.due_ns <= w.end_ns
 ),
 decided AS (

@@ -97,7 +97,7 @@ run_change AS (
     FROM change
     WHERE step IN (1, 3)
 ),
-told AS (
+described AS (
     SELECT
         s.run_id, s.thread_id, s.at_ns, s.next_ns, s.next_step, s.next_kind, s.step, s.state,
         s.kind IS NOT NULL AS has_callback,
@@ -134,7 +134,7 @@ classified AS (
                 THEN 'blocked'
             ELSE 'select'
         END AS activity
-    FROM told AS t
+    FROM described AS t
     JOIN store.executor_thread AS x ON t.thread_id = x.thread_id
     JOIN store.executor AS e ON x.executor_id = e.executor_id
 )

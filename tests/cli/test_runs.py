@@ -19,7 +19,7 @@ from ingested import contents
 from typer.testing import Result
 
 from msgflow.database import Database
-from msgflow.db.finding import audit
+from msgflow.db.finding import broken_rules
 from msgflow.ingest import ingest
 from msgflow.sim import simulate
 
@@ -79,7 +79,7 @@ def test_remove_leaves_the_others_as_they_were(
         assert opened.sql("SELECT DISTINCT run_id FROM publication").to_arrow().to_pylist() == [
             {"run_id": 2}
         ]
-        assert audit(opened.connection, 2) == []
+        assert broken_rules(opened.connection, 2) == []
     assert msgflow("ingest", ingested.parent / "before", "--db", database).exit_code == 0
     assert names(msgflow, database) == ["after", "before"]
 

@@ -1,4 +1,4 @@
-"""Findings: stored, read and audited; and where one needs more than its golden case."""
+"""Findings: stored and read, and broken rules; and where one needs more than its golden case."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from golden import SYSTEMS, fill, fill_case
 from msgflow.db.derivation import derive, derive_findings
 from msgflow.db.finding import (
     Finding,
-    audit,
+    broken_rules,
     kinds_of,
     read_findings,
     statement,
-    store_audit,
+    store_broken_rules,
 )
 from msgflow.sql.header import Header
 
@@ -234,7 +234,7 @@ def test_what_is_not_wrong_is_read_on_request(database: duckdb.DuckDBPyConnectio
     ]
 
 
-def test_an_audit_names_the_run_and_the_place(database: duckdb.DuckDBPyConnection) -> None:
+def test_a_broken_rule_names_the_run_and_the_place(database: duckdb.DuckDBPyConnection) -> None:
     fill(
         database,
         {
@@ -243,13 +243,13 @@ def test_an_audit_names_the_run_and_the_place(database: duckdb.DuckDBPyConnectio
             "thread": "thread_id,run_id,process_id\n1,1,1\n2,2,7\n",
         },
     )
-    assert audit(database, 1) == []
+    assert broken_rules(database, 1) == []
     broken = [("interval_is_ordered", 2, "publication", 1), ("relation_is_kept", 2, "thread", 1)]
-    for found in (audit(database), audit(database, 2)):
+    for found in (broken_rules(database), broken_rules(database, 2)):
         assert [
             (each.name, each.run_id, each.subject.partition(".")[0], each.count) for each in found
         ] == broken
         assert all(each.phase == "database" and each.severity == "error" for each in found)
     for run_id in (1, 2):
-        store_audit(database, run_id)
-    assert read_findings(database, [1, 2]) == audit(database)
+        store_broken_rules(database, run_id)
+    assert read_findings(database, [1, 2]) == broken_rules(database)

@@ -108,9 +108,9 @@ def test_a_file_of_each_revision_becomes_what_a_new_one_is(
     """The newest is one of them: its migrations make what the declaration of the tables says."""
     path = old_file(tmp_path / "old.duckdb", revision)
     before = rows_by_count(path)
-    with pytest.raises(DatabaseError) as told:
+    with pytest.raises(DatabaseError) as refused:
         connect(path, read_only=True)
-    assert told.value.hint == f"msgflow db upgrade --db {path}"
+    assert refused.value.hint == f"msgflow db upgrade --db {path}"
     done = migration.upgrade(path)
     assert (done.before, done.after) == (revision, objects.head_revision())
     assert done.views_changed
@@ -137,9 +137,9 @@ def test_a_file_with_tables_that_its_revision_does_not_have_is_refused(
     path = old_file(tmp_path / "old.duckdb", revision)
     with duckdb.connect(str(path)) as con:
         con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
-    with pytest.raises(DatabaseError, match=r"another table store\.take") as told:
+    with pytest.raises(DatabaseError, match=r"another table store\.take") as refused:
         migration.upgrade(path)
-    assert told.value.hint == "ingest the traces into a new file"
+    assert refused.value.hint == "ingest the traces into a new file"
     with duckdb.connect(str(path), read_only=True) as con:
         assert recorded_revision(con) == revision
 
@@ -178,9 +178,11 @@ def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> N
     assert len(runs) == len(synchronised)
 
     head = objects.head_revision()
-    with pytest.raises(DatabaseError, match=f"has schema revision 0001, .* needs {head}") as told:
+    with pytest.raises(
+        DatabaseError, match=f"has schema revision 0001, .* needs {head}"
+    ) as refused:
         connect(small_database, read_only=True)
-    assert told.value.hint == f"msgflow db upgrade --db {small_database}"
+    assert refused.value.hint == f"msgflow db upgrade --db {small_database}"
     done = migration.upgrade(small_database)
     assert (done.before, done.after, done.views_changed) == ("0001", head, True)
     assert len(done.rederived_runs) == len(runs)
@@ -211,9 +213,9 @@ def test_other_tables_without_another_revision_are_refused(database: Path) -> No
     with duckdb.connect(str(database)) as con:
         con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
     for action in (lambda: connect(database, read_only=False), lambda: migration.upgrade(database)):
-        with pytest.raises(DatabaseError, match=r"another table store\.take") as told:
+        with pytest.raises(DatabaseError, match=r"another table store\.take") as refused:
             action()
-        assert told.value.hint == "ingest the traces into a new file"
+        assert refused.value.hint == "ingest the traces into a new file"
 
 
 def test_a_new_database_is_the_same_with_and_without_a_cache(
@@ -392,11 +394,11 @@ def test_foreign_database_is_refused(tmp_path: Path) -> None:
 def test_a_file_of_another_revision_is_refused(database: Path, revision: str) -> None:
     with duckdb.connect(str(database)) as con:
         con.execute("UPDATE store.alembic_version SET version_num = ?", [revision])
-    told_so = f"{revision}.*newer, or from before the first release"
+    message = f"{revision}.*newer, or from before the first release"
     for action in (lambda: connect(database, read_only=True), lambda: migration.upgrade(database)):
-        with pytest.raises(DatabaseError, match=told_so) as told:
+        with pytest.raises(DatabaseError, match=message) as refused:
             action()
-        assert told.value.hint == "upgrade msgflow, or ingest the traces into a new file"
+        assert refused.value.hint == "upgrade msgflow, or ingest the traces into a new file"
 
 
 def test_a_text_file_is_no_database(tmp_path: Path) -> None:

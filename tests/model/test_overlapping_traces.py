@@ -8,7 +8,7 @@ from ros_system import RosSystem
 from staged_events import Thread
 from thorough import few
 
-from msgflow.db.finding import audit
+from msgflow.db.finding import broken_rules
 
 MILLISECOND = 1_000_000
 PERIOD = 2 * MILLISECOND
@@ -78,7 +78,7 @@ def counts(model: Analysis) -> tuple[int, int, int, int]:
 
 
 def failed_checks(model: Analysis) -> list[str]:
-    return [finding.name for finding in audit(model.connection, 1)]
+    return [finding.name for finding in broken_rules(model.connection, 1)]
 
 
 def test_a_second_session_counts_nothing_twice(system: RosSystem, analyse: Analyse) -> None:

@@ -7,7 +7,7 @@ from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
 
-from msgflow.db.finding import audit
+from msgflow.db.finding import broken_rules
 
 MAIN = Thread(100)
 OTHER = Thread(100, 101)
@@ -300,7 +300,7 @@ def test_a_placeholder_of_a_buffer_is_not_said_to_miss_messages(
     analysis = analyse(system)
     assert analysis.rows("SELECT topic_name, is_inferred FROM subscription") == [("/a", True)]
     assert analysis.rows("SELECT publication_id, status FROM stat_delivery") == [(1, "delivered")]
-    assert audit(analysis.connection) == []
+    assert broken_rules(analysis.connection) == []
 
 
 def test_several_callbacks_behind_a_ring_buffer(system: RosSystem, analyse: Analyse) -> None:

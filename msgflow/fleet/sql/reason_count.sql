@@ -3,7 +3,7 @@
 -- description: Adds up what stands in the column reasons of delivery as 'reason 3, other 2'.
 -- grain: one row per group of runs, topic, receiving node and column
 -- kind: inline
-WITH told AS (
+WITH listed AS (
     SELECT g.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
     FROM delivery AS d
     JOIN run_group AS g ON d.run = g.run
@@ -14,7 +14,7 @@ WITH told AS (
 ),
 part AS (
     SELECT label_group, topic_name, subscriber, name, unnest(string_split(text, ', ')) AS text
-    FROM told
+    FROM listed
 ),
 counted AS (
     SELECT

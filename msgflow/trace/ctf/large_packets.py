@@ -71,10 +71,10 @@ def cut(
             piece.clock_before = int(events.clock[at - 1])
         pieces.append(piece)
     clock = events.clock
-    told = PacketEvents(
+    summary = PacketEvents(
         entry, begins.size, int(clock[0]), int(clock[-1]), int(ts_ns[-1]), falls_back=False
     )
-    return told, pieces
+    return summary, pieces
 
 
 def _say_nothing(entry: Entry, offset: int, message: str) -> None:

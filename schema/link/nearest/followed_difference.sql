@@ -13,7 +13,7 @@
 -- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
 -- param: regions VARCHAR  Rows as of derive.agreed_difference, and is_taken_here, stretch_ns
 CREATE OR REPLACE MACRO derive.followed_difference(regions) AS TABLE
-WITH RECURSIVE told AS (
+WITH RECURSIVE preferred AS (
     SELECT
         clock_id, stretch, difference_ns, wander_ns,
         lead(difference_ns, 1) OVER on_clock AS next_ns,
@@ -71,7 +71,7 @@ ballot AS MATERIALIZED (
         coalesce(bool_or(t.later_ns IS NOT NULL), false) AS has_later,
         count(*) OVER (PARTITION BY r.clock_id) <= 2 AS is_short
     FROM query_table(regions) AS r
-    LEFT JOIN told AS t ON r.clock_id = t.clock_id AND r.stretch = t.stretch
+    LEFT JOIN preferred AS t ON r.clock_id = t.clock_id AND r.stretch = t.stretch
     GROUP BY r.clock_id, r.stretch
 ),
 followed (

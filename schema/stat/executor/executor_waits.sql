@@ -135,7 +135,7 @@ waiting AS (
     UNION
     SELECT executor_id FROM poll
 ),
-told AS (
+measured AS (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
         r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.is_loss_affected,
@@ -173,6 +173,6 @@ SELECT
     CASE WHEN r.earliest_ns IS NOT NULL THEN r.blocked_max_ns END AS blocked_max_ns,
     r.idle_ns,
     r.is_loss_affected
-FROM told AS r
+FROM measured AS r
 JOIN store.thread AS t ON r.thread_id = t.thread_id
 JOIN derive.process_clock AS c ON t.process_id = c.process_id
