@@ -9,7 +9,7 @@
 -- column: name VARCHAR       What was found
 -- column: count BIGINT       How often
 -- column: subject VARCHAR    Where: a trace, process, host, topic
--- column: detail VARCHAR     Numbers, and what it means
+-- column: detail VARCHAR     Numbers, and what they mean
 -- column: phase VARCHAR      What it is about: input, recording or database
 -- brief: severity, name, count, detail, subject
 SELECT

@@ -97,6 +97,6 @@ Table(
     text("name", "Kind of finding: its file in `schema/health`", required=True),
     text("subject", "Where: a trace, process, host, topic; NULL: the trace, or all of the phase"),
     number("count", "How often"),
-    text("detail", "Numbers"),
+    text("detail", "Numbers, and what they mean"),
     comment="One row per place at which something was found",
 )

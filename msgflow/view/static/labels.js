@@ -21,7 +21,7 @@ const TITLES = {
   sink_event: "ends with", lost_reasons: "reasons", is_cut: "search cut", what: "what",
   topic_name: "topic", is_loss_affected: "touched by losses", rate_hz: "rate",
   callback_share: "busy", orphans: "takes without publication", cliffs_delta: "Cliff's delta",
-  start_at: "begin", length: "duration", subject: "path", a_ns: "A", b_ns: "B",
+  start_at: "begin", length: "duration", a_ns: "A", b_ns: "B",
   difference_ns: "B − A", change_percent: "change", low_ns: "95 % interval, from", high_ns: "to",
   a_count: "values of A", b_count: "values of B", share: "share", affected_percent: "affected",
   seen_ns: "seen", executor_kind: "executor", root_at: "began at",

@@ -172,10 +172,9 @@ export class LakePage {
   }
 
   findings() {
-    const { columns } = this.finding;
-    const finding = { ...this.finding, where: this.finding.subject, columns: columns.map((column) => (column.name === "subject" ? { ...column, name: "where" } : column)) };
+    const { finding } = this;
     return h("section", {}, h("h2", {}, "What is wrong with recordings"),
-      finding.rows ? dataTable(finding, { columns: ["title", "severity", "runs", "count", "worst_run", "where", "cure"], label: "findings" }) : h("p", {}, "Nothing is wrong with them."), command(finding.meta.command));
+      finding.rows ? dataTable(finding, { columns: ["title", "severity", "runs", "count", "worst_run", "subject", "cure"], label: "findings" }) : h("p", {}, "Nothing is wrong with them."), command(finding.meta.command));
   }
 
   failures() {

@@ -6,7 +6,7 @@
 -- cure: Stop the session before copying (lttng stop, lttng destroy), check the free space, copy
 --     again and compare sizes.
 -- grain: one row per field of an event
--- severity: error
+-- severity: warning
 SELECT
     value_count AS count,
     printf('values of %s in %s that cannot be %s: left out', field, event, what) AS detail
