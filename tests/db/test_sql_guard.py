@@ -219,6 +219,9 @@ def test_what_is_refused_is_said(small_database: Path) -> None:
                 "WITH x AS (DELETE FROM store.run RETURNING *) FROM x",
                 "not a statement that only reads — WITH",
             ),
+            # DuckDB runs neither as a part of a SELECT.
+            ("PRAGMA version", "not a statement that only reads — PRAGMA"),
+            ("CALL pragma_version()", "not a statement that only reads — CALL"),
             ("SELECT 1; SELECT 2", "one query at a time — 2 statements"),
         ):
             with pytest.raises(QueryError, match=message) as raised:
