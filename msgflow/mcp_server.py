@@ -366,7 +366,7 @@ def _with_short_cells(text: str) -> str:
 
 
 def _answer(said: dict[str, Any], rows: Iterable[str], notes: Sequence[str] = ()) -> str:
-    """Return JSON of rows, as many as there is room for, and of what is to be said of them."""
+    """Return JSON of the fields in `said`, the notes, and as many rows as there is room for."""
     texts = list(rows)
     room = MOST_CHARACTERS
     shown: list[str] = []

@@ -1,8 +1,8 @@
-"""The check that the tables, views and macros in a database are those of this msgflow.
+"""Definition check: tables, views and macros of a database are those of this msgflow.
 
-Commands that write make it first: they would run changed views, macros and triggers of the file.
-DuckDB renders definitions in its own way, and those of a file not as those just created. Hence the
-definitions are compared with those of a new file.
+Commands that write check this first, since they would run changed views, macros and triggers.
+DuckDB prints definitions in its own words, and prints those of a file differently from those just
+created. Hence the check compares the definitions with those of a new file.
 """
 
 from __future__ import annotations

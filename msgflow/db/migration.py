@@ -1,4 +1,7 @@
-"""Migration: new databases, and upgrades of old ones: tables by Alembic, views and macros anew."""
+"""Migration: new databases, and upgrades of old ones.
+
+Alembic upgrades the tables. Views and macros are dropped and created again.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Relations between tables: identities that are no row of the table that their column refers to.
+"""Relations between tables, and the rows that break them: they refer to a row that is missing.
 
-`tables` declares a relation as a foreign key. Databases do not have it.
+`tables` declares a relation as a foreign key. The databases have no foreign keys.
 """
 
 from __future__ import annotations

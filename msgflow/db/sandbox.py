@@ -77,13 +77,15 @@ def shut_in(
     files: Sequence[str] = (),
     lock: bool = True,
 ) -> None:
-    """Put a connection into the sandbox, for ever: it keeps the databases that it has attached.
+    """Put a connection into the sandbox, which it cannot leave.
+
+    The databases that it has attached stay attached.
 
     Args:
         con: the connection.
-        directories: it may read and write them all the same.
-        files: likewise.
-        lock: no setting of it can be changed any more.
+        directories: directories that it may still read and write.
+        files: files that it may still read and write.
+        lock: forbid changes of its settings.
     """
     con.execute("SET allowed_directories = ?", [[str(path.absolute()) for path in directories]])
     con.execute("SET allowed_paths = ?", [list(files)])

@@ -214,7 +214,11 @@ def _left_out(
 
 
 def _one_sided(result: QueryResult, by: str) -> Iterator[str]:
-    """Yield a note of what only one side has; raise if the sides have nothing in common."""
+    """Yield a note for each side that has paths of its own.
+
+    Raises:
+        UsageError: no path has latencies on both sides.
+    """
     rows = _of_paths(result)
     if not any(row["a_count"] and row["b_count"] for row in rows):
         raise UsageError(

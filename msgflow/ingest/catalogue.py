@@ -51,7 +51,7 @@ class Field:
 
 
 class Origin(Enum):
-    """What a column says of a predecessor; the value is the suffix of its name."""
+    """A property of a preceding event; its value is the suffix of the column that holds it."""
 
     EVENT_ID = "event_id"
     TS_NS = "ts_ns"
@@ -64,7 +64,7 @@ class Predecessor:
 
     Attributes:
         sequence: the sequence of events.
-        origin: what the column says of the predecessor.
+        origin: the property of the earlier event that the column holds.
     """
 
     sequence: str

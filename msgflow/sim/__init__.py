@@ -4,9 +4,10 @@
 (`directory/HOSTNAME/ust/uid/1000/64-bit`), and the truth into `directory/truth`: what happened, not
 what can be seen. `scenarios()` lists what can be simulated; a `Scenario` of your own works as well.
 
-`layout` names the release of ROS 2 whose events the trace has, see `layouts()`. `recording` is what
-recording does to them: it starts late, pauses, loses events or packets, is rotated, … A recording
-never changes what happens, a layout only when stamps are made and what that shifts.
+`layout` names the release of ROS 2 whose events the trace has, see `layouts()`. `recording` is how
+they are recorded: the recording starts late, pauses, loses events or packets, is rotated, … A
+recording never changes what happens. A layout changes only when stamps are made, and what depends
+on these times.
 
 Truth tables (Parquet). `host` is a hostname; `pid` and `tid` are those of the trace. Columns in
 `_ns` are ns since the epoch on the trace clock of the host in question, hence equal to time stamps
@@ -16,8 +17,8 @@ Identifiers (`…_id`) are the truth's own and connect its tables; rows have no 
 
 publication — one row per publication:
     publication_id, host, pid, tid, node (full name), topic_name, publisher_handle (as in
-    rcl_publisher_init), rmw_publisher_handle, rclcpp_ns, rcl_ns, rmw_ns (its events, NULL where
-    there is none: /rosout does not pass rclcpp, ros_discovery_info only rmw),
+    rcl_publisher_init), rmw_publisher_handle, rclcpp_ns, rcl_ns, rmw_ns (times of its
+    events; NULL: no such event, since /rosout does not pass rclcpp, ros_discovery_info only rmw),
     source_timestamp_ns, callback_instance_id (the callback that published, else NULL),
     is_internal, intra_ns (rclcpp_intra_publish; such a publication has the others only if a
     subscription needs DDS). node and publisher_handle are NULL for ros_discovery_info.
@@ -40,8 +41,9 @@ transport — one row per take with its publication:
 subscription — one row per subscription, at whatever address:
     subscription_id, host, pid, node, topic_name, subscription_handle, rmw_subscription_handle,
     created_ns, ended_ns (NULL: not before the end of tracing), is_internal
-undelivered — one row per publication and subscription of the topic that no callback and no user
-got, whenever they existed; with the takes they account for every such pair:
+undelivered — one row per publication and subscription of its topic where neither a callback nor a
+user got the message. It does not matter when the two existed: every publication and subscription of
+a topic has a take or a row here:
     publication_id, topic_name, publication_{host,pid,tid,rmw_ns}, source_timestamp_ns,
     subscription_{host,pid,handle}, reason, is_internal, subscription_id. Reasons:
     'before_subscription', 'before_discovery', 'lost_in_transport', 'overwritten' (in a queue or a
@@ -53,7 +55,7 @@ one per message of another input that it was made of (annotated nodes):
     'take_adjacent' without a callback; 'periodic_async', 'partial_sync' of another input),
     callback_start_ns, take_id, take_rmw_ns (NULL for timers), topic_name,
     publication_rcl_ns, publication_rmw_ns, is_internal, is_reuse (an earlier publication by the
-    same link has used the message already: a program that empties its caches would not have)
+    same link used the message too; a program that empties its caches uses it only once)
 request — one row per request:
     request_id, service_name, client_gid, sequence_number, client_{host,pid,tid,node,handle},
     sent_ns, sender_callback_instance_id, service_{host,pid,tid,node,handle}, taken_ns,

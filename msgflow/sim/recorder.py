@@ -257,9 +257,10 @@ class Recorder:
         return writer
 
     def _breaks(self) -> Iterator[tuple[int, int, bool]]:
-        """Begin and end of what ends packets, and whether others follow in a directory of its own.
+        """Yield (begin, end, is rotation) of pauses, rotations, snapshots and flushes.
 
-        A session that is rotated while it is stopped goes on in the next chunk when it is started.
+        Each ends all packets. After a rotation or snapshot the next packets are in a new directory.
+        A session that is rotated while it is stopped uses that directory when it starts again.
         """
         recording = self._recording
         times = (*recording.rotations, *recording.snapshots)

@@ -135,7 +135,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Header:
-    """Everything that an SQL file says of itself, and its body.
+    """The header of an SQL file, and the SQL below it.
 
     Attributes:
         name: object name, equal to the file name.

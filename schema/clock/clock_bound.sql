@@ -1,10 +1,10 @@
 -- name: derive.clock_bound
 -- kind: macro
--- description: What messages and packets say of how far two clocks are apart. Nothing can be
---     received before it was sent. So what was sent to the clock `clock_id` says what has to be
---     added at least to its times to get those of `other_clock_id`; what was sent from it says
---     what at most. The difference is `-sense * bound_ns`: in both directions the largest
---     `bound_ns` tells most.
+-- description: Bounds of the difference between two clocks, from messages and packets. Nothing is
+--     received before it was sent. Hence each of them bounds the difference that turns times of
+--     `clock_id` into times of `other_clock_id`. A message to `clock_id` gives a lower bound, a
+--     message from it an upper bound. The bound is `-sense * bound_ns`. In both directions the
+--     largest `bound_ns` is the tightest.
 -- grain: one row per pair of clocks and message or packet between them
 CREATE OR REPLACE MACRO derive.clock_bound(only_run) AS TABLE
 SELECT

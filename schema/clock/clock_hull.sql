@@ -1,10 +1,10 @@
 -- name: derive.clock_hull
 -- kind: macro
--- description: The corners of the convex hulls of what messages and packets say of two clocks,
---     one hull for each direction: the lower envelope of the delays. A line between both hulls is
---     possible if it is no steeper than clocks can drift apart; no other line is. First, what
---     another point makes superfluous at every possible drift is dropped; then, again and again,
---     what does not lie above the line through its neighbours. Times count from `base_ns`, and
+-- description: Corners of the convex hulls of the bounds between two clocks. Each direction has a
+--     hull: the lower envelope of the delays. A line fits the clocks if it lies between both hulls
+--     and is no steeper than clocks can drift apart. The first step drops each point that another
+--     point makes superfluous at every possible drift. The next steps drop each point that does
+--     not lie above the line through its neighbours. Times count from `base_ns`, and
 --     differences from `base_bound_ns`, which keeps them exact as DOUBLE.
 -- grain: one row per pair of clocks, direction and corner
 CREATE OR REPLACE MACRO derive.clock_hull(only_run) AS TABLE

@@ -1,6 +1,6 @@
 -- name: executor_node
 -- title: Nodes of executors
--- description: Which executor ran the callbacks of which node.
+-- description: Nodes, and the executors that ran their callbacks.
 -- grain: one row per node and executor that ran a callback of it
 -- param: run BIGINT  Run
 -- column: node VARCHAR  Full name of the node, or its process in brackets

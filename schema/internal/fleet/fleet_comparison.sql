@@ -1,11 +1,11 @@
 -- name: internal.fleet_comparison
 -- title: How runs of one side differ from those of another
--- description: What `measured` (rows of `internal.fleet_run_value`) says of two sides. A run, or
---     what it is a sample of, is one value, however many flows it has: how much runs of a side
---     differ from each other tells whether the sides do. Both are compared by trimmed means (the
---     lowest and the highest fifth of the runs is left out) and Welch's t with winsorized variances
---     (Yuen), of logarithms, so that a difference is a share; where a value is not positive, of
---     the values.
+-- description: Compares two sides by `measured` (rows of `internal.fleet_run_value`). A run, or
+--     what it is a sample of, is one value, however many flows it has. The difference
+--     between the sides is measured against the differences between runs of a side. Yuen's test
+--     compares the sides: trimmed means (without the lowest and the highest fifth of the runs), and
+--     Welch's t with winsorized variances. It takes logarithms, so that a difference is a share.
+--     Where a value is not positive, it takes the values themselves.
 -- grain: one row per path and statistic; paths that only one side has, too
 -- param: z DOUBLE  Quantile of the standard normal distribution for the confidence wanted
 -- param: least_units BIGINT  Fewest runs of either side for an interval

@@ -1,8 +1,8 @@
 -- name: internal.fleet_flow
 -- title: Flows of every path, one by one
 -- description: Rows of main.end_to_end with its defaults (from the start of a callback to the end
---     of one), each with its path. What e2e-latency says of a run it says of these rows; over
---     several runs it can be computed from theirs.
+--     of one), each with its path. The query e2e-latency summarises these rows for a run. The rows
+--     of several runs together give its answer for all of them.
 -- grain: one row per path, root and arrival; one per path and root that did not arrive
 -- param: runs BIGINT[]  Runs
 -- column: run_id BIGINT  Run
