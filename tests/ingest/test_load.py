@@ -1,10 +1,17 @@
-"""Payload values that cannot be times or names are left out while traces are loaded."""
+"""Loading: implausible values are left out, and errors of both threads come through."""
 
 from __future__ import annotations
 
+import threading
+from pathlib import Path
+
 import numpy as np
 import pyarrow as pa
+import pytest
 
+from msgflow.errors import UsageError
+from msgflow.ingest import ingest
+from msgflow.ingest.ingest import IngestProgress
 from msgflow.ingest.load import ImplausibleValues
 from msgflow.trace.numpy_arrow import to_arrow
 
@@ -49,3 +56,24 @@ def test_what_can_be_stays_as_it_is() -> None:
         found = ImplausibleValues()
         assert found.without("some", batch) is batch
         assert list(found.rows()) == []
+
+
+def reading_threads() -> int:
+    return sum(thread.name == "msgflow-reader" for thread in threading.enumerate())
+
+
+def test_an_error_of_the_thread_that_reads_comes_through(trace: Path, new_database: Path) -> None:
+    def fail(state: IngestProgress) -> None:
+        if state.fraction is not None:
+            raise ValueError("from the progress of the reader")
+
+    with pytest.raises(ValueError, match="from the progress"):
+        ingest([trace], new_database, progress=fail)
+    assert reading_threads() == 0
+    assert not new_database.exists()
+
+
+def test_an_error_of_the_thread_that_inserts_ends_the_other(trace: Path, database: Path) -> None:
+    with pytest.raises(UsageError, match="these packets are in the database already"):
+        ingest([trace], database)
+    assert reading_threads() == 0
