@@ -306,7 +306,7 @@ def test_no_stamp(pair: Pair, analyse: Analyse) -> None:
 def stamped(system: Pair) -> int:
     """Publish and take a message whose stamp is of the clock of the trace; return that."""
     stamp = system.publish(TALKER, 0x10, 0)
-    system._events[-1][1]["timestamp"] = stamp
+    system.events[-1][1]["timestamp"] = stamp
     system.hear(stamp)
     return stamp
 
@@ -321,10 +321,10 @@ def test_a_stamp_in_a_gap_of_the_publisher(pair: Pair, analyse: Analyse) -> None
     pair.create()
     stamped(pair)
     pair.lose()
-    stamp = pair._now + 1
+    stamp = pair.now + 1
     pair.wait(100)
     pair.hear(stamp)
-    pair.send(pair._now)
+    pair.send(pair.now)
     assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
 
 
@@ -345,7 +345,7 @@ def test_a_stamp_beside_a_gap_of_the_publisher(
     stamped(pair)
     pair.wait(3 * MS)
     pair.lose()
-    stamp = pair._now + 1 + more
+    stamp = pair.now + 1 + more
     pair.wait(3 * MS)
     pair.hear(stamp)
     stamped(pair)
@@ -356,7 +356,7 @@ def test_a_stamp_after_the_last_event_of_every_publisher(pair: Pair, analyse: An
     pair.create()
     stamped(pair)
     pair.wait(20 * MS)
-    stamp = pair._now
+    stamp = pair.now
     pair.hear(stamp)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_trace_ends")]
 
@@ -365,7 +365,7 @@ def test_a_publisher_that_is_not_traced(pair: Pair, analyse: Analyse) -> None:
     """The known publisher is seen before and after, and nothing is lost."""
     pair.create()
     stamped(pair)
-    stamp = pair._now + 5
+    stamp = pair.now + 5
     pair.hear(stamp)
     stamped(pair)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
@@ -374,7 +374,7 @@ def test_a_publisher_that_is_not_traced(pair: Pair, analyse: Analyse) -> None:
 @pytest.mark.thorough
 def test_a_topic_without_a_publisher(pair: Pair, analyse: Analyse) -> None:
     pair.add_subscription()
-    stamp = pair._now
+    stamp = pair.now
     pair.hear(stamp)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
 
@@ -476,7 +476,7 @@ def test_discovery_goes_before_waiting(pair: Pair, analyse: Analyse) -> None:
 def test_a_gap_may_hide_that_the_two_knew_each_other(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send(1)
-    pair.add_packet(1_000, pair._now)
+    pair.add_packet(1_000, pair.now)
     pair.lose()
     pair.wait(100)
     pair.ready(LISTENER)
@@ -556,17 +556,17 @@ def test_before_the_sender_is_recorded(analyse: Analyse) -> None:
     dual = Dual()
     dual.ready(dual.listener)
     dual.wait(20)
-    stamp = dual._now
+    stamp = dual.now
     dual.take(dual.listener, 0x30, stamp)
     dual.wait(MS)
-    dual.publish(dual.talker, 0x10, dual._now)
+    dual.publish(dual.talker, 0x10, dual.now)
     assert analyse(dual).rows(ORPHANS) == [(stamp, "before_tracing")]
 
 
 def paused(pair: Pair, begin: int, end: int) -> None:
     """All streams of the trace are silent from `begin` to `end`."""
     pair.add_packet(1_000, begin)
-    pair.add_packet(end, pair._now)
+    pair.add_packet(end, pair.now)
 
 
 def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse: Analyse) -> None:
@@ -574,15 +574,15 @@ def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse:
     pair.create()
     stamped(pair)
     pair.wait(5 * MS)
-    stamp = pair._now
+    stamp = pair.now
     pair.wait(5 * MS)
     pair.hear(stamp)
-    begin = pair._now
+    begin = pair.now
     pair.wait(30 * MS)
-    end = pair._now
+    end = pair.now
     pair.ready(LISTENER)
     pair.wait(5 * MS)
-    later = pair._now
+    later = pair.now
     pair.wait(5 * MS)
     pair.hear(later)
     stamped(pair)
@@ -598,7 +598,7 @@ def test_a_publisher_without_a_topic_may_be_the_sender(pair: Pair, analyse: Anal
     pair.add_source(1, "alpha", "boot")
     pair.publish(Thread(300, trace=1), 0x77, 4)
     pair.lose(trace=1)
-    stamp = pair._now + 1
+    stamp = pair.now + 1
     pair.wait(MS)
     pair.hear(stamp)
     pair.publish(Thread(300, trace=1), 0x77, 5)
@@ -611,7 +611,7 @@ def test_a_publisher_without_a_topic_that_was_recorded_is_not(pair: Pair, analys
     pair.publish(OTHER, 0x77, 3)
     stamped(pair)
     pair.wait(5 * MS)
-    stamp = pair._now + 5
+    stamp = pair.now + 5
     pair.hear(stamp)
     pair.wait(5 * MS)
     pair.publish(OTHER, 0x77, 4)
@@ -624,11 +624,11 @@ def test_a_publisher_that_was_created_later_is_not(pair: Pair, analyse: Analyse)
     pair.create()
     stamped(pair)
     pair.wait(20 * MS)
-    stamp = pair._now
+    stamp = pair.now
     pair.hear(stamp)
     pair.wait(20 * MS)
     pair.publisher(OTHER, 0x10, "/a")
-    pair.publish(OTHER, 0x10, pair._now)
+    pair.publish(OTHER, 0x10, pair.now)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_trace_ends")]
 
 
