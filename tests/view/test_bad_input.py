@@ -265,10 +265,10 @@ def _asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     class RememberingPages(Pages):
         def __init__(self, window: Window) -> None:
             super().__init__(window)
-            self.window = window
+            self.shown = window
 
         def answer(self, connection: Any, name: str, params: dict[str, Any]) -> bytes:
-            key = f"{self.window} {name} {sorted(params.items())}"
+            key = f"{self.shown} {name} {sorted(params.items())}"
             if key not in known:
                 known[key] = super().answer(connection, name, params)
             return known[key]
