@@ -8,8 +8,8 @@ from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
 from msgflow.trace.ctf.declarations import give_order, is_timeless
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.events import BEYOND_END
+from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
 from msgflow.trace.ctf.packet_order import entries_of
