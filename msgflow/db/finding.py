@@ -189,7 +189,7 @@ def audit(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Fin
 def _broken(
     con: duckdb.DuckDBPyConnection, header: Header, run_id: int | None
 ) -> Iterator[Finding]:
-    from msgflow.db.relation import broken_relations
+    from msgflow.db.relation_check import broken_relations
 
     values: dict[str, object] = {"run_id": run_id}
     if header.params:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.owner import mark
+from msgflow.temporary_owner import mark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
 

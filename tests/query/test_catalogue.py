@@ -4,7 +4,7 @@ import pytest
 
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.query.catalogue import QUERIES_BY_WORD, load_queries, load_query, query_names
 
 

@@ -18,7 +18,7 @@ from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.trace_info import describe
 from msgflow.trace.discovery import irregular_files, stream_files
-from msgflow.trace.metadata import FILE_NAME
+from msgflow.trace.metadata_frame import FILE_NAME
 from msgflow.trace.model import Damage, undeclared
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import TimeBase
