@@ -13,6 +13,7 @@ from typing import Any
 import duckdb
 import pytest
 import thorough
+from analysis import Analysis
 from hypothesis import settings
 from ingested import made_once
 
@@ -120,6 +121,14 @@ def small_database(_small_database: Path, tmp_path: Path) -> Path:
     path = tmp_path / "msgflow.duckdb"
     shutil.copyfile(_small_database, path)
     return path
+
+
+@pytest.fixture(scope="session")
+def analysis(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Analysis]:
+    """A database for one system after the other."""
+    bench = Analysis(empty_database, tmp_path_factory.mktemp("analysis"))
+    yield bench
+    bench.close()
 
 
 @pytest.fixture(scope="session")

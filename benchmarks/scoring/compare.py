@@ -11,9 +11,10 @@ import duckdb
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+EXCUSE = "events are missing"
+"""What `drops.sql` and `orphans.sql` say of a reason that a hole excuses."""
+
 _SQL = Path(__file__).parent
-# What `drops.sql` and `orphans.sql` say of a reason that a hole excuses.
-_EXCUSE = "events are missing"
 _RECORDED_COLUMNS = """{
     t: 'VARCHAR', id: 'VARCHAR', name: 'VARCHAR', kind: 'VARCHAR', host: 'VARCHAR',
     vpid: 'INTEGER', vtid: 'INTEGER',
@@ -96,7 +97,7 @@ def compare_simulated(
         for name in ("drops", "orphans"):
             rows += connection.execute((_SQL / f"{name}.sql").read_text()).fetchall()
         drops = [Drop(*row) for row in rows]
-        excused = sum(drop.messages for drop in drops if drop.undecided == _EXCUSE)
+        excused = sum(drop.messages for drop in drops if drop.undecided == EXCUSE)
         return [*scores, _excused(connection, excused)], drops
 
 

@@ -6,8 +6,14 @@ from typing import Annotated
 
 import typer
 
-from msgflow.cli.default_command import with_default
-from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, RunOption, WideOption
+from msgflow.cli.options import (
+    DatabaseOption,
+    FormatOption,
+    OutputOption,
+    RunOption,
+    WideOption,
+    with_default,
+)
 from msgflow.default_files import DEFAULT_DATABASE
 
 app = typer.Typer(cls=with_default("show"))

@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from msgflow.cli.completion import complete
-from msgflow.cli.default_command import with_default
-from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption
+from msgflow.cli.options import DatabaseOption, FormatOption, OutputOption, WideOption, with_default
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode, UsageError
 

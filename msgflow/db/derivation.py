@@ -40,7 +40,7 @@ def derive(
     """
     learn_topics(con, run_id)
     for name in derived_tables():
-        if not _reads_clocks(name):
+        if not reads_clocks(name):
             derive_table(con, name, run_id)
     if synchronise is not None:
         synchronise()
@@ -57,7 +57,7 @@ def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     This happens inside the open transaction.
     """
     for name in derived_tables():
-        if _reads_clocks(name):
+        if reads_clocks(name):
             derive_table(con, name, run_id)
     derive_findings(con, run_id)
 
@@ -83,7 +83,8 @@ def derived_tables() -> tuple[str, ...]:
 
 
 @cache
-def _reads_clocks(name: str) -> bool:
+def reads_clocks(name: str) -> bool:
+    """Return whether the rows of one of `derived_tables` depend on corrected clocks."""
     return not _CLOCKS.isdisjoint(objects.sources_of([f"derive.{name}"]))
 
 

@@ -190,7 +190,7 @@ def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> l
 def _broken(
     con: duckdb.DuckDBPyConnection, header: Header, run_id: int | None
 ) -> Iterator[Finding]:
-    from msgflow.db.relation import broken_relations
+    from msgflow.db.relation_check import broken_relations
 
     values: dict[str, object] = {"run_id": run_id}
     if header.params:

@@ -51,12 +51,16 @@ def load(layer: str) -> tuple[Header, ...]:
     if layer == PUBLIC:
         from msgflow.db.table_view import table_views
 
-        headers = [*map(_completed, headers), *table_views()]
+        headers = [*map(completed, headers), *table_views()]
     return sort([*headers, *composed(layer)])
 
 
-def _completed(header: Header) -> Header:
-    """Fill in the columns that a header only names, from the table of the same name."""
+def completed(header: Header) -> Header:
+    """Fill in the columns that a header only names, from the table of the same name.
+
+    Raises:
+        HeaderError: the table has no column of that name.
+    """
     if all(column.type for column in header.columns):
         return header
     from msgflow.db.table_view import declared_columns

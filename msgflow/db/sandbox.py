@@ -19,8 +19,8 @@ import duckdb
 from msgflow.db.memory import limit_threads, set_memory_limit
 from msgflow.db.workspace import remove_abandoned_workspaces
 from msgflow.errors import DatabaseError
-from msgflow.owner import is_abandoned, mark
 from msgflow.sql.failure import in_words
+from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -13,32 +13,28 @@ if TYPE_CHECKING:
     from sqlalchemy import Column, Table
 
 
-# A join that does not fit into memory returns rows in any order, and unsorted ids and times take
-# far more room in the file. Sorting fewer rows than this costs more than it saves. The size of a
-# view is not known: if one table is large, all are sorted.
-_ROWS_WORTH_ORDERING = 1_000_000
-
-
 def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Copy each staged table that has the name of a store table, inside the open transaction.
+
+    Rows are sorted by id: unsorted ids and times take far more room in the file.
 
     Ids in staging are above 0; the store adds its highest id to them. Tables without a row are
     skipped, since a statement takes longer than its few rows. DuckDB sees staging as of the start
     of the transaction: staging has to be filled before, and a transaction stores one run.
     """
-    staged = dict(
-        con.execute(
-            "SELECT table_name, estimated_size FROM duckdb_tables() "
+    staged = {
+        name
+        for (name,) in con.execute(
+            "SELECT table_name FROM duckdb_tables() "
             "WHERE database_name = 'staging' AND schema_name = 'main' AND estimated_size > 0 "
-            "UNION ALL SELECT view_name, 0 FROM duckdb_views() "
+            "UNION ALL SELECT view_name FROM duckdb_views() "
             "WHERE database_name = 'staging' AND schema_name = 'main'"
         ).fetchall()
-    )
+    }
     bases = _bases(con)
-    is_large = max(staged.values(), default=0) >= _ROWS_WORTH_ORDERING
     for table in STORE.tables.values():
         if table.name in staged:
-            _copy(con, table, run_id, bases, in_order=is_large)
+            _copy(con, table, run_id, bases)
 
 
 def delete(con: duckdb.DuckDBPyConnection, run_ids: Iterable[int]) -> None:
@@ -68,18 +64,11 @@ def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
     return bases
 
 
-def _copy(
-    con: duckdb.DuckDBPyConnection,
-    table: Table,
-    run_id: int,
-    bases: dict[str, int],
-    *,
-    in_order: bool,
-) -> None:
+def _copy(con: duckdb.DuckDBPyConnection, table: Table, run_id: int, bases: dict[str, int]) -> None:
     names = ", ".join(table.columns.keys())
     values = ", ".join(_value(table, column, run_id, bases) for column in table.columns)
     key = f"{table.name}_id"
-    order = f" ORDER BY {key}" if in_order and key in table.columns else ""
+    order = f" ORDER BY {key}" if key in table.columns else ""
     con.execute(
         f"INSERT INTO {table.fullname} ({names}) SELECT {values} FROM staging.{table.name}{order}"
     )

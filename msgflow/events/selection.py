@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
     from msgflow.trace import Progress, TraceSet
 
-# Few rows: the first lines come soon.
-_BATCH_ROWS = 20_000
+BATCH_ROWS = 20_000
+"""Most rows of a batch: few, so that the first lines come soon."""
+
 _NOTHING = pa.schema([])
 # By position: a payload may have a field of the same name.
 _TIME = COMMON_SCHEMA.get_field_index("ts_ns")
@@ -103,7 +104,7 @@ class Selection:
         progress: Callable[[Progress], None] | None,
     ) -> Iterator[list[EventBatch]]:
         self.lost_event_count = 0
-        batches = self.traces.batches(wanted, progress=progress, batch_rows=_BATCH_ROWS)
+        batches = self.traces.batches(wanted, progress=progress, batch_rows=BATCH_ROWS)
         for _, items in groupby(batches, key=attrgetter("round")):
             events = []
             for item in items:

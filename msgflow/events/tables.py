@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from msgflow.events.selection import Selection
     from msgflow.trace import Progress
 
-_MOST_BYTES_HELD = 64 << 20
+MOST_BYTES_HELD = 64 << 20
+"""Bytes of all rows that are gathered before they are written."""
+
 _UNSAFE = re.compile(r"[^\w.-]+", re.ASCII)
 
 
@@ -80,7 +82,7 @@ class _Files:
         """Take the next rows of an event."""
         self._held.setdefault(name, []).append(rows)
         self._bytes += rows.nbytes
-        if self._bytes > _MOST_BYTES_HELD:
+        if self._bytes > MOST_BYTES_HELD:
             self.flush()
 
     def flush(self) -> None:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.owner import is_abandoned, mark
+from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

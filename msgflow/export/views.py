@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.nearest import did_you_mean
+from msgflow.name_suggestions import did_you_mean
 from msgflow.run.window import WHOLE, Window
 
 if TYPE_CHECKING:

@@ -62,7 +62,7 @@ def do(task: Task, directory: Path) -> Outcome:
             seconds=time.monotonic() - begin,
         )
     except Exception as error:
-        return _failed(error, stage.name, time.monotonic() - begin)
+        return failed_outcome(error, stage.name, time.monotonic() - begin)
 
 
 class _Stage:
@@ -161,7 +161,14 @@ def _rename_paths(database: Path, before: str, after: str) -> None:
             )
 
 
-def _failed(error: Exception, stage: str, seconds: float) -> Outcome:
+def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
+    """Return the outcome of a recording at which an error was raised.
+
+    Args:
+        error: decides the reason; its message is kept without secrets.
+        stage: the stage that raised it.
+        seconds: time from the begin of the task.
+    """
     from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
     from msgflow.fleet.task import Outcome, Reason, without_secrets
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.query.compare import STATISTICS, Failure, failures
 from msgflow.query.result import QueryResult
 from msgflow.query.selection import CUT_COLUMN

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.owner import mark
+from msgflow.temporary_owner import mark
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -28,9 +28,12 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 S3 = "s3://"
+MOST_ATTEMPTS = 6
+"""Tries of each request by the client of AWS, whose pauses double: some 10 s together."""
+PAUSES = (0.1, 0.3, 1.0, 3.0)
+"""Seconds between tries of our own, when the client of AWS has given up."""
+
 _CHUNK = 8 * 1024 * 1024
-# Tries of each request by the client of AWS, with pauses that double: some 10 s together.
-_MOST_ATTEMPTS = 6
 _CONNECT_SECONDS = 10
 _REQUEST_SECONDS = 60
 # Variables of the environment that name an endpoint, the more specific one first.
@@ -40,8 +43,6 @@ _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
 _HOPELESS = re.compile(
     r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
 )
-# Seconds between tries.
-_PAUSES = (0.1, 0.3, 1.0, 3.0)
 _OF_THIS_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES)
 _USERINFO = re.compile(r"//[^/@]*@")
 
@@ -190,7 +191,7 @@ class Store:
         The client of AWS tries again by itself, but not during a download, and not always when it
         lists files.
         """
-        for pause in () if self.is_local else _PAUSES:
+        for pause in () if self.is_local else PAUSES:
             try:
                 return work()
             except FileNotFoundError:
@@ -319,7 +320,7 @@ def _s3() -> Any:
     if region:
         options["region"] = region
     return S3FileSystem(
-        retry_strategy=AwsStandardS3RetryStrategy(max_attempts=_MOST_ATTEMPTS),
+        retry_strategy=AwsStandardS3RetryStrategy(max_attempts=MOST_ATTEMPTS),
         connect_timeout=_CONNECT_SECONDS,
         request_timeout=_REQUEST_SECONDS,
         **options,

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
     from msgflow.fleet.workers import Workers
 
 _LOOKING_AT_ONCE = 8
+SECONDS_BETWEEN_LOOKS_AT_RUNS = 1.0
+"""Time between two listings of the runs that other processes may have written."""
+
 _SECONDS_BETWEEN_LOOKS = 0.5
-_SECONDS_BETWEEN_LOOKS_AT_RUNS = 1.0
 _LONGEST_PAUSE = 60.0
 
 
@@ -205,7 +207,7 @@ class _Ingest:
 
     def _look_again(self) -> None:
         """Read the runs of the lake again if another process has written or removed some."""
-        if time.monotonic() - self._looked < _SECONDS_BETWEEN_LOOKS_AT_RUNS:
+        if time.monotonic() - self._looked < SECONDS_BETWEEN_LOOKS_AT_RUNS:
             return
         if set(self._lake.run_files()) != self._files:
             self._read_runs()

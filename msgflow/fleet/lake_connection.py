@@ -22,7 +22,7 @@ from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import PACK
 from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier
 from msgflow.version import __version__

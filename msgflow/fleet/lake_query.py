@@ -27,7 +27,7 @@ from msgflow.fleet.lake_connection import (
     what_there_is,
 )
 from msgflow.fleet.layout import VIEWS
-from msgflow.nearest import did_you_mean
+from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import query_names
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import bind, without_counts

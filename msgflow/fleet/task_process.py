@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.fleet.child_process import RESULT, STAGE
 from msgflow.fleet.task import Outcome, Reason, Task, without_secrets
-from msgflow.owner import is_abandoned, mark
+from msgflow.temporary_owner import is_abandoned, mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

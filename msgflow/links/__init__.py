@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from msgflow.links.annotations import AppliedLinks, apply_links, declare_links
-from msgflow.links.file import DeclaredLink, LinksFile, read_links
-from msgflow.links.suggestion import suggest_links
+from msgflow.links.file import DeclaredLink, LinksFile, read_links, suggest_links
 
 __all__ = [
     "AppliedLinks",

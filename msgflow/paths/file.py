@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
-from msgflow.nearest import did_you_mean
+from msgflow.name_suggestions import did_you_mean
 from msgflow.query.names import require_names
 from msgflow.yaml_file import Text, YamlFile
 

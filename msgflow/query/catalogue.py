@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.resources import resource_directory
 from msgflow.sql.header import Header, read
 
@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
 
-# Words that people use, without the s of a plural, and the queries that answer them.
-_WORDS = {
+QUERIES_BY_WORD = {
     "jitter": ("timers", "publication-rate"),
     "rate": ("publication-rate",),
     "frequency": ("publication-rate",),
@@ -62,6 +61,7 @@ _WORDS = {
     "proces": ("info-processes",),
     "diagnostic": ("info-findings",),
 }
+"""Words that people use, without the s of a plural, and the queries that answer them."""
 
 
 @cache
@@ -88,7 +88,7 @@ def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Heade
 
 def _meant(name: str, views: Callable[[], Collection[str]]) -> str:
     """Return a hint for a name that no query has: the commands that the user may mean."""
-    words = _WORDS.get(name.lower().removesuffix("s").replace("_", "-"))
+    words = QUERIES_BY_WORD.get(name.lower().removesuffix("s").replace("_", "-"))
     if words is None:
         if name in views():
             return f"it is a view: msgflow sql 'FROM {name}'"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.nearest import column_named
+from msgflow.name_suggestions import column_named
 from msgflow.version import __version__
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from msgflow.errors import UsageError
-from msgflow.nearest import did_you_mean
+from msgflow.name_suggestions import did_you_mean
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.result import QueryResult

@@ -19,6 +19,15 @@ if TYPE_CHECKING:
     from msgflow.sim.executor import Entity, Executor
     from msgflow.sim.transport import Middleware
 
+HANDLERS: Mapping[type, Callable[..., Run]] = {
+    TimerObject: run_timer,
+    SubscriptionObject: run_subscription,
+    ServiceObject: run_service,
+    ClientObject: run_client,
+    IntraBuffer: run_buffer,
+}
+"""The function that runs a ready entity, by its class."""
+
 # Guard conditions and graph events wake executors that have nothing to do.
 _SPURIOUS_WAKE_UP = 0.1
 
@@ -26,13 +35,6 @@ _WAIT = "wait"
 _PROCESS = "process"
 _EXECUTE = "execute"
 _NO_TIMEOUT = -1
-_RUN: Mapping[type, Callable[..., Run]] = {
-    TimerObject: run_timer,
-    SubscriptionObject: run_subscription,
-    ServiceObject: run_service,
-    ClientObject: run_client,
-    IntraBuffer: run_buffer,
-}
 # Others are executed without rclcpp_executor_execute.
 _ANNOUNCED = (TimerObject, SubscriptionObject)
 
@@ -134,7 +136,7 @@ class ExecutorThread(Thread):
         kind = type(entity)
         if kind in _ANNOUNCED:
             self._enter(executor, _EXECUTE, time, entity.handle)
-        return _RUN[kind](self, self._middleware, entity, time)
+        return HANDLERS[kind](self, self._middleware, entity, time)
 
     def _fall_asleep(self, executor: Executor, time: int, until: int | None) -> None:
         random = self.scheduler.random

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.trace.discovery import discover
 from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo, TraceLocation
-from msgflow.trace.reader import open
+from msgflow.trace.reader_choice import open
 from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from msgflow.trace.bt2_fields import schema_of
 from msgflow.trace.bt2_messages import messages, parameters_of
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.description import description
-from msgflow.trace.metadata import MetadataKind, kind_of
+from msgflow.trace.metadata_frame import MetadataKind, kind_of
 from msgflow.trace.model import TraceInfo, undeclared
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from msgflow.trace.bt2_description import clock_of, context_of, describe
 from msgflow.trace.bt2_fields import schema_of, value_of
 from msgflow.trace.bt2_messages import messages
 from msgflow.trace.ctf.clock import GIGA, Clock
-from msgflow.trace.lttng_index import DiscardCounters
+from msgflow.trace.ctf.packet_index import DiscardCounters
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.schemas import COMMON_SCHEMA, PACKET, PACKET_SCHEMA
 from msgflow.trace.time_base import TimeBase

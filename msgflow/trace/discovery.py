@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.trace import metadata
+from msgflow.trace import metadata_frame
 from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
 from msgflow.trace.regular_file import irregular, read_regular, unreadable_error
@@ -68,7 +68,9 @@ def stream_files(directory: Path) -> list[Path]:
     return sorted(
         entry
         for entry in directory.iterdir()
-        if entry.name != metadata.FILE_NAME and not entry.name.startswith(".") and entry.is_file()
+        if entry.name != metadata_frame.FILE_NAME
+        and not entry.name.startswith(".")
+        and entry.is_file()
     )
 
 
@@ -83,12 +85,15 @@ def _check_exists(path: Path) -> None:
     if kind is not None:
         raise TraceError(
             f"not a trace but {kind} — {path}",
-            hint=metadata.DIRECTORY_HINT,
+            hint=metadata_frame.DIRECTORY_HINT,
         )
     if not path.exists():
         raise TraceError(f"no such file or directory — {path}", hint=f"ls {path.parent}")
     if path.is_file():
-        if path.name == metadata.FILE_NAME or (path.parent / metadata.FILE_NAME).is_file():
+        if (
+            path.name == metadata_frame.FILE_NAME
+            or (path.parent / metadata_frame.FILE_NAME).is_file()
+        ):
             raise TraceError(
                 f"this is a file inside a trace, give the directory — {path}",
                 hint=f"msgflow ingest {path.parent}",
@@ -116,7 +121,7 @@ def _directories_with_metadata(root: Path, strays: list[Path]) -> Iterator[Path]
             continue
         visited.add(resolved)
         names.sort()
-        if metadata.FILE_NAME in files:
+        if metadata_frame.FILE_NAME in files:
             yield resolved
         else:
             strays += _first_stream(resolved, files)
@@ -136,7 +141,7 @@ def _first_stream(directory: Path, names: Sequence[str]) -> list[Path]:
 
 def _locate(directory: Path) -> TraceLocation:
     try:
-        metadata.kind_of(directory)
+        metadata_frame.kind_of(directory)
         files = stream_files(directory)
         size = sum(file.stat().st_size for file in files)
     except OSError as error:
@@ -168,7 +173,7 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
             )
     return TraceError(
         f"no CTF trace (no file `metadata`) in this directory or below — {path}",
-        hint=metadata.DIRECTORY_HINT,
+        hint=metadata_frame.DIRECTORY_HINT,
     )
 
 
@@ -195,4 +200,4 @@ def _hint_for(path: Path) -> str:
         return "give the directory of the trace that it was converted from"
     if "recording" in kind:
         return f"messages are not traces, record one: {_RECORD_HINT}"
-    return metadata.DIRECTORY_HINT
+    return metadata_frame.DIRECTORY_HINT

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.text.values import format_duration
 
 OPERATORS = ("<", "<=", ">", ">=")

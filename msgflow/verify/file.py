@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.nearest import nearest
+from msgflow.name_suggestions import nearest
 from msgflow.verify.condition import Condition, ConditionError, parse_condition
 from msgflow.verify.metrics import PATH, SUBJECTS
 from msgflow.yaml_file import Text, YamlFile, is_null, line_of

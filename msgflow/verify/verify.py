@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from msgflow.nearest import did_you_mean
+from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query

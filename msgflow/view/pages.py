@@ -162,8 +162,8 @@ class Pages:
             return self._plain(connection, name, params)
         if name in _OF_PATH:
             return self._of_path(connection, name, params)
-        if name in _ANSWERS:
-            return _ANSWERS[name](self, connection, params)
+        if name in ANSWERS:
+            return ANSWERS[name](self, connection, params)
         raise UsageError(f"pages have no such data — {name}")
 
     def extent(self, connection: duckdb.DuckDBPyConnection, params: Params) -> Extent:
@@ -341,7 +341,7 @@ class Pages:
         return encode(table, units=_units(name))
 
 
-_ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] = {
+ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] = {
     "run": Pages._run,
     "query": Pages._query,
     "finding": Pages._finding,
@@ -352,6 +352,8 @@ _ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]]
     "flow": Pages._flow,
     "critical": Pages._critical,
 }
+"""The method that gives an answer of more than one page query, by the name of the answer."""
+
 _PLAIN = ("row", "gap", "path", "executor_share", "executor_node", "neighbour")
 _OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")
 

@@ -53,7 +53,7 @@ def test_each_table_is_derived_after_those_that_it_reads() -> None:
 
 
 def test_only_what_reads_clocks_waits_for_them() -> None:
-    assert [name for name in derivation.derived_tables() if derivation._reads_clocks(name)] == [
+    assert [name for name in derivation.derived_tables() if derivation.reads_clocks(name)] == [
         "undelivered"
     ]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import msgflow
-from msgflow import owner
+from msgflow import temporary_owner
 from msgflow.atomic import replacing
 from msgflow.db.connection import connect
 from msgflow.db.sandbox import spill_directory
@@ -22,7 +22,7 @@ from msgflow.sim import simulate
 
 def dead_mark() -> str:
     """Return the mark of a process that has ended."""
-    program = "from msgflow.owner import mark; print(mark())"
+    program = "from msgflow.temporary_owner import mark; print(mark())"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
@@ -30,12 +30,12 @@ def dead_mark() -> str:
 
 
 def test_a_mark_is_abandoned_with_its_process() -> None:
-    place, pid, start = owner.mark().split("-")
-    assert not owner.is_abandoned(owner.mark())
-    assert owner.is_abandoned(dead_mark())
-    assert owner.is_abandoned(f"{place}-{pid}-{int(start) + 1}")  # another process, later
-    assert not owner.is_abandoned(f"{'f' * 12}-{pid}-1")  # of another machine
-    assert not owner.is_abandoned("something else")
+    place, pid, start = temporary_owner.mark().split("-")
+    assert not temporary_owner.is_abandoned(temporary_owner.mark())
+    assert temporary_owner.is_abandoned(dead_mark())
+    assert temporary_owner.is_abandoned(f"{place}-{pid}-{int(start) + 1}")  # another process, later
+    assert not temporary_owner.is_abandoned(f"{'f' * 12}-{pid}-1")  # of another machine
+    assert not temporary_owner.is_abandoned("something else")
 
 
 def spilled(database: Path, mark: str) -> Path:
@@ -48,7 +48,7 @@ def spilled(database: Path, mark: str) -> Path:
 def test_what_the_dead_spilled_is_removed(small_database: Path) -> None:
     dead = spilled(small_database, dead_mark())
     elsewhere = spilled(small_database, f"{'f' * 12}-1-1")
-    own = spilled(small_database, owner.mark())
+    own = spilled(small_database, temporary_owner.mark())
     mine = small_database.with_name(f".{small_database.name}.mine")
     mine.touch()
     msgflow.open_db(small_database).runs()

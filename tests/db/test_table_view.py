@@ -134,4 +134,4 @@ def test_a_header_names_no_column_that_the_table_lacks(tmp_path: Path) -> None:
     path = tmp_path / "take.sql"
     path.write_text("-- name: main.take\n-- description: Takes.\n-- column: taken_us\nSELECT 1\n")
     with pytest.raises(ValueError, match="store has no column 'taken_us'"):
-        objects._completed(objects.read(path))
+        objects.completed(objects.read(path))

@@ -172,7 +172,7 @@ def test_rounds_join_without_a_seam(
 ) -> None:
     forms = ("text", "json", "jsonl", "csv")
     whole = [listing(trace, form=form) for form in forms]
-    monkeypatch.setattr("msgflow.events.selection._BATCH_ROWS", 1)
+    monkeypatch.setattr("msgflow.events.selection.BATCH_ROWS", 1)
     assert [listing(trace, form=form) for form in forms] == whole
 
 

@@ -87,7 +87,7 @@ def test_time_window_has_its_start_and_not_its_end(
     batch_rows: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("msgflow.events.selection._BATCH_ROWS", batch_rows)
+    monkeypatch.setattr("msgflow.events.selection.BATCH_ROWS", batch_rows)
     assert times(listed(trace, start=start, end=end)) == [
         3 * SECOND,
         3 * SECOND + 1,

@@ -61,9 +61,9 @@ def test_csv_has_lists_as_json(trace: Path, tmp_path: Path) -> None:
 def test_small_pieces_are_gathered(
     trace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("msgflow.events.selection._BATCH_ROWS", 1)
+    monkeypatch.setattr("msgflow.events.selection.BATCH_ROWS", 1)
     write(trace, EventFormat.PARQUET, tmp_path / "few")
-    monkeypatch.setattr("msgflow.events.tables._MOST_BYTES_HELD", 1)
+    monkeypatch.setattr("msgflow.events.tables.MOST_BYTES_HELD", 1)
     write(trace, EventFormat.PARQUET, tmp_path / "many")
     few, many = (pq.ParquetFile(tmp_path / name / "app.start.parquet") for name in ("few", "many"))
     assert (few.num_row_groups, many.num_row_groups) == (1, 2)

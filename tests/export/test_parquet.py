@@ -17,6 +17,7 @@ from golden import fill_case
 
 from msgflow import Database, UsageError, __version__
 from msgflow.db.connection import recorded_revision
+from msgflow.export.views import Selection
 
 CASES = Path(__file__).resolve().parents[1] / "schema" / "cases"
 LARGE = 18_446_744_073_709_551_615
@@ -207,16 +208,14 @@ def test_what_fails_on_the_way_changes_nothing(
         before = {path: path.read_bytes() for path in out.rglob("*.parquet")}
         calls = []
 
-        def write(*arguments: object) -> int:
+        def read(*arguments: Any) -> Any:
             calls.append(arguments)
             if len(calls) == 3:
                 raise KeyboardInterrupt
             return original(*arguments)
 
-        from msgflow.export import parquet
-
-        original = parquet._write
-        monkeypatch.setattr(parquet, "_write", write)
+        original = Selection.read
+        monkeypatch.setattr(Selection, "read", read)
         with pytest.raises(KeyboardInterrupt):
             database.export_parquet(out, ["node", "publisher"], force=force)
     assert {path: path.read_bytes() for path in out.rglob("*.parquet")} == before

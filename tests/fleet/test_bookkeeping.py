@@ -52,7 +52,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
 @pytest.fixture(autouse=True)
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "run_task", run_task)
-    monkeypatch.setattr(ingesting, "_SECONDS_BETWEEN_LOOKS_AT_RUNS", 0)
+    monkeypatch.setattr(ingesting, "SECONDS_BETWEEN_LOOKS_AT_RUNS", 0)
 
 
 @pytest.fixture

@@ -31,9 +31,9 @@ class Refusing:
 
 
 def refusing(monkeypatch: pytest.MonkeyPatch, times: int, words: str) -> tuple[Store, Refusing]:
-    monkeypatch.setattr(store_module, "_PAUSES", (0, 0, 0, 0))
+    monkeypatch.setattr(store_module, "PAUSES", (0, 0, 0, 0))
     store, system = Store("s3://bucket/recordings"), Refusing(times, words)
-    store._system = system
+    monkeypatch.setattr(Store, "filesystem", system)
     return store, system
 
 

@@ -352,8 +352,11 @@ def test_what_may_pass_is_tried_again(
     ],
 )
 def test_too_little_memory_is_told_from_other_errors(error: Exception) -> None:
-    assert child_process._failed(error, "answers", 1.0).reason == "too_large"
-    assert child_process._failed(UsageError("no such query"), "answers", 1.0).reason != "too_large"
+    assert child_process.failed_outcome(error, "answers", 1.0).reason == "too_large"
+    assert (
+        child_process.failed_outcome(UsageError("no such query"), "answers", 1.0).reason
+        != "too_large"
+    )
 
 
 def test_what_no_worker_has_is_not_tried(filled: Filled, tmp_path: Path) -> None:
@@ -404,7 +407,7 @@ def test_a_lake_where_nobody_may_write(filled: Filled) -> None:
 
 def test_a_lake_that_cannot_be_reached(filled: Filled, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setattr("msgflow.fleet.file_store._MOST_ATTEMPTS", 1)
+    monkeypatch.setattr("msgflow.fleet.file_store.MOST_ATTEMPTS", 1)
     result = run("ingest", filled.recordings / "r0", "--lake", "s3://fleet/lake")
     assert result.exit_code == 4
     assert "cannot read the store" in result.stderr

@@ -151,9 +151,9 @@ def test_a_store_that_is_not_there(bucket: ObjectStore, monkeypatch: pytest.Monk
         Store("s3://nobodys-bucket/lake").put("x", b"y")
     assert not any(secret in str(raised.value) for secret in KEYS.values() if "-1" not in secret)
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setattr("msgflow.fleet.file_store._MOST_ATTEMPTS", 1)
+    monkeypatch.setattr("msgflow.fleet.file_store.MOST_ATTEMPTS", 1)
     # If the service does not answer, only the client of AWS tries again.
-    monkeypatch.setattr("msgflow.fleet.file_store._PAUSES", (1e6,))
+    monkeypatch.setattr("msgflow.fleet.file_store.PAUSES", (1e6,))
     with pytest.raises(DatabaseError, match="cannot read the store"):
         Store("s3://fleet/lake").read("lake.json")
 

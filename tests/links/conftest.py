@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,12 +8,8 @@ from analysis import Analysis
 from ros_system import RosSystem
 from staged_events import Thread
 
-from msgflow import Database
-
 FUSION, RELAY = Thread(100, name="fusion"), Thread(200, name="relay")
 TWINS = Thread(300, name="left"), Thread(400, name="right")
-
-Apply = Callable[..., tuple[Database, Exception | None]]
 
 
 def make_system() -> RosSystem:

@@ -6,7 +6,6 @@ import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
 from staged_events import Thread
-from thorough import thorough
 
 TALKER = Thread(100)
 LISTENER = Thread(200)
@@ -52,6 +51,11 @@ class Pair(RosSystem):
         self.ready(LISTENER)
         self.idle(LISTENER)
 
+    def send_and_hear(self, stamp: int) -> None:
+        """Publish a message that is taken at once."""
+        self.send(stamp)
+        self.hear(stamp)
+
     def go_on(self) -> None:
         """All processes are seen once more, so that none ends before the others."""
         for thread in (TALKER, LISTENER):
@@ -70,8 +74,7 @@ def reasons(analysis: Analysis) -> dict[int, str | None]:
 
 def test_what_was_taken_has_no_reason(pair: Pair, analyse: Analyse) -> None:
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     assert analyse(pair).rows(REASONS) == [(1, "delivered", None)]
 
 
@@ -79,8 +82,7 @@ def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None
     pair.publisher(TALKER, 0x10, "/a")
     pair.send(1)
     pair.add_subscription()
-    pair.send(2)
-    pair.hear(2)
+    pair.send_and_hear(2)
     assert analyse(pair).rows(REASONS) == [
         (1, "unconnected", "before_subscription"),
         (2, "delivered", None),
@@ -90,8 +92,7 @@ def test_before_the_subscription_there_was(pair: Pair, analyse: Analyse) -> None
 def test_before_discovery_nothing_arrives(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send(1, 2)
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     assert reasons(analyse(pair)) == {
         1: "before_discovery",
         2: "before_discovery",
@@ -102,8 +103,7 @@ def test_before_discovery_nothing_arrives(pair: Pair, analyse: Analyse) -> None:
 def test_a_process_that_is_seen_no_more_has_ended(pair: Pair, analyse: Analyse) -> None:
     """Others go on for much longer than a message ever took."""
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.wait(50 * MS)
     pair.send(3)
@@ -116,19 +116,16 @@ def test_a_process_that_is_seen_no_more_has_ended(pair: Pair, analyse: Analyse) 
 
 def test_at_the_end_of_the_trace_messages_are_pending(pair: Pair, analyse: Analyse) -> None:
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     assert reasons(analyse(pair)) == {1: None, 2: "pending_at_end"}
 
 
 def test_a_subscription_ends_where_its_handle_is_used_again(pair: Pair, analyse: Analyse) -> None:
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.add_subscription()
-    pair.send(2)
-    pair.hear(2)
+    pair.send_and_hear(2)
     assert analyse(pair).rows(REASONS) == [
         (1, "delivered", None),
         (1, "unconnected", "before_subscription"),
@@ -139,16 +136,13 @@ def test_a_subscription_ends_where_its_handle_is_used_again(pair: Pair, analyse:
 
 def test_a_gap_of_the_receiver_may_hide_the_take(pair: Pair, analyse: Analyse) -> None:
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.lose()
     pair.wait(100)
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     pair.send(4)
-    pair.send(5)
-    pair.hear(5)
+    pair.send_and_hear(5)
     assert reasons(analyse(pair)) == {
         1: None,
         2: "receiver_gap",
@@ -160,12 +154,10 @@ def test_a_gap_of_the_receiver_may_hide_the_take(pair: Pair, analyse: Analyse) -
 
 def test_an_attempt_that_took_nothing(pair: Pair, analyse: Analyse) -> None:
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     model = analyse(pair)
     assert reasons(model) == {1: None, 2: "take_failed", 3: None}
     assert model.value("SELECT count(*) FROM failed_take") == 1
@@ -178,8 +170,7 @@ def test_a_callback_that_looks_for_a_message_and_finds_none(pair: Pair, analyse:
     pair.start(LISTENER, 0xC9)
     pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
     pair.end(LISTENER, 0xC9)
-    pair.send(2)
-    pair.hear(2)
+    pair.send_and_hear(2)
     assert reasons(analyse(pair)) == {1: "before_discovery", 2: None}
 
 
@@ -198,8 +189,7 @@ def test_where_nothing_was_ever_taken_nothing_was_overwritten(pair: Pair, analys
 def test_a_queue_that_was_full(pair: Pair, analyse: Analyse) -> None:
     """Of five messages the newest two fit; nobody can tell whether fewer were overwritten."""
     pair.create(depth=2)
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2, 3, 4, 5, 6)
     pair.hear(5)
     pair.hear(6)
@@ -216,20 +206,9 @@ def test_a_queue_that_was_full(pair: Pair, analyse: Analyse) -> None:
 
 
 @pytest.mark.thorough
-def test_fewer_newer_messages_than_fit_overwrite_nothing(pair: Pair, analyse: Analyse) -> None:
-    pair.create(depth=10)
-    pair.send(1)
-    pair.hear(1)
-    pair.send(2, 3)
-    pair.hear(3)
-    assert reasons(analyse(pair)) == {1: None, 2: "lost_in_transport", 3: None}
-
-
-@pytest.mark.thorough
 def test_without_a_depth_nobody_can_tell(pair: Pair, analyse: Analyse) -> None:
     pair.create(depth=0)
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2, 3)
     pair.hear(3)
     assert analyse(pair).rows(REASONS)[1] == (2, "unknown", "unknown")
@@ -238,20 +217,17 @@ def test_without_a_depth_nobody_can_tell(pair: Pair, analyse: Analyse) -> None:
 def test_a_reader_that_waits_has_nothing_in_its_queue(pair: Pair, analyse: Analyse) -> None:
     """It waited for longer than messages take: the message did not come, whatever the depth."""
     pair.create(depth=1)
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.wait(20 * MS)
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     pair.go_on()
     assert reasons(analyse(pair)) == {1: None, 2: "not_delivered", 3: None}
 
 
 def test_a_reader_that_is_busy_tells_nothing(pair: Pair, analyse: Analyse) -> None:
     pair.create(depth=1)
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.ready(LISTENER)
     pair.start(LISTENER, 0xC9)
     pair.send(2)
@@ -267,13 +243,11 @@ def test_a_reader_that_is_busy_tells_nothing(pair: Pair, analyse: Analyse) -> No
 def test_a_take_that_cannot_be_identified_may_be_any(pair: Pair, analyse: Analyse) -> None:
     """A callback that ran without a take traced was handed some message."""
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.start(LISTENER, 0xC2)
     pair.end(LISTENER, 0xC2)
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     model = analyse(pair)
     assert reasons(model) == {1: None, 2: "unknown", 3: None}
     assert model.rows(ORPHANS) == [(None, "no_stamp")]
@@ -306,7 +280,7 @@ def test_no_stamp(pair: Pair, analyse: Analyse) -> None:
 def stamped(system: Pair) -> int:
     """Publish and take a message whose stamp is of the clock of the trace; return that."""
     stamp = system.publish(TALKER, 0x10, 0)
-    system._events[-1][1]["timestamp"] = stamp
+    system.events[-1][1]["timestamp"] = stamp
     system.hear(stamp)
     return stamp
 
@@ -321,42 +295,18 @@ def test_a_stamp_in_a_gap_of_the_publisher(pair: Pair, analyse: Analyse) -> None
     pair.create()
     stamped(pair)
     pair.lose()
-    stamp = pair._now + 1
+    stamp = pair.now + 1
     pair.wait(100)
     pair.hear(stamp)
-    pair.send(pair._now)
+    pair.send(pair.now)
     assert (stamp, "publisher_gap") in analyse(pair).rows(ORPHANS)
-
-
-@pytest.mark.parametrize(
-    ("more", "reason"),
-    [
-        (MS - 1_000, "publisher_gap"),
-        (MS + 1_000, "publisher_not_traced"),
-        thorough(-MS + 1_000, "publisher_gap"),
-        thorough(-MS - 1_000, "publisher_not_traced"),
-    ],
-)
-def test_a_stamp_beside_a_gap_of_the_publisher(
-    pair: Pair, analyse: Analyse, more: int, reason: str
-) -> None:
-    """No more than a millisecond behind its end, or before its begin."""
-    pair.create()
-    stamped(pair)
-    pair.wait(3 * MS)
-    pair.lose()
-    stamp = pair._now + 1 + more
-    pair.wait(3 * MS)
-    pair.hear(stamp)
-    stamped(pair)
-    assert (stamp, reason) in analyse(pair).rows(ORPHANS)
 
 
 def test_a_stamp_after_the_last_event_of_every_publisher(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     stamped(pair)
     pair.wait(20 * MS)
-    stamp = pair._now
+    stamp = pair.now
     pair.hear(stamp)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_trace_ends")]
 
@@ -365,17 +315,9 @@ def test_a_publisher_that_is_not_traced(pair: Pair, analyse: Analyse) -> None:
     """The known publisher is seen before and after, and nothing is lost."""
     pair.create()
     stamped(pair)
-    stamp = pair._now + 5
+    stamp = pair.now + 5
     pair.hear(stamp)
     stamped(pair)
-    assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
-
-
-@pytest.mark.thorough
-def test_a_topic_without_a_publisher(pair: Pair, analyse: Analyse) -> None:
-    pair.add_subscription()
-    stamp = pair._now
-    pair.hear(stamp)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_not_traced")]
 
 
@@ -408,8 +350,7 @@ def test_every_take_and_message_is_accounted_for(pair: Pair, analyse: Analyse) -
 def test_a_gap_goes_before_the_end_of_a_process(pair: Pair, analyse: Analyse) -> None:
     """What came into the gap may have been taken there; what came long after it was not."""
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.lose()
     pair.wait(50 * MS)
@@ -426,28 +367,24 @@ def test_a_gap_goes_before_the_end_of_a_process(pair: Pair, analyse: Analyse) ->
 
 def test_a_gap_goes_before_a_failed_take(pair: Pair, analyse: Analyse) -> None:
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.lose()
     pair.wait(100)
     pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     assert reasons(analyse(pair)) == {1: None, 2: "receiver_gap", 3: None}
 
 
 def test_what_cannot_be_identified_goes_before_a_failed_take(pair: Pair, analyse: Analyse) -> None:
     """Either may have been for the message."""
     pair.create()
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.take(LISTENER, 0x30, 0, taken=0, layers="rmw")
     pair.start(LISTENER, 0xC2)
     pair.end(LISTENER, 0xC2)
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     assert reasons(analyse(pair)) == {1: None, 2: "unknown", 3: None}
 
 
@@ -457,8 +394,7 @@ def test_what_cannot_be_identified_goes_before_discovery(pair: Pair, analyse: An
     pair.send(1)
     pair.start(LISTENER, 0xC2)
     pair.end(LISTENER, 0xC2)
-    pair.send(2)
-    pair.hear(2)
+    pair.send_and_hear(2)
     assert reasons(analyse(pair)) == {1: "unknown", 2: None}
 
 
@@ -467,8 +403,7 @@ def test_discovery_goes_before_waiting(pair: Pair, analyse: Analyse) -> None:
     pair.idle(LISTENER)
     pair.send(1)
     pair.wait(20 * MS)
-    pair.send(2)
-    pair.hear(2)
+    pair.send_and_hear(2)
     pair.go_on()
     assert reasons(analyse(pair)) == {1: "before_discovery", 2: None}
 
@@ -476,13 +411,12 @@ def test_discovery_goes_before_waiting(pair: Pair, analyse: Analyse) -> None:
 def test_a_gap_may_hide_that_the_two_knew_each_other(pair: Pair, analyse: Analyse) -> None:
     pair.create()
     pair.send(1)
-    pair.add_packet(1_000, pair._now)
+    pair.add_packet(1_000, pair.now)
     pair.lose()
     pair.wait(100)
     pair.ready(LISTENER)
     pair.send(2)
-    pair.send(3)
-    pair.hear(3)
+    pair.send_and_hear(3)
     assert reasons(analyse(pair)) == {1: "receiver_gap", 2: "unknown", 3: None}
 
 
@@ -495,8 +429,7 @@ def test_a_reader_that_gets_no_cpu_seems_to_wait(
     The usual delay is 30 ns here.
     """
     pair.create(depth=1)
-    pair.send(1)
-    pair.hear(1)
+    pair.send_and_hear(1)
     pair.send(2)
     pair.wait(20 * MS)
     pair.send(3)
@@ -504,28 +437,6 @@ def test_a_reader_that_gets_no_cpu_seems_to_wait(
     pair.hear(3)
     pair.go_on()
     assert reasons(analyse(pair)) == {1: None, 2: reason, 3: None}
-
-
-@pytest.mark.parametrize(
-    ("depth", "expected"),
-    [(3, ["not_delivered"] * 2), (2, ["overwritten", "lost_in_transport"])],
-)
-def test_as_many_in_a_row_as_the_queue_holds(
-    pair: Pair, analyse: Analyse, depth: int, expected: list[str]
-) -> None:
-    """The reader may have got no CPU while they came, though it took the next one at once."""
-    pair.create(depth=depth)
-    pair.send(1)
-    pair.hear(1)
-    pair.send(2)
-    pair.wait(5 * MS)
-    pair.send(3)
-    pair.wait(5 * MS)
-    pair.send(4)
-    pair.hear(4)
-    pair.go_on()
-    found = reasons(analyse(pair))
-    assert [found[2], found[3]] == expected
 
 
 class Dual(Pair):
@@ -556,17 +467,17 @@ def test_before_the_sender_is_recorded(analyse: Analyse) -> None:
     dual = Dual()
     dual.ready(dual.listener)
     dual.wait(20)
-    stamp = dual._now
+    stamp = dual.now
     dual.take(dual.listener, 0x30, stamp)
     dual.wait(MS)
-    dual.publish(dual.talker, 0x10, dual._now)
+    dual.publish(dual.talker, 0x10, dual.now)
     assert analyse(dual).rows(ORPHANS) == [(stamp, "before_tracing")]
 
 
 def paused(pair: Pair, begin: int, end: int) -> None:
     """All streams of the trace are silent from `begin` to `end`."""
     pair.add_packet(1_000, begin)
-    pair.add_packet(end, pair._now)
+    pair.add_packet(end, pair.now)
 
 
 def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse: Analyse) -> None:
@@ -574,15 +485,15 @@ def test_processes_leave_one_after_the_other_before_a_pause(pair: Pair, analyse:
     pair.create()
     stamped(pair)
     pair.wait(5 * MS)
-    stamp = pair._now
+    stamp = pair.now
     pair.wait(5 * MS)
     pair.hear(stamp)
-    begin = pair._now
+    begin = pair.now
     pair.wait(30 * MS)
-    end = pair._now
+    end = pair.now
     pair.ready(LISTENER)
     pair.wait(5 * MS)
-    later = pair._now
+    later = pair.now
     pair.wait(5 * MS)
     pair.hear(later)
     stamped(pair)
@@ -598,7 +509,7 @@ def test_a_publisher_without_a_topic_may_be_the_sender(pair: Pair, analyse: Anal
     pair.add_source(1, "alpha", "boot")
     pair.publish(Thread(300, trace=1), 0x77, 4)
     pair.lose(trace=1)
-    stamp = pair._now + 1
+    stamp = pair.now + 1
     pair.wait(MS)
     pair.hear(stamp)
     pair.publish(Thread(300, trace=1), 0x77, 5)
@@ -611,7 +522,7 @@ def test_a_publisher_without_a_topic_that_was_recorded_is_not(pair: Pair, analys
     pair.publish(OTHER, 0x77, 3)
     stamped(pair)
     pair.wait(5 * MS)
-    stamp = pair._now + 5
+    stamp = pair.now + 5
     pair.hear(stamp)
     pair.wait(5 * MS)
     pair.publish(OTHER, 0x77, 4)
@@ -624,11 +535,11 @@ def test_a_publisher_that_was_created_later_is_not(pair: Pair, analyse: Analyse)
     pair.create()
     stamped(pair)
     pair.wait(20 * MS)
-    stamp = pair._now
+    stamp = pair.now
     pair.hear(stamp)
     pair.wait(20 * MS)
     pair.publisher(OTHER, 0x10, "/a")
-    pair.publish(OTHER, 0x10, pair._now)
+    pair.publish(OTHER, 0x10, pair.now)
     assert analyse(pair).rows(ORPHANS) == [(stamp, "publisher_trace_ends")]
 
 

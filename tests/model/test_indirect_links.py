@@ -72,7 +72,7 @@ def make_history(seed: int) -> tuple[RosSystem, History]:
             history.publications.append(Publication(publisher, n, at, inner))
             history.heard[n] = at
         elif history.loss is None and not stack and n in history.heard:
-            history.loss = (n, system._now)
+            history.loss = (n, system.now)
             system.lose(cpu=n)
     for n, stack in enumerate(stacks):
         while stack:

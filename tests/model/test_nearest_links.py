@@ -73,9 +73,7 @@ class Unstamped:
                 source_timestamp=stamp,
                 taken=1,
             )
-            self.system.add(
-                "ros2:rcl_take", self.listener, ts=self.system._now + 1_000, message=0xB
-            )
+            self.system.add("ros2:rcl_take", self.listener, ts=self.system.now + 1_000, message=0xB)
         if is_traced and is_taken:
             self.truth.append((time + 6_000, stamp))
         return stamp

@@ -4,8 +4,8 @@ import pytest
 
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
-from msgflow.nearest import nearest
-from msgflow.query.catalogue import _WORDS, load_queries, load_query, query_names
+from msgflow.name_suggestions import nearest
+from msgflow.query.catalogue import QUERIES_BY_WORD, load_queries, load_query, query_names
 
 
 def test_the_catalogue_is_the_folder() -> None:
@@ -55,4 +55,6 @@ def test_words_for_what_a_query_answers(name: str, hint: str) -> None:
 
 
 def test_every_word_leads_to_a_query() -> None:
-    assert {query for queries in _WORDS.values() for query in queries} <= set(query_names())
+    assert {query for queries in QUERIES_BY_WORD.values() for query in queries} <= set(
+        query_names()
+    )

@@ -9,7 +9,6 @@ import pytest
 
 STRETCH_NS = 500_000_000
 # What a clock may drift in a stretch.
-WANDER_NS = 100_000
 
 
 def agreed(

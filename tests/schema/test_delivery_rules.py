@@ -74,6 +74,24 @@ class Delivery:
             )
         return self._count
 
+    def miss(self) -> int:
+        """Publish a message that is taken, then one that is not; return the number of that."""
+        self.publish(0, 300_000)
+        return self.publish(300 * MS)
+
+    def fails(self, at: int) -> None:
+        """Attempt to take, and find nothing."""
+        self.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [at])
+
+    def takes_without_message(self, at: int) -> None:
+        """Take what has no stamp, and what has one: that cannot be of a message with another."""
+        self.con.execute(
+            "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) "
+            "VALUES (99, ?, NULL), (98, ?, 7)",
+            [at, 305 * MS],
+        )
+        self.con.execute("UPDATE derive.expected_arrival SET source_timestamp_ns = 5")
+
     def waits(self, start: int, end: int) -> None:
         self.con.execute(
             "INSERT INTO store.executor_state (start_ns, end_ns) VALUES (?, ?)", [start, end]
@@ -209,8 +227,7 @@ def test_a_reader_that_was_seen_when_the_message_arrived(
     delivery: Delivery, seen: int, reason: str
 ) -> None:
     delivery.lives(last_seen_ns=300 * MS + seen, host_end_ns=400 * MS)
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     assert delivery.reason(missing) == reason
 
 
@@ -256,8 +273,7 @@ def test_a_gap_that_ends_before_a_message_arrives(
     delivery: Delivery, until: int, reason: str
 ) -> None:
     delivery.lives()
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(320 * MS, 320 * MS + 300_000)
     delivery.misses(250 * MS, 300 * MS + until)
     assert delivery.reason(missing) == reason
@@ -288,8 +304,7 @@ def test_a_gap_hides_what_the_two_knew_of_each_other(
 def test_as_many_newer_messages_as_fit(delivery: Delivery, newer: int, reason: str) -> None:
     """Of any publisher, until the next one is taken; the message itself does not count."""
     delivery.lives(queue_depth=3)
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     for at in range(newer - 1):
         delivery.publish(301 * MS + at, publisher=2)
     delivery.publish(305 * MS, 306 * MS)
@@ -328,10 +343,9 @@ def test_an_attempt_failed_before_a_later_message_was_taken(
     delivery: Delivery, failed: int, reason: str
 ) -> None:
     delivery.lives()
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [failed])
+    delivery.fails(failed)
     assert delivery.reason(missing) == reason
 
 
@@ -339,10 +353,9 @@ def test_a_gap_leaves_open_whether_the_attempt_that_failed_was_the_only_one(
     delivery: Delivery,
 ) -> None:
     delivery.lives()
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [305 * MS])
+    delivery.fails(305 * MS)
     delivery.misses(306 * MS, 307 * MS)
     assert delivery.reason(missing) == "receiver_gap"
 
@@ -350,22 +363,10 @@ def test_a_gap_leaves_open_whether_the_attempt_that_failed_was_the_only_one(
 def test_a_take_without_a_message_leaves_open_what_failed(delivery: Delivery) -> None:
     """Either may have been the attempt that took it."""
     delivery.lives()
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [305 * MS])
-    taken = 315 * MS
-    delivery.con.execute(
-        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (99, ?, NULL)",
-        [taken],
-    )
-    # One with a stamp cannot be of a message with one.
-    delivery.con.execute(
-        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (98, ?, 7)",
-        [305 * MS],
-    )
-    with_stamp = "UPDATE derive.expected_arrival SET source_timestamp_ns = 5"
-    delivery.con.execute(with_stamp)
+    delivery.fails(305 * MS)
+    delivery.takes_without_message(315 * MS)
     assert delivery.reason(missing) == "unknown"
 
 
@@ -383,20 +384,9 @@ def test_a_take_without_a_message_was_before_a_later_one(
 ) -> None:
     """It had no stamp, so that it may be of any message."""
     delivery.lives()
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(310 * MS, 320 * MS)
-    delivery.con.execute(
-        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (99, ?, NULL)",
-        [taken],
-    )
-    # One with a stamp cannot be of a message with one.
-    delivery.con.execute(
-        "INSERT INTO store.take (take_id, taken_ns, source_timestamp_ns) VALUES (98, ?, 7)",
-        [305 * MS],
-    )
-    with_stamp = "UPDATE derive.expected_arrival SET source_timestamp_ns = 5"
-    delivery.con.execute(with_stamp)
+    delivery.takes_without_message(taken)
     assert delivery.reason(missing) == reason
 
 
@@ -420,8 +410,7 @@ def test_a_later_message_of_another_publisher_was_taken(
 ) -> None:
     """One that arrived at the same time is not later."""
     delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(300 * MS + last, 310 * MS, publisher=2)
     assert delivery.reason(missing) == reason
 
@@ -439,8 +428,7 @@ def test_a_later_message_of_the_publisher_shows_how_long_a_gap_matters(
 ) -> None:
     """Its messages arrive in order: until the later one was taken. Another one was taken, too."""
     delivery.lives(last_seen_ns=400 * MS)
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(300 * MS + later, 320 * MS)
     delivery.publish(301 * MS, 321 * MS, publisher=2)
     delivery.misses(start, 900 * MS)
@@ -534,8 +522,7 @@ def test_messages_stay_in_a_queue_that_nobody_reads(
 def test_what_was_lost_is_not_told_without_a_depth(delivery: Delivery) -> None:
     """The queue may have held one message."""
     delivery.lives(queue_depth=None)
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     delivery.publish(301 * MS, 302 * MS)
     assert delivery.reason(missing) == "unknown"
 
@@ -574,18 +561,16 @@ def test_of_messages_of_a_publisher_at_the_same_moment_the_first_take_counts(
 ) -> None:
     """An attempt that failed after that was none for the missing message."""
     delivery.lives()
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     for at in taken:
         delivery.publish(310 * MS, at)
-    delivery.con.execute("INSERT INTO derive.empty_take (failed_ns) VALUES (?)", [325 * MS])
+    delivery.fails(325 * MS)
     assert delivery.reason(missing) == "lost_in_transport"
 
 
 def test_messages_that_arrive_at_the_same_moment_are_newer_alike(delivery: Delivery) -> None:
     delivery.lives(queue_depth=3)
-    delivery.publish(0, 300_000)
-    missing = delivery.publish(300 * MS)
+    missing = delivery.miss()
     for _ in range(3):
         delivery.publish(310 * MS, 310 * MS)
     assert delivery.reason(missing) == "overwritten"

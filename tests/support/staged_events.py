@@ -61,21 +61,21 @@ class StagedEvents:
 
     def __init__(self) -> None:
         self.sources: dict[int, Source] = {0: Source()}
-        self._events: list[tuple[str, dict[str, Any]]] = []
+        self.events: list[tuple[str, dict[str, Any]]] = []
         self._packets: dict[int, list[dict[str, Any]]] = defaultdict(list)
-        self._now = 1_000
+        self.now = 1_000
 
     def add(self, name: str, thread: Thread, *, ts: int | None = None, **fields: Any) -> int:
         """Add an event; fields left out are NULL. Returns its time stamp."""
         known = {field.name for field in load().tracepoints[name].fields}
         if fields.keys() - known:
             raise ValueError(f"{name} has no field {', '.join(sorted(fields.keys() - known))}")
-        self._now = self._now + STEP_NS if ts is None else ts
-        self._events.append(
+        self.now = self.now + STEP_NS if ts is None else ts
+        self.events.append(
             (
                 name,
                 {
-                    "ts_ns": self._now,
+                    "ts_ns": self.now,
                     "trace_index": thread.trace,
                     "cpu_id": thread.cpu,
                     "vpid": thread.pid,
@@ -86,16 +86,16 @@ class StagedEvents:
                 },
             )
         )
-        return self._now
+        return self.now
 
     def add_row(self, name: str, columns: Mapping[str, Any]) -> None:
         """Add an event of another system, as `ordered` returned it."""
-        self._now = columns["ts_ns"]
-        self._events.append((name, {k: v for k, v in columns.items() if k != "event_id"}))
+        self.now = columns["ts_ns"]
+        self.events.append((name, {k: v for k, v in columns.items() if k != "event_id"}))
 
     def wait(self, duration_ns: int) -> None:
         """Let time pass before the next event."""
-        self._now += duration_ns
+        self.now += duration_ns
 
     def add_source(
         self,
@@ -144,12 +144,12 @@ class StagedEvents:
     def lose(self, *, cpu: int = 0, trace: int = 0, count: int = 5) -> None:
         """Declare that events are lost between the event added last and the next one added."""
         self.add_packet(
-            self._now, self._now + 1, last_event=self._now, discarded=count, cpu=cpu, trace=trace
+            self.now, self.now + 1, last_event=self.now, discarded=count, cpu=cpu, trace=trace
         )
 
     def ordered(self) -> list[tuple[str, dict[str, Any]]]:
         """Return (name, columns) of all events in their total order, with their `event_id`."""
-        ordered = sorted(self._events, key=lambda event: event[1]["ts_ns"])
+        ordered = sorted(self.events, key=lambda event: event[1]["ts_ns"])
         return [(name, {"event_id": n, **row}) for n, (name, row) in enumerate(ordered)]
 
     def write(self, con: duckdb.DuckDBPyConnection) -> None:
@@ -212,7 +212,7 @@ class StagedEvents:
     def _all_packets(self) -> list[dict[str, Any]]:
         whole = StagedEvents()
         for trace in self.sources.keys() - self._packets.keys():
-            rows = [row for _, row in self._events if row["trace_index"] == trace]
+            rows = [row for _, row in self.events if row["trace_index"] == trace]
             for cpu in sorted({row["cpu_id"] for row in rows}):
                 times = [row["ts_ns"] for row in rows if row["cpu_id"] == cpu]
                 begin, end = min(r["ts_ns"] for r in rows), max(r["ts_ns"] for r in rows)

@@ -10,7 +10,7 @@ import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
-from msgflow.trace import extraction, metadata
+from msgflow.trace import extraction, metadata_frame
 
 KIB = 1 << 10
 BLOCK = 4 * KIB
@@ -56,10 +56,10 @@ def test_metadata_of_64_mebibytes(tmp_path: Path) -> None:
     path = tmp_path / "metadata"
     path.touch()
     os.truncate(path, 64 << 20)
-    assert len(metadata.content_of(tmp_path)) == 64 << 20
+    assert len(metadata_frame.content_of(tmp_path)) == 64 << 20
     os.truncate(path, (64 << 20) + 1)
     with pytest.raises(OSError, match=r"67,108,865 bytes, more than the 67,108,864"):
-        metadata.content_of(tmp_path)
+        metadata_frame.content_of(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ class Witness:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.arrivals: list[tuple[Any, ...]] = []
         self.calls: list[tuple[Any, ...]] = []
-        arrive, run_timer = Middleware.arrive, executor_thread._RUN[TimerObject]
+        arrive, run_timer = Middleware.arrive, executor_thread.HANDLERS[TimerObject]
 
         def seen(middleware: Middleware, time: int, delivery: Any) -> None:
             subscription, message = delivery
@@ -113,8 +113,8 @@ class Witness:
             return run_timer(thread, middleware, timer, time)
 
         monkeypatch.setattr(Middleware, "arrive", seen)
-        handlers: dict[type, Callable[..., Any]] = {**executor_thread._RUN, TimerObject: called}
-        monkeypatch.setattr(executor_thread, "_RUN", handlers)
+        handlers: dict[type, Callable[..., Any]] = {**executor_thread.HANDLERS, TimerObject: called}
+        monkeypatch.setattr(executor_thread, "HANDLERS", handlers)
 
 
 @pytest.mark.parametrize("name", few(SCENARIOS, "executors"))

@@ -234,7 +234,7 @@ def test_a_loss_excuses_what_is_near_it(simulation, database):
 
 def test_excuses_where_nothing_is_missing_are_wrong(losses, monkeypatch):
     simulation, path = losses
-    monkeypatch.setattr(compare, "_EXCUSE", None)
+    monkeypatch.setattr(compare, "EXCUSE", None)
     scores, drops = compare_simulated(path, simulation.truth)
     excused = {score.kind: score for score in scores}["excused"]
     assert excused.labels == "at most 0"

@@ -94,7 +94,7 @@ class TrueTimer:
 def timers(monkeypatch: pytest.MonkeyPatch) -> dict[int, TrueTimer]:
     """The timers of a simulation by the address of their callback."""
     seen: dict[int, TrueTimer] = {}
-    run_timer = executor_thread._RUN[TimerObject]
+    run_timer = executor_thread.HANDLERS[TimerObject]
 
     def called(thread: Any, middleware: Any, timer: TimerObject, time: int) -> Any:
         true = seen.setdefault(timer.callback, TrueTimer(timer.node, timer.period))
@@ -104,8 +104,8 @@ def timers(monkeypatch: pytest.MonkeyPatch) -> dict[int, TrueTimer]:
         true.skipped.append((timer.due - due) // timer.period - 1)
         return outcome
 
-    handlers: dict[type, Callable[..., Any]] = {**executor_thread._RUN, TimerObject: called}
-    monkeypatch.setattr(executor_thread, "_RUN", handlers)
+    handlers: dict[type, Callable[..., Any]] = {**executor_thread.HANDLERS, TimerObject: called}
+    monkeypatch.setattr(executor_thread, "HANDLERS", handlers)
     return seen
 
 

@@ -18,7 +18,9 @@ from thorough import few
 from msgflow.cli.report import read_size
 from msgflow.database import open_db
 from msgflow.errors import UsageError
+from msgflow.run.window import Window
 from msgflow.view import report as report_module
+from msgflow.view.pages import Pages
 
 PAGES = ("overview", "paths", "timeline", "graph", "executors", "compare")
 
@@ -259,15 +261,19 @@ def said_bytes(raised: pytest.ExceptionInfo[UsageError]) -> int:
 def _asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports of one database and window have the same answers: they are asked for once."""
     known: dict[str, bytes] = {}
-    ask = report_module._Maker.answer
 
-    def answer(maker: report_module._Maker, name: str, /, **params: Any) -> bytes:
-        key = f"{maker.window} {name} {sorted(params.items())}"
-        if key not in known:
-            known[key] = ask(maker, name, **params)
-        return known[key]
+    class RememberingPages(Pages):
+        def __init__(self, window: Window) -> None:
+            super().__init__(window)
+            self.shown = window
 
-    monkeypatch.setattr(report_module._Maker, "answer", answer)
+        def answer(self, connection: Any, name: str, params: dict[str, Any]) -> bytes:
+            key = f"{self.shown} {name} {sorted(params.items())}"
+            if key not in known:
+                known[key] = super().answer(connection, name, params)
+            return known[key]
+
+    monkeypatch.setattr(report_module, "Pages", RememberingPages)
 
 
 @pytest.mark.usefixtures("_asked_once")

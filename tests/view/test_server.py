@@ -218,7 +218,7 @@ def test_what_nobody_waits_for_ends(
 
     from msgflow.view import pages
 
-    monkeypatch.setitem(pages._ANSWERS, "edge", long)
+    monkeypatch.setitem(pages.ANSWERS, "edge", long)
     with socket.create_connection(("127.0.0.1", server.port)) as reader:
         reader.sendall(
             f"GET /api/edge HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"

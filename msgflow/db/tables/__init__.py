@@ -8,14 +8,13 @@ users the module `msgflow.schema` has the tables and the public views.
 
 The comment of a table states its grain, the comment of a column its meaning. `column.py` documents
 what their `info` holds. Each `ForeignKey` declares a relation. Databases do not have it: DuckDB's
-foreign keys would forbid replacing a run in one transaction. `relation.py` proves it instead.
+foreign keys would forbid replacing a run in one transaction. `relation_check.py` proves it instead.
 """
 
 from msgflow.db.tables import (
     call,
     callback,
     clock,
-    delivery,
     executor,
     flow,
     identity,
@@ -30,7 +29,6 @@ __all__ = [
     "call",
     "callback",
     "clock",
-    "delivery",
     "executor",
     "flow",
     "identity",

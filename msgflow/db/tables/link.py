@@ -1,4 +1,4 @@
-"""Tables of links: which take is from which publication, and what caused a publication."""
+"""Tables of links: which take is from which publication, which messages are missing, and causes."""
 
 from __future__ import annotations
 
@@ -154,4 +154,34 @@ Table(
     reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
     comment="One row per response and the callback instance that sent it",
     info={"view": "Responses and the callback instance that sent them."},
+)
+
+Table(
+    "undelivered",
+    STORE,
+    run_id(),
+    reference("publication_id", "The message", to="publication.publication_id", required=True),
+    reference("publisher_id", "Its publisher", to="publisher.publisher_id", required=True),
+    reference(
+        "subscription_id",
+        "Subscription that did not take it",
+        to="subscription.subscription_id",
+        required=True,
+    ),
+    text("reason", "Why; a closed vocabulary", required=True),
+    comment=(
+        "One row per publication and subscription of its topic that is not known to have taken it"
+    ),
+)
+
+Table(
+    "orphan_take",
+    STORE,
+    run_id(),
+    reference("take_id", "The take", to="take.take_id", required=True),
+    reference(
+        "subscription_id", "Subscription that received it", to="subscription.subscription_id"
+    ),
+    text("reason", "Why; a closed vocabulary", required=True),
+    comment="One row per take whose publication is not known",
 )

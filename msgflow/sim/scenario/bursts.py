@@ -1,4 +1,4 @@
-"""Publications of one publisher that follow each other within microseconds, as markers do."""
+"""Bursts: publications within microseconds, as of markers, or with equal source stamps."""
 
 from __future__ import annotations
 
@@ -20,6 +20,33 @@ def bursts_two_hosts() -> Scenario:
     """The same with the relay on another host: some messages are taken there only."""
     return _scenario(
         "bursts_two_hosts", "The bursts with their relay on a second host.", ("alpha", "beta")
+    )
+
+
+def equal_stamps() -> Scenario:
+    """A clock that ticks every 4 ms: bursts on one topic and on two have equal stamps."""
+    topics = ("/left", "/left", "/right", "/left")
+    source = Node(
+        "source",
+        publishers=(Publisher("/left"), Publisher("/right")),
+        timers=(Timer(11 * MILLISECOND, topics),),
+    )
+    relay = Node(
+        "relay",
+        publishers=(Publisher("/out"),),
+        subscriptions=(Subscription("/left", ("/out", "/out")), Subscription("/right")),
+    )
+    sink = Node("sink", subscriptions=(Subscription("/out"), Subscription("/left")))
+    return Scenario(
+        name="equal_stamps",
+        description="Messages with equal source stamps, on one topic and on several.",
+        hosts=(Host("alpha", stamp_resolution_ns=4 * MILLISECOND),),
+        processes=(
+            Process("source", "alpha", 1101, (source,)),
+            Process("relay", "alpha", 1201, (relay,), start_ns=3 * MILLISECOND),
+            Process("sink", "alpha", 1301, (sink,), start_ns=7 * MILLISECOND),
+        ),
+        duration_ns=3 * SECOND,
     )
 
 

@@ -14,8 +14,7 @@ from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
 from msgflow.trace.ctf.field_types import BYTE
 from msgflow.trace.ctf.packet_rows import PacketRows
-from msgflow.trace.ctf.record_batch import ClassPlan, EventRows, build_batch, make_plan
-from msgflow.trace.ctf.thread_names import ThreadNames
+from msgflow.trace.ctf.record_batch import ClassPlan, EventRows, ThreadNames, build_batch, make_plan
 from msgflow.trace.model import EventBatch, Progress
 from msgflow.trace.prefetch import Prefetch
 

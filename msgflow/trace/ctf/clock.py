@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import MetadataError
 
 if TYPE_CHECKING:
     import numpy as np

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.field_types import (
     END_ROLE,
     TIME_ROLE,
@@ -13,6 +12,7 @@ from msgflow.trace.ctf.field_types import (
     Choice,
     Integer,
     Member,
+    MetadataError,
     Structure,
     Type,
     VariableInteger,

@@ -8,10 +8,10 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
-from msgflow.trace.ctf.errors import FieldError
 from msgflow.trace.ctf.field_types import (
     BYTE,
     Array,
+    FieldError,
     Integer,
     Real,
     Scope,

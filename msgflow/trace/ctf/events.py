@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.trace.ctf.errors import FieldError
-from msgflow.trace.ctf.field_types import BYTE
+from msgflow.trace.ctf.field_types import BYTE, FieldError
 from msgflow.trace.ctf.header_columns import read_headers
 from msgflow.trace.numpy_arrow import distinct
 

@@ -6,12 +6,12 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.trace.ctf.errors import FieldError
 from msgflow.trace.ctf.field_types import (
     BYTE,
     EVENT_CLASS_ROLE,
     TIME_ROLE,
     Array,
+    FieldError,
     Integer,
     Optional,
     Real,

@@ -1,4 +1,4 @@
-"""Types of fields, for metadata in any language. Sizes and alignments are in bits."""
+"""Types of fields, for metadata in any language; errors. Sizes and alignments are in bits."""
 
 from __future__ import annotations
 
@@ -23,6 +23,14 @@ EVENT_CLASS_ROLE = "event-record-class-id"
 
 BYTE = 8
 _UUID_BYTES = 16
+
+
+class MetadataError(Exception):
+    """The metadata cannot be understood; the message says why and where."""
+
+
+class FieldError(Exception):
+    """A field cannot be read; the message says why."""
 
 
 class Scope(IntEnum):

@@ -9,7 +9,7 @@ from uuid import UUID
 
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.json_types import TypeReader, integer_of
 
 if TYPE_CHECKING:

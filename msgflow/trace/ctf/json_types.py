@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.field_types import (
     BYTE,
     Array,
     Choice,
     Integer,
     Member,
+    MetadataError,
     Optional,
     Real,
     Reference,

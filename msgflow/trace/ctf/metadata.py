@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, tsdl
-from msgflow.trace.ctf.errors import MetadataError
-from msgflow.trace.ctf.field_types import parts
-from msgflow.trace.metadata import (
+from msgflow.trace.ctf.field_types import MetadataError, parts
+from msgflow.trace.metadata_frame import (
     BYTE_ORDER_OF_MAGIC,
     HEADER_SIZE,
     SIZES_OFFSET,

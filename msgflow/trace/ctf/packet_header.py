@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from uuid import UUID
 
-from msgflow.trace.ctf.errors import FieldError, MetadataError
 from msgflow.trace.ctf.field_reader import FieldReader
 from msgflow.trace.ctf.field_types import (
     BYTE,
@@ -21,7 +20,9 @@ from msgflow.trace.ctf.field_types import (
     TIME_ROLE,
     UUID_ROLE,
     Array,
+    FieldError,
     Integer,
+    MetadataError,
     Scope,
     Structure,
 )

@@ -1,35 +1,48 @@
-"""LTTng's packet indexes (`index/*.idx`), a second witness of where packets lie."""
+"""LTTng's packet indexes (`index/*.idx`): where packets lie, and counters of lost events."""
 
 from __future__ import annotations
 
 import os
 import struct
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections import Counter
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from msgflow.trace.regular_file import UnsuitableFileError, read_regular
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 DIRECTORY: Final = "index"
 """Name of the directory beside the streams that has the indexes."""
 
+Recording = tuple[Any, int, int]
+"""Trace uuid (or path), stream class and stream instance: equal in all directories."""
+
 _SUFFIX: Final = ".idx"
 _MAGIC: Final = 0xC1F1DCC1
 _HEADER: Final = struct.Struct(">IIII")
-_ENTRY: Final = struct.Struct(">5Q")
+_WORD: Final = 8
+_LEAST_FIELDS: Final = 5
 _LONGEST_ENTRY: Final = 4096
 _SHORTEST_LIMIT: Final = 1 << 20
 
 
 class IndexEntry(NamedTuple):
-    """A packet: offset in bytes, sizes in bits, clock values."""
+    """A packet: offset in bytes, sizes in bits, clock values.
+
+    Old indexes lack the last fields.
+    """
 
     offset: int
     size_bits: int
     content_bits: int
     begin: int
     end: int
+    discarded: int | None = None
+    class_id: int | None = None
+    instance_id: int | None = None
+    sequence: int | None = None
 
 
 def path_of(stream_file: Path) -> Path:
@@ -39,8 +52,7 @@ def path_of(stream_file: Path) -> Path:
 
 def orphans(directory: Path) -> list[Path]:
     """List the indexes in a trace directory whose stream files are missing."""
-    indexes = sorted((directory / DIRECTORY).glob(f"*{_SUFFIX}"))
-    return [path for path in indexes if not os.path.lexists(directory / path.stem)]
+    return [path for path in _indexes(directory) if not os.path.lexists(directory / path.stem)]
 
 
 def entries(stream_file: Path) -> dict[int, IndexEntry]:
@@ -57,17 +69,69 @@ def entries(stream_file: Path) -> dict[int, IndexEntry]:
         raise
     except OSError:
         return {}
-    if len(content) < _HEADER.size:
-        return {}
-    magic, _, _, entry_size = _HEADER.unpack_from(content)
-    if magic != _MAGIC or not _ENTRY.size <= entry_size <= _LONGEST_ENTRY:
-        return {}
     found = {}
     expected = 0
-    for position in range(_HEADER.size, len(content) - entry_size + 1, entry_size):
-        entry = IndexEntry(*_ENTRY.unpack_from(content, position))
+    for entry in _entries(content):
         if entry.offset != expected or not 0 < entry.content_bits <= entry.size_bits:
             break
         found[entry.offset] = entry
         expected += entry.size_bits // 8
     return found
+
+
+class DiscardCounters:
+    """Counters of lost events, which continue through the directories of a recording.
+
+    Babeltrace hides them.
+    """
+
+    def __init__(self) -> None:
+        self._counters: Counter[Recording] = Counter()
+
+    def rise(self, recording: Recording, directory: Path, told: int | None) -> int | None:
+        """Return how many events were lost before a packet; None where nothing tells it.
+
+        Args:
+            recording: what the counter counts for.
+            directory: the trace of the packet.
+            told: what Babeltrace tells, None for the first packet of a directory.
+        """
+        before = self._counters[recording]
+        if told is None:
+            counter = _first_counter(directory, *recording[1:])
+            if counter is None:
+                return None
+            told = counter - before if counter >= before else counter
+            before = counter - told
+        self._counters[recording] = before + told
+        return told
+
+
+def _first_counter(directory: Path, class_id: int, instance_id: int) -> int | None:
+    """Return the counter of the first packet of a stream; an index may be missing or cut off."""
+    firsts = []
+    for path in _indexes(directory):
+        try:
+            content = read_regular(path, None, _HEADER.size + _LONGEST_ENTRY)
+        except OSError:
+            continue
+        entry = next(_entries(content), None)
+        if entry is not None and entry[6:8] == (class_id, instance_id):
+            firsts.append((entry.begin, entry.discarded))
+    return min(firsts)[1] if firsts else None
+
+
+def _indexes(directory: Path) -> list[Path]:
+    return sorted((directory / DIRECTORY).glob(f"*{_SUFFIX}"))
+
+
+def _entries(content: bytes) -> Iterator[IndexEntry]:
+    """Yield the entries of an index; none if its header is damaged."""
+    if len(content) < _HEADER.size:
+        return
+    magic, _, _, size = _HEADER.unpack_from(content)
+    if magic != _MAGIC or not _LEAST_FIELDS * _WORD <= size <= _LONGEST_ENTRY:
+        return
+    fields = struct.Struct(f">{min(size // _WORD, len(IndexEntry._fields))}Q")
+    for position in range(_HEADER.size, len(content) - size + 1, size):
+        yield IndexEntry(*fields.unpack_from(content, position))

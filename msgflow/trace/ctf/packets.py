@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import packet_index
-from msgflow.trace.ctf.errors import FieldError
-from msgflow.trace.ctf.field_types import BYTE
+from msgflow.trace.ctf.field_types import BYTE, FieldError
 from msgflow.trace.regular_file import UnsuitableFileError
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
 from msgflow.trace.ctf.declarations import give_order, is_timeless
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.events import BEYOND_END
+from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
 from msgflow.trace.ctf.packet_order import entries_of
@@ -18,7 +18,7 @@ from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.streams import streams_of
 from msgflow.trace.ctf.trace_info import describe
 from msgflow.trace.discovery import irregular_files, stream_files
-from msgflow.trace.metadata import FILE_NAME
+from msgflow.trace.metadata_frame import FILE_NAME
 from msgflow.trace.model import Damage, undeclared
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import TimeBase

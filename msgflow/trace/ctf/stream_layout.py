@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.errors import FieldError
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
 from msgflow.trace.ctf.field_reader import EventReader
-from msgflow.trace.ctf.field_types import BYTE, Type, aligned, parts
+from msgflow.trace.ctf.field_types import BYTE, FieldError, Type, aligned, parts
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass

@@ -8,7 +8,6 @@ from uuid import UUID
 
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.field_types import (
     CONTENT_SIZE_ROLE,
     DISCARDED_ROLE,
@@ -25,6 +24,7 @@ from msgflow.trace.ctf.field_types import (
     Choice,
     Integer,
     Member,
+    MetadataError,
     Scope,
     Structure,
     Type,

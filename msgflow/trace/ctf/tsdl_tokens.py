@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import MetadataError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.field_types import (
     Array,
     Choice,
     Integer,
     Member,
+    MetadataError,
     Reference,
     Scope,
     Sequence,

@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.errors import FieldError
-from msgflow.trace.ctf.field_types import BYTE, Array, Integer, Real, Structure, Variant
+from msgflow.trace.ctf.field_types import BYTE, Array, FieldError, Integer, Real, Structure, Variant
 from msgflow.trace.ctf.fixed_layout import DynamicError, Leaf, is_dense, lay_out
 
 if TYPE_CHECKING:

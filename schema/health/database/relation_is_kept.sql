@@ -5,7 +5,7 @@
 -- cure: Report what msgflow db check prints, together with the trace.
 -- grain: one row per run and column with such identities
 -- severity: error
--- param: broken STRUCT[]  Run, column, table it refers to, and count, as `relation.py` found them
+-- param: broken STRUCT[]  Run, column, table it refers to, count; from `relation_check.py`
 SELECT
     broken.run_id,
     broken.child AS subject,

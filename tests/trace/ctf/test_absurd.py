@@ -18,7 +18,7 @@ from msgflow.errors import TraceError
 from msgflow.trace import PACKET
 from msgflow.trace.ctf import json_metadata, metadata, tsdl
 from msgflow.trace.ctf.clock import LATEST_NS, Clock
-from msgflow.trace.ctf.errors import MetadataError
+from msgflow.trace.ctf.field_types import MetadataError
 
 EVENTS, PACKETS, HEADER, EVENT = 50, 10, 84, 10 + 25 + 8
 BEGIN = "trace { major = 1; minor = 8; byte_order = le; };"

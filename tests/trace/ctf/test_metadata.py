@@ -10,12 +10,12 @@ import pytest
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, metadata, tsdl
 from msgflow.trace.ctf.declarations import TraceClass
-from msgflow.trace.ctf.errors import MetadataError
 from msgflow.trace.ctf.field_types import (
     Array,
     Choice,
     Integer,
     Member,
+    MetadataError,
     Real,
     Reference,
     Scope,

@@ -1,4 +1,4 @@
-"""Reader of traces, chosen by name; finds the traces and unpacks archives first."""
+"""Choice of the reader of traces by name; finds the traces and unpacks archives first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Metadata of a trace: its kind, and whether its frame is whole.
+"""Frame of the metadata of a trace: its kind, and whether it is whole.
 
 This module looks only at the frame, so that no reader meets a file that is cut off or no metadata.
 """
