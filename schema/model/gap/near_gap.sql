@@ -1,8 +1,8 @@
 -- name: staging.near_gap
 -- description: Events with a gap between themselves and their predecessor in a sequence of their
---     thread; the sequence 'thread' has all its events. `is_between`: the gap is on the CPU of either
---     event, or a pause, and so interrupts the record of the thread. Else it is on other CPUs, which
---     the thread may have visited meanwhile.
+--     thread; the sequence 'thread' has all its events. `is_between`: the gap is on the CPU of
+--     either event, or a pause, and so interrupts the record of the thread. Else it is on other
+--     CPUs, which the thread may have visited meanwhile.
 -- grain: one row per event and sequence
 -- when: staging.gap
 -- column: event_id BIGINT  The event
