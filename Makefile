@@ -49,7 +49,8 @@ quick: $(VENV)/.developed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --num-workers auto
-	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(wildcard tests/*/cases)
+	$(BIN)/pytest -n auto --dist worksteal --assert=plain $(wildcard tests/*/cases) \
+		tests/style/test_generated.py tests/style/test_headers.py tests/style/test_sql_style.py
 
 test: SELECTED := -m 'not thorough'
 test test-all: $(VENV)/.developed babeltrace chromium
