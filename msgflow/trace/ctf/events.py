@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msgflow.trace.ctf.event_positions import find_positions
 from msgflow.trace.ctf.field_types import BYTE, FieldError
 from msgflow.trace.ctf.header_columns import read_headers
 from msgflow.trace.numpy_arrow import distinct
@@ -21,13 +21,10 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.field_reader import EventReader
     from msgflow.trace.ctf.packet_memory import Memory
     from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.stream_layout import Span, StreamLayout
-
-BEYOND_END = "an event goes beyond the end of the packet"
+    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 # Some tracers end packets too early, but not by a day.
 _SLACK_SECONDS = 86_400
-_CODES = {1: "B", 2: "H", 4: "I", 8: "Q"}
 
 
 @dataclass(frozen=True)
@@ -66,13 +63,21 @@ def find_events(
         entries: the packets.
         report: called for damage with the packet, the byte of the packet and a message.
     """
-    for entry in entries:
-        if layout.header is None:
-            entry.events, problem = _find_field_by_field(layout, memory, entry)
-        else:
-            entry.events, problem = _find(layout, memory, entry)
-        if problem is not None:
-            report(entry, *problem)
+    if layout.header is None:
+        for entry in entries:
+            entry.events, damage = _find_field_by_field(layout, memory, entry)
+            if damage is not None:
+                report(entry, *damage)
+        return
+    spans = [
+        layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
+        for entry in entries
+    ]
+    for entry, found in zip(entries, find_positions(layout, memory, spans), strict=True):
+        entry.events = found.positions - entry.base
+        if found.problem is not None:
+            position, message = found.problem
+            report(entry, position - entry.base, message)
 
 
 def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) -> Events:
@@ -133,67 +138,15 @@ def event_reader_of(layout: StreamLayout, memory: Memory, entry: Entry, base: in
     return layout.event_reader(content, entry.packet.content_bits)
 
 
-def _find(
-    layout: StreamLayout, memory: Memory, entry: Entry
-) -> tuple[NDArray[np.int64], tuple[int, str] | None]:
-    """Find the events of a packet; this is the only step that goes from event to event.
-
-    Returns:
-        bytes of the packet at which event headers begin, up to the damage if there is any; and
-        the byte that cannot be read and why, None if all is well.
-    """
-    header = layout.header
-    assert header is not None
-    place = header.selector
-    read = struct.Struct((">" if place.big_endian else "<") + _CODES[place.width]).unpack_from
-    offset, mask = place.offsets[0], place.mask << place.shift
-    sizes, last_residue = layout.sizes_by_selector, layout.residues - 1
-    span = layout.span(entry.base, entry.packet.header.events_at, entry.packet.content_bits)
-    data, end = memory.data, span.end
-    positions: list[int] = []
-    append = positions.append
-    problem = None
-    position = span.begin
-    while position < end:
-        try:
-            while position < end:
-                append(position)
-                position += sizes[position & last_residue][read(data, position + offset)[0] & mask]
-        except KeyError:  # the size of this event varies, or no event begins here
-            try:
-                position = layout.next_event(data, position, span)
-            except FieldError as error:
-                problem = str(error)
-                break
-    if problem is None and positions:
-        problem = _problem_of_last(layout, memory, span, positions[-1], position)
-    damaged_at = positions.pop() - entry.base if problem is not None else 0
-    begins = np.array(positions, np.int64) - entry.base
-    return begins, None if problem is None else (damaged_at, problem)
-
-
-def _problem_of_last(
-    layout: StreamLayout, memory: Memory, span: Span, last: int, following: int
-) -> str | None:
-    """Return why the last event is damaged, None if it fits into the packet.
-
-    `following` is where the next event would begin. The size of an event includes the padding
-    behind it. Where a packet ends within that padding, the event itself may still fit.
-    """
-    if following > span.end:
-        return BEYOND_END
-    if span.limit < span.end:
-        try:
-            layout.next_event(memory.data, last, span)
-        except FieldError as error:
-            return str(error)
-    return None
-
-
 def _find_field_by_field(
     layout: StreamLayout, memory: Memory, entry: Entry
 ) -> tuple[NDArray[np.int64], tuple[int, str] | None]:
-    """Find the events of a packet as `_find` does; begins are bits of the packet."""
+    """Find the events of a packet.
+
+    Returns:
+        bits of the packet at which event headers begin, up to the damage if there is any; and
+        the byte that cannot be read and why, None if all is well.
+    """
     reader = event_reader_of(layout, memory, entry, entry.base)
     end = entry.packet.content_bits
     begins = []

@@ -8,7 +8,7 @@ from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
 from msgflow.trace.ctf.declarations import give_order, is_timeless
-from msgflow.trace.ctf.events import BEYOND_END
+from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans

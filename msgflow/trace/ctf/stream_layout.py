@@ -6,18 +6,23 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
 from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import BYTE, FieldError, Type, aligned, parts
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
 GAP = 64
 """Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
 
 _MOST_RESIDUES = 8
+_LONGEST_TABLE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,28 @@ class StreamLayout:
                 if size:
                     of_residue[event_id << header.selector.shift] = size
         return sizes
+
+    @cached_property
+    def size_table(self) -> NDArray[np.int64] | None:
+        """`sizes_by_selector` as an array by selector and residue, 0 where they have none.
+
+        The last row has none: larger selectors are looked up there. None if there are too many
+        selectors, or if one of ones only is a class: ones follow the last event.
+        """
+        assert self.header is not None
+        shift, mask = self.header.selector.shift, self.header.selector.mask
+        sizes = [
+            {key >> shift: size for key, size in of_residue.items()}
+            for of_residue in self.sizes_by_selector
+        ]
+        rows = max((selector for of_residue in sizes for selector in of_residue), default=0) + 2
+        if rows > _LONGEST_TABLE or any(mask in of_residue for of_residue in sizes):
+            return None
+        table = np.zeros((rows, self.residues), np.int64)
+        for residue, of_residue in enumerate(sizes):
+            for selector, size in of_residue.items():
+                table[selector, residue] = size
+        return table
 
     def _short_form(self, event_id: int) -> Form | None:
         """Return the form whose selector is this id, None if no form is."""

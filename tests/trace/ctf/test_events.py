@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
 from ctf_layouts import Style, TraceMaker
 from ctf_writer import Event, Packet, TraceContent, write_trace
@@ -17,7 +19,7 @@ from same_batches import differences, read
 from thorough import examples
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import stream_layout
+from msgflow.trace.ctf import event_positions, stream_layout
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 KINDS = {
@@ -58,6 +60,63 @@ def test_columns_as_field_by_field(
     assert places[0] == places[1]
 
 
+def anywhere(random: Random) -> Callable[..., Any]:
+    """Return guesses of where events begin; most are wrong."""
+
+    def guess(layout: Any, _: Any, targets: Any) -> Any:
+        near = [at + random.randrange(-3, 4) * layout.header.align for at in targets.tolist()]
+        return np.array(near, np.int64), np.arange(targets.size)
+
+    return guess
+
+
+@settings(
+    deadline=None,
+    max_examples=examples(20, 60),
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    style=STYLES,
+    random=st.randoms(use_true_random=True),
+    damage=st.sampled_from([None, flip_stream, flip_header, overwrite]),
+    smallest=st.sampled_from([1, 8, 100, 4096]),
+    looked_at=st.sampled_from([8, 128]),
+    followed=st.sampled_from([0, 200]),
+    is_wild=st.booleans(),
+)
+def test_side_by_side_as_alone(
+    style: Style,
+    random: Random,
+    damage: Any,
+    smallest: int,
+    looked_at: int,
+    followed: int,
+    is_wild: bool,
+    tmp_path_factory: Any,
+) -> None:
+    """Also where packets are split at bytes where no event begins, or within a long event."""
+    trace = TraceMaker(style, random).write(tmp_path_factory.mktemp("trace") / "trace", packets=12)
+    if damage is not None:
+        damage(trace, random)
+    contents = []
+    for fewest in (1, 3, 1 << 30):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(event_positions, "FEWEST_LANES", fewest)
+            patch.setattr(event_positions, "SMALLEST_LANE", smallest)
+            patch.setattr(event_positions, "LOOKED_AT", looked_at)
+            patch.setattr(event_positions, "FOLLOWED", followed)
+            if is_wild:
+                patch.setattr(event_positions, "guess", anywhere(random))
+            try:
+                contents.append(read(trace))
+            except TraceError:
+                return
+    alone = contents.pop()
+    for content in contents:
+        assert not differences(content, alone)
+        assert content.damages == alone.damages
+
+
 def write_numbers(directory: Path, count: int, *, blob_at: int = -1) -> Path:
     """Write a trace of one packet with so many events, one of which may be a blob."""
     events = [
@@ -87,6 +146,25 @@ def test_events_in_front_of_damage_are_kept(tmp_path: Path) -> None:
     numbers = [row[-1] for row in found.rows["test:number"]]
     assert numbers[:-1] == [*range(len(numbers) - 1)]
     assert 9_000 < len(numbers) < 9_400
+
+
+def test_large_packets_are_read_side_by_side(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lane per 4 KiB, and each begins at an event; else the comparison above means nothing."""
+    split, lanes = event_positions.split, []
+
+    def noted(*given: Any) -> Any:
+        lanes.append(split(*given))
+        return lanes[-1]
+
+    monkeypatch.setattr(event_positions, "split", noted)
+    found = read(write_numbers(tmp_path, 20_000))
+    (only,) = lanes
+    assert only.begins.size > 100
+    sizes = set((only.begins - only.begins[0]) % (only.ends[-1] - only.begins[0])) - {0}
+    assert {int(size) % ((only.ends[-1] - only.begins[0]) // 20_000) for size in sizes} == {0}
+    assert [row[-1] for row in found.rows["test:number"]] == [*range(20_000)]
 
 
 def test_packets_without_events(tmp_path: Path) -> None:
