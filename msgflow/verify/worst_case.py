@@ -58,7 +58,7 @@ ORDER BY root_ns, root_id LIMIT 1
 def find_worst_case(
     connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: Window
 ) -> WorstCase | None:
-    """Return the worst case of a kind, None if there is none.
+    """Return the worst case of a kind; None if nothing was measured.
 
     Args:
         connection: to a database with the public views.

@@ -1,4 +1,4 @@
-"""A trace without events beside others is a finding; a copy that is not read is none."""
+"""A trace without events is a finding if others have some. A copy that is not read is not."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class EventBody:
         fields: its fields in order; None if they must be read field by field.
         sizes: of the body in bytes, by residue of its position; None if the size varies.
         offsets: of each field in bytes, by residue; None if `sizes` is None.
-        variant: the variant behind the fields, None if there is none.
+        variant: the variant behind the fields; None without one.
         variant_name: its name in the payload.
         selector: place in the list of the field that chooses its option.
     """

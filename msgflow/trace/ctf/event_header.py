@@ -69,7 +69,7 @@ class Form:
     Attributes:
         choice: for which selector values; None: always.
         id: where the event's class is; None if there is only one.
-        time: where the time stamp is; None if there is none.
+        time: where the time stamp is; None without one.
         sizes: of the header in bytes, by residue.
     """
 

@@ -74,7 +74,7 @@ class PacketEvents:
     Attributes:
         entry: the packet.
         count: of its events.
-        first: value of the clock at the first event, None if there is none.
+        first: value of the clock at the first event; None without events.
         last: value at the last event.
         last_ns: time of the last.
         falls_back: time runs backward in it.

@@ -69,7 +69,7 @@ SELECT
     b.topic_name AS subject,
     1 AS count,
     printf(
-        '%d messages for subscriptions, of which %d are delivered or have a reason',
+        '%d messages for subscriptions; %d delivered, or with a reason',
         b.number * s.number - coalesce(n.number, 0),
         coalesce(d.number, 0) + coalesce(u.number, 0)
     ) AS detail
@@ -85,7 +85,7 @@ SELECT
     'takes',
     1,
     printf(
-        '%d takes, of which %d have a publication or a reason',
+        '%d takes; %d with a publication, or a reason',
         t.number, coalesce(l.number, 0) + coalesce(o.number, 0)
     )
 FROM taken AS t

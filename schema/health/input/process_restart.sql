@@ -1,6 +1,7 @@
 -- name: finding.process_restart
 -- title: Process ids that were used again
--- description: New processes have the ids of earlier ones. They are told apart.
+-- description: New processes have the ids of earlier ones. Each is a process of its own in the
+--     database.
 -- cause: Processes ended, and others were given their ids.
 -- cure: None needed.
 -- grain: one row, if there are any
