@@ -62,10 +62,12 @@ class RootGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the imported command, and the words behind it."""
-        from msgflow.query.catalogue import query_names
+        if args[0] not in COMMANDS:
+            from msgflow.query.catalogue import query_names
 
-        if args[0] not in COMMANDS and args[0] in query_names():
-            raise UsageError(f"there is no such command — {args[0]}", f"msgflow query {args[0]}")
+            if args[0] in query_names():
+                hint = f"msgflow query {args[0]}"
+                raise UsageError(f"there is no such command — {args[0]}", hint)
         name, summary, rest = super().resolve_command(ctx, args)
         return name, summary and _imported(str(name)), rest
 
