@@ -61,26 +61,39 @@ def definitions(con: duckdb.DuckDBPyConnection) -> dict[str, str]:
     return dict(con.execute(_RENDERED).fetchall())
 
 
-def require_ours(con: duckdb.DuckDBPyConnection, path: Path, *, only_tables: bool = False) -> None:
+def require_ours(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     """Raise unless tables, views and macros are those of this msgflow.
-
-    Args:
-        con: to the database.
-        path: its file.
-        only_tables: leave out views and macros, which an upgrade makes anew.
 
     Raises:
         DatabaseError: one is missing, changed, or not ours.
     """
-    found, wanted = definitions(con), dict(expected_definitions())
-    if only_tables:
-        found, wanted = (
-            {name: text for name, text in each.items() if not name.startswith(("view", "macro"))}
-            for each in (found, wanted)
-        )
+    _require(definitions(con), expected_definitions(), path)
+
+
+def require_tables(
+    con: duckdb.DuckDBPyConnection, path: Path, wanted: Mapping[str, str] | None = None
+) -> None:
+    """Raise unless tables are as they should be; an upgrade makes views and macros anew.
+
+    Args:
+        con: to the database.
+        path: its file.
+        wanted: definitions, as from `definitions`; those of this msgflow when None.
+
+    Raises:
+        DatabaseError: one is missing, changed, or not ours.
+    """
+    found, wanted = (
+        {name: text for name, text in each.items() if not name.startswith(("view", "macro"))}
+        for each in (definitions(con), wanted or expected_definitions())
+    )
+    _require(found, wanted, path)
+
+
+def _require(found: Mapping[str, str], wanted: Mapping[str, str], path: Path) -> None:
     if found == wanted:
         return
-    names = sorted(name for name in found | wanted if found.get(name) != wanted.get(name))
+    names = sorted(name for name in {**found, **wanted} if found.get(name) != wanted.get(name))
     name = min(names, key=lambda name: name.startswith(("view", "macro")))
     how = (
         "lacks a" if name not in found else "has a foreign" if name not in wanted else "has another"

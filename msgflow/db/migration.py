@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import tempfile
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.db import objects
 from msgflow.db.connection import (
@@ -19,7 +23,7 @@ from msgflow.db.connection import (
     recorded_revision,
     require_known,
 )
-from msgflow.db.definition_check import require_ours
+from msgflow.db.definition_check import definitions, require_ours, require_tables
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
 from msgflow.db.transaction import transaction
@@ -29,10 +33,7 @@ from msgflow.resources import resource_directory
 from msgflow.sql.failure import database_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    import duckdb
+    from collections.abc import Iterator, Mapping
 
 
 @dataclass(frozen=True)
@@ -127,11 +128,25 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
 
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> None:
-    is_older = recorded_revision(con) != objects.head_revision()
+    revision = recorded_revision(con)
+    is_older = revision != objects.head_revision()
+    # Migrations and views need their tables. Before the first release, others had revisions of the
+    # same names.
+    require_tables(con, path, _definitions_of(revision) if revision and is_older else None)
     with migrated(con) if is_older else transaction(con) as changing:
-        # Views need their tables. Before the first release, others had revisions of the same names.
-        require_ours(changing, path, only_tables=True)
         objects.apply(changing)
+
+
+def _definitions_of(revision: str) -> Mapping[str, str]:
+    """Return the definitions of tables that a database of an older revision has."""
+    with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
+        path = Path(directory) / "old.duckdb"
+        with duckdb.connect(str(path)) as con:
+            con.execute("CREATE SCHEMA store")
+            with migrated(con, revision):
+                pass
+        with duckdb.connect(str(path), read_only=True) as con:
+            return definitions(con)
 
 
 def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:

@@ -130,18 +130,26 @@ def test_a_file_of_each_revision_becomes_what_a_new_one_is(
 
 
 @pytest.mark.parametrize("revision", sorted(objects.known_revisions()))
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("ALTER TABLE store.take ADD COLUMN more BIGINT", r"another table store\.take"),
+        # A migration reads it.
+        ("ALTER TABLE store.finding RENAME TO diagnostic", r"a foreign table store\.diagnostic"),
+    ],
+)
 def test_a_file_with_tables_that_its_revision_does_not_have_is_refused(
-    tmp_path: Path, revision: str
+    tmp_path: Path, revision: str, change: str, message: str
 ) -> None:
     """Revisions of before the first release had the same names."""
     path = old_file(tmp_path / "old.duckdb", revision)
     with duckdb.connect(str(path)) as con:
-        con.execute("ALTER TABLE store.take ADD COLUMN more BIGINT")
-    with pytest.raises(DatabaseError, match=r"another table store\.take") as refused:
+        con.execute(change)
+    before = path.read_bytes()
+    with pytest.raises(DatabaseError, match=message) as refused:
         migration.upgrade(path)
     assert refused.value.hint == "ingest the traces into a new file"
-    with duckdb.connect(str(path), read_only=True) as con:
-        assert recorded_revision(con) == revision
+    assert path.read_bytes() == before
 
 
 def older(path: Path) -> dict[int, str]:
@@ -157,15 +165,19 @@ def older(path: Path) -> dict[int, str]:
         con.execute("DELETE FROM store.run WHERE run_id > 2")
         con.execute(
             "INSERT INTO store.run (run_id, name, created_at, msgflow_version, derivation_hash) "
-            "SELECT 2 + n, 'run ' || n, now(), '', '' FROM range(1, 4) AS _(n)"
+            "SELECT 2 + n, 'run ' || n, now(), '', '' FROM range(1, 6) AS _(n)"
         )
         con.execute(
             "INSERT INTO store.clock (clock_id, run_id, offset_ns, drift_ppb, reference_ns, method)"
             " VALUES (91, 2, 0, 0, 0, 'none'), (92, 3, 0, 0, 0, 'file'),"
-            " (93, 4, 0, 0, 0, 'packets'), (94, 5, 0, 0, 0, 'none')"
+            " (93, 4, 0, 0, 0, 'packets'), (94, 5, 0, 0, 0, 'messages'),"
+            " (95, 6, 0, 0, 0, 'none'), (96, 7, 0, 0, 0, 'none')"
         )
-        con.execute("INSERT INTO store.finding (run_id, name) VALUES (5, 'clock_not_synchronised')")
-    return {1: "none", 2: "none", 3: "file", 4: "messages", 5: "messages"}
+        con.execute(
+            "INSERT INTO store.finding (run_id, name) "
+            "VALUES (2, 'empty_trace'), (6, 'clock_not_synchronised'), (7, 'clock_uneven')"
+        )
+    return {1: "none", 2: "none", 3: "file", **dict.fromkeys((4, 5, 6, 7), "messages")}
 
 
 def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> None:
@@ -197,15 +209,18 @@ def test_an_older_file_keeps_its_runs(small_database: Path, tmp_path: Path) -> N
     assert dict(found) == synchronised
 
 
-def test_a_failing_migration_leaves_the_file_as_it_was(small_database: Path) -> None:
-    """It adds a column that is there already."""
-    with duckdb.connect(str(small_database)) as con:
-        con.execute("UPDATE store.alembic_version SET version_num = '0001'")
-    with pytest.raises(duckdb.CatalogException, match="clock_sync"):
+def test_a_failing_view_leaves_the_tables_of_an_older_file(
+    small_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    older(small_database)
+    before = rows_by_count(small_database)
+    monkeypatch.setattr(objects, "create_statement", lambda _: "CREATE VIEW main.broken AS FROM no")
+    with pytest.raises(duckdb.CatalogException, match="no"):
         migration.upgrade(small_database)
     with duckdb.connect(str(small_database), read_only=True) as con:
         assert recorded_revision(con) == "0001"
-        assert con.execute("SELECT count(*) FROM main.run").fetchall() == [(2,)]
+        assert "clock_sync" not in tables_of(con)["run"]
+    assert rows_by_count(small_database) == before
 
 
 def test_other_tables_without_another_revision_are_refused(database: Path) -> None:
