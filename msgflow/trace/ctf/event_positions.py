@@ -75,7 +75,7 @@ def find_positions(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) 
     if layout.size_table is not None:
         lanes = split(layout, memory, spans)
         if lanes.begins.size >= FEWEST_LANES:
-            return _SideBySide(layout, memory, spans, lanes).run()
+            return SideBySide(layout, memory, spans, lanes).run()
     found = []
     for span in spans:
         events, following = _find_alone(layout, memory, span, span.begin, span.end)
@@ -216,7 +216,7 @@ def _without_cut_event(
     return found
 
 
-class _SideBySide:
+class SideBySide:
     """Lanes that take one step at a time together.
 
     An event whose size is not in the table stops its lane, and is looked at alone.
@@ -235,6 +235,7 @@ class _SideBySide:
         self._found: list[NDArray[np.int64]] = []
 
     def run(self) -> list[Found]:
+        """Return the events of each packet."""
         lanes = self._lanes
         self._walk(np.arange(lanes.begins.size), lanes.begins, lanes.ends)
         # Positions come out mixed. Sorted, those of a packet are together.

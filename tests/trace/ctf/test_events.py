@@ -20,6 +20,7 @@ from thorough import examples
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import event_positions, stream_layout
+from msgflow.trace.ctf.event_positions import Found, Lanes, SideBySide
 
 STYLES = st.builds(Style, st.booleans(), st.booleans(), st.booleans(), st.booleans())
 KINDS = {
@@ -148,23 +149,46 @@ def test_events_in_front_of_damage_are_kept(tmp_path: Path) -> None:
     assert 9_000 < len(numbers) < 9_400
 
 
-def test_large_packets_are_read_side_by_side(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Lanes, list[Found]]]:
+    """What was read side by side, and what was found in it."""
+    noted = []
+
+    class Noting(SideBySide):
+        def __init__(self, layout: Any, memory: Any, spans: Any, lanes: Lanes) -> None:
+            super().__init__(layout, memory, spans, lanes)
+            self.lanes = lanes
+
+        def run(self) -> list[Found]:
+            found = super().run()
+            noted.append((self.lanes, found))
+            return found
+
+    monkeypatch.setattr(event_positions, "SideBySide", Noting)
+    return noted
+
+
+def test_a_large_packet_is_read_side_by_side(
+    tmp_path: Path, runs: list[tuple[Lanes, list[Found]]]
 ) -> None:
-    """A lane per 4 KiB, and each begins at an event; else the comparison above means nothing."""
-    split, lanes = event_positions.split, []
-
-    def noted(*given: Any) -> Any:
-        lanes.append(split(*given))
-        return lanes[-1]
-
-    monkeypatch.setattr(event_positions, "split", noted)
+    """In a lane per 4 KiB, each from the begin of an event."""
     found = read(write_numbers(tmp_path, 20_000))
-    (only,) = lanes
-    assert only.begins.size > 100
-    sizes = set((only.begins - only.begins[0]) % (only.ends[-1] - only.begins[0])) - {0}
-    assert {int(size) % ((only.ends[-1] - only.begins[0]) // 20_000) for size in sizes} == {0}
     assert [row[-1] for row in found.rows["test:number"]] == [*range(20_000)]
+    ((lanes, (packet,)),) = runs
+    assert lanes.begins.size > 100
+    assert set(lanes.begins.tolist()) <= set(packet.positions.tolist())
+
+
+@pytest.mark.parametrize(
+    ("count", "times"), [(event_positions.FEWEST_LANES - 1, 0), (event_positions.FEWEST_LANES, 1)]
+)
+def test_many_small_packets_are_read_side_by_side(
+    tmp_path: Path, runs: list[tuple[Lanes, list[Found]]], count: int, times: int
+) -> None:
+    packets = [Packet([Event(n, "test:number", (n,))]) for n in range(count)]
+    found = read(write_trace(tmp_path / "trace", TraceContent(KINDS, {0: packets})))
+    assert [row[-1] for row in found.rows["test:number"]] == [*range(count)]
+    assert len(runs) == times
 
 
 def test_packets_without_events(tmp_path: Path) -> None:
