@@ -1,6 +1,7 @@
 """The program: `msgflow` and `python -m msgflow`."""
 
 import os
+import signal
 
 
 def main() -> None:
@@ -9,6 +10,9 @@ def main() -> None:
     Raises:
         SystemExit: always, with a code of `msgflow.errors.ExitCode`.
     """
+    # Until the handler is in place, Ctrl-C ends the process without a traceback.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     # numpy's linear algebra, which nothing uses, starts a thread per core.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from msgflow.cli.signals import HANDLER

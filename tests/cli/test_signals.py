@@ -1,4 +1,7 @@
-"""Ctrl-C and SIGTERM at any moment of the program: its exit code, one line, no traceback."""
+"""Ctrl-C and SIGTERM at any moment of the program: no traceback.
+
+Once the handler is in place, they end it with an exit code and one line; before, at once.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,8 @@ import pytest
 
 from msgflow.errors import ExitCode
 
-# Counts the calls of Python functions from the first line of the program. At a given one the
-# process sends itself a signal.
+# Counts the calls of Python functions from where the handler is in place. At a given one the process
+# sends itself a signal.
 _COUNTING = """
 import os, signal, sys
 from msgflow.__main__ import main
@@ -58,7 +61,7 @@ def python(program: str, *arguments: object) -> subprocess.CompletedProcess[str]
 
 
 @pytest.mark.parametrize("number", _ENDINGS)
-def test_at_any_moment_a_signal_ends_the_program_cleanly(
+def test_a_signal_ends_the_program_cleanly(
     small_database: Path, number: signal.Signals
 ) -> None:
     arguments = ("query", "info-runs", "--db", small_database)
@@ -70,6 +73,28 @@ def test_at_any_moment_a_signal_ends_the_program_cleanly(
         done = python(_COUNTING, int(number), 1 + calls * part // 5, *arguments)
         ended.add((done.returncode, done.stderr.removeprefix("runs: morning (1), noon (2)\n")))
     assert ended == {_ENDINGS[number]}
+
+
+# Sends a signal at each import of a part of the command line; the first is that of the handler.
+_STARTING = """
+import signal, sys
+from msgflow.__main__ import main
+
+class Importing:
+    def find_spec(name, path=None, target=None):
+        if name.startswith("msgflow.cli"):
+            signal.raise_signal(number)
+
+sys.meta_path.insert(0, Importing)
+number, sys.argv[1:] = int(sys.argv[1]), ["--version"]
+main()
+"""
+
+
+@pytest.mark.parametrize("number", _ENDINGS)
+def test_a_signal_in_front_of_the_handler(number: signal.Signals) -> None:
+    done = python(_STARTING, int(number))
+    assert (done.returncode, done.stderr) == (-number, "")
 
 
 _IMPORTING = """
@@ -165,11 +190,7 @@ def test_after_its_end_a_signal_changes_nothing(number: signal.Signals) -> None:
 @pytest.mark.parametrize("number", _ENDINGS)
 def test_what_the_caller_wants_ignored_is(number: signal.Signals) -> None:
     ignored = f"import signal; signal.signal({int(number)}, signal.SIG_IGN)\n"
-    program = (
-        "from msgflow.cli.signals import HANDLER\n"
-        f"HANDLER.run(lambda: signal.raise_signal({int(number)}))\n"
-    )
-    assert python(ignored + program).returncode == 0
+    assert python(ignored + _STARTING, int(number)).returncode == 0
 
 
 _BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from golden import fill_case
 
 from msgflow.sql.header import parse
 
@@ -41,9 +42,20 @@ def test_every_room_is_named(room: Path) -> None:
     assert any(room.name in name.split("/") for name in NAMED)
 
 
-def test_the_query_of_the_first_change_is_one(empty_database: Path) -> None:
-    (sql,) = re.findall(r"cat > queries/[\w-]+\.sql <<'END'\n(.*?)END\n", TEXT, re.DOTALL)
-    header = parse(sql, ROOT / "CONTRIBUTING.md")
-    with duckdb.connect(str(empty_database), read_only=True) as con:
-        columns = con.sql(header.body, params={"runs": [1]}).columns
-    assert columns == [column.name for column in header.columns]
+def written(path: str) -> str:
+    """What the first change writes into a file."""
+    (text,) = re.findall(rf"cat > {path} <<'END'\n(.*?)END\n", TEXT, re.DOTALL)
+    return str(text)
+
+
+def test_the_query_and_the_golden_case_of_the_first_change_work(
+    fresh_database: Path, tmp_path: Path
+) -> None:
+    header = parse(written("queries/node-timers.sql"), ROOT / "CONTRIBUTING.md")
+    case = tmp_path / "two_timers.case"
+    case.write_text(written("tests/query/cases/node-timers/two_timers.case"))
+    with duckdb.connect(str(fresh_database)) as con:
+        fill_case(con, case)
+        answer = con.sql(header.body, params={"runs": [1]})
+        assert answer.columns == [column.name for column in header.columns]
+        assert answer.fetchall() == [(1, "/talker", 2)]

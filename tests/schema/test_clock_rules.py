@@ -8,7 +8,6 @@ import duckdb
 import pytest
 
 STRETCH_NS = 500_000_000
-# What a clock may drift in a stretch.
 
 
 def agreed(
