@@ -15,8 +15,8 @@ import pytest
 
 from msgflow.errors import ExitCode
 
-# Counts the calls of Python functions from where the handler is in place. At a given one the process
-# sends itself a signal.
+# Counts the calls of Python functions from where the handler is in place. At a given one the
+# process sends itself a signal.
 _COUNTING = """
 import os, signal, sys
 from msgflow.__main__ import main
@@ -61,9 +61,7 @@ def python(program: str, *arguments: object) -> subprocess.CompletedProcess[str]
 
 
 @pytest.mark.parametrize("number", _ENDINGS)
-def test_a_signal_ends_the_program_cleanly(
-    small_database: Path, number: signal.Signals
-) -> None:
+def test_a_signal_ends_the_program_cleanly(small_database: Path, number: signal.Signals) -> None:
     arguments = ("query", "info-runs", "--db", small_database)
     whole = python(_COUNTING, int(number), 0, *arguments)
     assert whole.returncode == 0

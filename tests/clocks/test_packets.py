@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import duckdb
 import pytest
+from ingested import rows
 from kernel_traces import TCP, UDP, Header
 from network import SECOND, Network, traffic
 
@@ -46,11 +46,6 @@ def ingest(tmp_path: Path) -> Ingest:
         return database
 
     return into_new
-
-
-def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
-    with duckdb.connect(str(database), read_only=True) as connection:
-        return connection.execute(sql).fetchall()
 
 
 def beta(database: Path) -> dict[str, Any]:

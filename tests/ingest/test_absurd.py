@@ -6,9 +6,9 @@ import os
 import shutil
 import struct
 from pathlib import Path
-from typing import Any
 
 import pytest
+from ingested import rows
 from mutations import packet_begins, streams
 from thorough import few
 
@@ -32,11 +32,6 @@ def findings(database: Path) -> dict[str, tuple[str, int, str]]:
         for name in ("info-findings", "e2e-latency", "data-quality", "info-runs"):
             opened.query(name)
     return {row["name"]: (row["severity"], row["count"], row["detail"]) for row in rows.to_pylist()}
-
-
-def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
-    with open_db(database) as opened:
-        return [tuple(row.values()) for row in opened.sql(sql).to_arrow().to_pylist()]
 
 
 def replace(root: Path, before: bytes, after: bytes) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pytest
+from reading_threads import reading_threads
 
 from msgflow.errors import UsageError
 from msgflow.ingest import ingest
@@ -56,10 +56,6 @@ def test_what_can_be_stays_as_it_is() -> None:
         found = ImplausibleValues()
         assert found.without("some", batch) is batch
         assert list(found.rows()) == []
-
-
-def reading_threads() -> int:
-    return sum(thread.name == "msgflow-reader" for thread in threading.enumerate())
 
 
 def test_an_error_of_the_thread_that_reads_comes_through(trace: Path, new_database: Path) -> None:

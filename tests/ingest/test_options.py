@@ -5,10 +5,10 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import duckdb
 import pytest
+from ingested import rows
 
 from msgflow.ingest import IngestProgress, ingest
 from msgflow.ingest.hostnames import hostnames_of
@@ -34,11 +34,6 @@ EVENTS = [
     ("ros2:from_the_future", (2,)),
     ("my_app:started", (1,)),
 ]
-
-
-def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
-    with duckdb.connect(str(database), read_only=True) as connection:
-        return connection.execute(sql).fetchall()
 
 
 @pytest.mark.parametrize(

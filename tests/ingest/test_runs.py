@@ -10,18 +10,13 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import contents
+from ingested import contents, rows
 
 from msgflow.db.tables import STORE
 from msgflow.errors import ExitCode, UsageError
 from msgflow.ingest import ingest
 
 RUNS = "SELECT run_id, name FROM run ORDER BY run_id"
-
-
-def rows(database: Path, sql: str) -> list[tuple[Any, ...]]:
-    with duckdb.connect(str(database), read_only=True) as connection:
-        return connection.execute(sql).fetchall()
 
 
 def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from each import each
-from ingested import contents, ingest_one
+from ingested import contents, ingest_one, rows
 from thorough import few
 
 from msgflow import Database
@@ -46,11 +46,6 @@ def write(path: Path, text: str) -> Path:
     file = path.parent / "links.yaml"
     file.write_text(text)
     return file
-
-
-def rows(path: Path, sql: str) -> list[tuple[Any, ...]]:
-    with Database(path) as database:
-        return database.connection.execute(sql).fetchall()
 
 
 def test_links_are_derived_anew(database: Path) -> None:

@@ -11,9 +11,7 @@ from msgflow.run.window import WHOLE, Window, format_epoch
 
 START = 1_700_000_000_000_000_000
 FIRST = Run(1, "morning", START)
-SECOND = Run(2, "noon", START + 1)
-NUMBERED = Run(3, "1", START + 2)
-RUNS = (FIRST, SECOND, NUMBERED)
+RUNS = (FIRST, Run(2, "noon", START), Run(3, "evening", START))
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,12 @@ from msgflow.ingest import ingest
 _SECONDS_TO_MAKE = 300
 
 
+def rows(path: Path, sql: str) -> list[tuple[Any, ...]]:
+    """Return the rows of a query on a database that is not open."""
+    with duckdb.connect(str(path), read_only=True) as connection:
+        return connection.execute(sql).fetchall()
+
+
 @dataclass(frozen=True)
 class Ingested:
     """A database with one run, open for reading."""

@@ -10,14 +10,11 @@ from typing import Any
 
 import pytest
 from ctf_writer import Event, Packet, TraceContent, write_trace
+from reading_threads import reading_threads
 
 import msgflow.trace
 from msgflow.trace.ctf import batches, event_order
 from msgflow.trace.prefetch import Prefetch
-
-
-def reading_threads() -> int:
-    return sum(thread.name == "msgflow-reader" for thread in threading.enumerate())
 
 
 def test_all_items_in_order() -> None:
