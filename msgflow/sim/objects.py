@@ -1,6 +1,6 @@
 """Objects of running processes: publishers, subscriptions, timers, buffers, and messages.
 
-They refer to each other; what happens to them lies above: `transport`, `publish`, `take`,
+They refer to each other; what happens to them lies above: `transport`, `publication`, `take`,
 `callbacks`.
 """
 

@@ -32,7 +32,7 @@ class Middleware:
         """Begin without any objects.
 
         Args:
-            scheduler: where it is.
+            scheduler: plans arrivals, and has the truth.
             overwrites: a full queue drops its oldest message.
             expected: subscriptions that there will be, by topic.
         """

@@ -155,11 +155,9 @@ def _concurrent() -> Node:
     slow = Work(4 * MILLISECOND, 9 * MILLISECOND)
     return Node(
         "concurrent",
-        groups=(Group("any_time", is_reentrant=True),),
+        groups=(Group(_GROUP, is_reentrant=True),),
         publishers=(Publisher(topic),),
-        subscriptions=tuple(
-            Subscription(each, work=slow, group="any_time") for each in _INPUTS[:2]
-        ),
+        subscriptions=tuple(Subscription(each, work=slow, group=_GROUP) for each in _INPUTS[:2]),
         timers=(Timer(10 * MILLISECOND, (topic,), Work(2 * MILLISECOND)),),
         links=(MessageLink("periodic_async", _INPUTS[:2], (topic,)),),
     )
@@ -201,7 +199,7 @@ def _sink(nodes: tuple[Node, ...]) -> Process:
 
 
 def _sync(name: str, inputs: tuple[str, ...], *, is_late: bool) -> Node:
-    topics = (f"/{name}/0", f"/{name}/1")
+    topics = _outputs(name, 2)
     slow = Work(5 * MILLISECOND, 6 * MILLISECOND)
     return Node(
         name,

@@ -81,34 +81,14 @@ def _perception() -> tuple[Process, ...]:
             ),
         ),
     )
-    ground_filter = Node(
-        "ground_filter",
-        "/perception",
-        publishers=(Publisher("/perception/obstacles", 5),),
-        subscriptions=(
-            Subscription(
-                "/lidar/points",
-                ("/perception/obstacles",),
-                Work(18 * MILLISECOND, 9 * MILLISECOND),
-                depth=5,
-                message_type="sensor_msgs::msg::PointCloud2",
-            ),
-        ),
-    )
-    tracker = Node(
-        "tracker",
-        "/perception",
-        publishers=(Publisher("/perception/objects"),),
-        subscriptions=(
-            Subscription(
-                "/perception/detections",
-                ("/perception/objects",),
-                Work(2 * MILLISECOND, 2 * MILLISECOND),
-                message_type="vision_msgs::msg::Detection3DArray",
-                logs=True,
-            ),
-        ),
-    )
+    ground_filter = _relay(
+        "ground_filter", "/lidar/points", "/perception/obstacles",
+        Work(18 * MILLISECOND, 9 * MILLISECOND), "sensor_msgs::msg::PointCloud2", depths=(5, 5),
+    )  # fmt: skip
+    tracker = _relay(
+        "tracker", "/perception/detections", "/perception/objects",
+        Work(2 * MILLISECOND, 2 * MILLISECOND), "vision_msgs::msg::Detection3DArray", logs=True,
+    )  # fmt: skip
     return (
         Process("detector", _COMPUTER, 812, (detector,), start_ns=6 * MILLISECOND),
         Process("ground_filter", _COMPUTER, 843, (ground_filter,), start_ns=11 * MILLISECOND),
@@ -137,20 +117,10 @@ def _control() -> tuple[Process, ...]:
             ),
         ),
     )
-    estimator = Node(
-        "state_estimator",
-        "/localization",
-        publishers=(Publisher("/localization/odometry"),),
-        subscriptions=(
-            Subscription(
-                "/imu/data",
-                ("/localization/odometry",),
-                Work(250 * MICROSECOND, 150 * MICROSECOND),
-                depth=50,
-                message_type="sensor_msgs::msg::Imu",
-            ),
-        ),
-    )
+    estimator = _relay(
+        "state_estimator", "/imu/data", "/localization/odometry",
+        Work(250 * MICROSECOND, 150 * MICROSECOND), "sensor_msgs::msg::Imu", depths=(50, 10),
+    )  # fmt: skip
     controller = Node(
         "controller",
         "/control",
@@ -180,3 +150,16 @@ def _control() -> tuple[Process, ...]:
             start_ns=24 * MILLISECOND,
         ),
     )
+
+
+def _relay(
+    name: str, heard: str, said: str, work: Work, message_type: str,
+    *, depths: tuple[int, int] = (10, 10), logs: bool = False,
+) -> Node:  # fmt: skip
+    """Return a node that answers each message with one, in the namespace of what it publishes."""
+    subscription = Subscription(
+        heard, (said,), work, depth=depths[0], message_type=message_type, logs=logs
+    )
+    publishers = (Publisher(said, depths[1]),)
+    namespace = said.rpartition("/")[0]
+    return Node(name, namespace, publishers=publishers, subscriptions=(subscription,))
