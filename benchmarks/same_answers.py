@@ -5,9 +5,9 @@
 
 Each checkout ingests the same traces into a new database: those that `msgflow simulate NAME` of
 BEFORE writes, with the options given there, and the recorded ones in ../shared/traces where that
-folder exists. Then every public view, every table macro of whole runs or of a few messages, and
-every named query are read in both, findings, and the rules that are broken. AFTER is this checkout
-when left out.
+folder exists. Then both give every public view, every table macro of whole runs or of a few
+messages, every named query, the findings and the broken rules. AFTER is this checkout when left
+out.
 
 Prints a line for each difference: what it is of, and rows that only one of them has. Rows of views
 are compared in any order, those of queries in theirs. What the versions say of themselves does not
