@@ -730,8 +730,9 @@ class Database:
         from msgflow.db.finding import read_findings
 
         connection = self.connection
-        runs = self._ask(lambda: Slice(run).runs(connection))
-        return self._ask(lambda: read_findings(connection, [one.run_id for one in runs]))
+        return self._ask(
+            lambda: read_findings(connection, [one.run_id for one in Slice(run).runs(connection)])
+        )
 
     def export_parquet(
         self,

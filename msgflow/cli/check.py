@@ -47,13 +47,13 @@ def command(
     """
     from msgflow.database import Database
     from msgflow.query.clock_notes import clock_verdicts
+    from msgflow.run.choice import choose_runs
 
     with Database(database, memory_limit=memory_limit) as opened:
         findings = opened.findings(run=run)
-        runs = opened.query("clocks", run=run).runs if opened.runs() else ()
+        runs = choose_runs(opened.runs(), run)
         verdicts = clock_verdicts(opened.connection, runs, only_several=True)
-        names = {known.run_id: known.title for known in opened.runs()}
-    labels = names if run == "all" and len(names) > 1 else {}
+    labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     report(findings, form, output, run_labels=labels, notes=verdicts, of="recording")
 
 
@@ -66,14 +66,14 @@ def report(
     notes: Sequence[str] = (),
     of: str,
 ) -> None:
-    """Print findings and how many they are, and end with exit code 1 on errors.
+    """Print findings and their numbers, and end with exit code 1 on errors.
 
     Args:
         findings: errors first, those of one kind together.
         form: what to write; chosen by the suffix of `output`, else numbered text, when None.
         output: file to write; stdout when None.
         run_labels: what to call each run; empty: runs are not named.
-        notes: lines to print before how many they are.
+        notes: lines to print before the numbers of errors and warnings.
         of: what they are about: 'recording' or 'database'.
     """
     import pyarrow as pa

@@ -51,10 +51,11 @@ def apply(
                     f"by {messages:,} messages and {packets:,} network packets:"
                     " msgflow clocks pairs"
                 )
-            findings = opened.query("info-findings", run=one.run_id).to_arrow().to_pylist()
-            for finding in findings:
-                if finding["name"].startswith("clock_"):
-                    print_note(f"{finding['name']}: {finding['detail']}")
+            findings = opened.query(
+                "info-findings", run=one.run_id, where="starts_with(name, 'clock_')"
+            )
+            for finding in findings.to_arrow().to_pylist():
+                print_note(f"{finding['name']}: {finding['detail']}")
 
 
 @app.command("show")

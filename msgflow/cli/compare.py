@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inspect import Parameter, Signature
+from inspect import Parameter
 from keyword import iskeyword
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +20,7 @@ from msgflow.cli.options import (
     OutputOption,
     WideOption,
 )
+from msgflow.cli.slice_options import set_parameters
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
@@ -57,20 +58,18 @@ def fail_on_option(side: str) -> Any:
     )
 
 
-def only_different_option(subject: str, **more: Any) -> Any:
+def only_different_option(subject: str) -> Any:
     """Return the option for the rows of a comparison: one for each subject, or all."""
     return typer.Option(
         "--only-different/--all",
         help=f"One row for each {subject}: those that differ, or all",
         show_default="on a terminal those that differ; else every statistic",
-        **more,
+        rich_help_panel=OUTPUT,
     )
 
 
 _FailOnOption = Annotated[list[str] | None, fail_on_option("run")]
-_OnlyDifferentOption = Annotated[
-    bool | None, only_different_option("path, callback or topic", rich_help_panel=OUTPUT)
-]
+_OnlyDifferentOption = Annotated[bool | None, only_different_option("path, callback or topic")]
 
 
 def command(
@@ -128,32 +127,28 @@ def print_comparison(
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _signature() -> Signature:
-    """Return the signature of the command: parameters of the statement, then its own options."""
+def _parameters() -> list[Parameter]:
+    """Return the parameters of the command: those of the statement, then its own options."""
     positional, keyword = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
     declared = (p for p in internal_sql().header("comparison").params if p.name not in _COMMON)
-    return Signature(
-        [
-            Parameter("run_a", positional, annotation=_RunA),
-            Parameter("run_b", positional, annotation=_RunB),
-            *(header_parameter(param) for param in declared),
-            *(
-                Parameter(name, keyword, default=default, annotation=annotation)
-                for name, annotation, default in (
-                    ("internal", InternalOption, False),
-                    ("fail_on", _FailOnOption, None),
-                    ("only_different", _OnlyDifferentOption, None),
-                    ("form", FormatOption, None),
-                    ("wide", WideOption, False),
-                    ("output", OutputOption, None),
-                    ("memory_limit", MemoryLimitOption, None),
-                    ("database", DatabaseOption, DEFAULT_DATABASE),
-                )
-            ),
-        ]
-    )
+    return [
+        Parameter("run_a", positional, annotation=_RunA),
+        Parameter("run_b", positional, annotation=_RunB),
+        *(header_parameter(param) for param in declared),
+        *(
+            Parameter(name, keyword, default=default, annotation=annotation)
+            for name, annotation, default in (
+                ("internal", InternalOption, False),
+                ("fail_on", _FailOnOption, None),
+                ("only_different", _OnlyDifferentOption, None),
+                ("form", FormatOption, None),
+                ("wide", WideOption, False),
+                ("output", OutputOption, None),
+                ("memory_limit", MemoryLimitOption, None),
+                ("database", DatabaseOption, DEFAULT_DATABASE),
+            )
+        ),
+    ]
 
 
-_SIGNATURE = _signature()
-command.__signature__ = _SIGNATURE  # type: ignore[attr-defined]
-command.__annotations__ = {name: each.annotation for name, each in _SIGNATURE.parameters.items()}
+set_parameters(command, _parameters())

@@ -169,7 +169,6 @@ def open_(
         output_option(
             help="New database file; one that exists is not replaced",
             show_default="RUN.duckdb",
-            rich_help_panel=None,
         ),
     ] = None,
 ) -> None:

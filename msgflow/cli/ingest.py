@@ -142,7 +142,8 @@ def _print_report(report: IngestReport, database: Path) -> None:
     for name, group in groupby(notable, key=lambda finding: finding.name):
         places = list(group)
         for finding in places[:PLACES_SHOWN]:
-            is_whole = finding.trace_id is not None or finding.subject == f"the {finding.phase}"
+            # The view calls it so where there is neither a trace nor a place.
+            is_whole = finding.subject == f"the {finding.phase}"
             place = "" if is_whole else f"{finding.subject} — "
             print_note(f"{name} ({finding.count}): {place}{finding.detail}")
         if len(places) > PLACES_SHOWN:

@@ -35,10 +35,11 @@ def apply(
                 f" {count(one.link_count, 'indirect link')} between messages"
                 f"{traced if one.traced_link_count else ''}"
             )
-            findings = opened.query("info-findings", run=one.run.run_id).to_arrow().to_pylist()
-            for finding in findings:
-                if finding["name"] == "contradictory_annotations":
-                    print_note(f"{finding['name']} ({finding['count']}): {finding['detail']}")
+            findings = opened.query(
+                "info-findings", run=one.run.run_id, where="name = 'contradictory_annotations'"
+            )
+            for finding in findings.to_arrow().to_pylist():
+                print_note(f"{finding['name']} ({finding['count']}): {finding['detail']}")
 
 
 @app.command("suggest")

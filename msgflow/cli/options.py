@@ -1,6 +1,6 @@
-"""Options that mean the same on every command that has them.
+"""Options of several commands, and their types.
 
-A command whose help words one of them differently makes it with the function of that option.
+A function makes an option whose help differs from command to command.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from msgflow.query.times import Times
 
 SELECTION = "Which part of the data"
 OUTPUT = "Output"
-
-
 _HELP = ("--help", "-h")
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(?:([kKMGT]?)B)?")
 _UNITS = {"": 1, "K": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
@@ -92,7 +90,8 @@ def output_option(
         metavar=metavar,
         parser=path_of,
         help=help,
-        **({"rich_help_panel": OUTPUT} | more),
+        rich_help_panel=OUTPUT,
+        **more,
     )
 
 

@@ -25,14 +25,14 @@ class QueryGroup(TyperGroup):
         return list(query_names())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the title of a query; an unknown name is a UsageError with a suggestion."""
+        """Return the command of a query without options; an unknown name is a UsageError."""
         header = load_query(cmd_name, _view_names)
         return TyperCommand(header.name, short_help=header.title)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command with the options of the query, and the words behind it."""
-        name, title, rest = super().resolve_command(ctx, args)
-        return name, title and build_command(load_query(str(name))), rest
+        name, found, rest = super().resolve_command(ctx, args)
+        return name, found and build_command(load_query(str(name))), rest
 
 
 app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from inspect import Parameter, Signature
+from inspect import Parameter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -22,7 +22,7 @@ from msgflow.cli.options import (
 )
 from msgflow.cli.row_options import row_options
 from msgflow.cli.show.layout import MOST_ROWS
-from msgflow.cli.slice_options import SLICE_OPTIONS
+from msgflow.cli.slice_options import SLICE_OPTIONS, set_parameters
 from msgflow.default_files import DEFAULT_DATABASE
 from msgflow.errors import UsageError
 from msgflow.query.selection import KINDS
@@ -119,8 +119,7 @@ def build_command(header: Header) -> Any:
         parameters.append(
             Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
         )
-    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    set_parameters(command, parameters)
     single = typer.Typer(
         add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
     )

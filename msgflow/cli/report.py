@@ -14,7 +14,6 @@ from msgflow.cli.options import (
     LakePageOption,
     LakeWhereOption,
     MemoryLimitOption,
-    RunOption,
     bytes_of,
     output_option,
 )
@@ -28,10 +27,10 @@ from msgflow.run.slice import LATEST, Slice
 _MOST = 1_000_000_000
 
 
-@with_slice("start", "end")
+@with_slice("run", "start", "end")
 def command(
     output: Annotated[Path, output_option("FILE.html")] = Path("msgflow.html"),
-    run: RunOption = None,
+    part: Slice = LATEST,
     compare: Annotated[
         str | None,
         typer.Option(
@@ -41,7 +40,6 @@ def command(
             rich_help_panel=SELECTION,
         ),
     ] = None,
-    part: Slice = LATEST,
     path: Annotated[
         str | None,
         typer.Option(
@@ -76,7 +74,7 @@ def command(
         raise UsageError(f"a report is a page: its name ends with .html — {output}", "-o FILE.html")
     size = read_size(max_size)
     if lake is not None:
-        if part.has_window or not run is compare is path is None:
+        if part != LATEST or not compare is path is None:
             raise UsageError(
                 "the page of a lake is of all its runs", "--where chooses some of them"
             )
@@ -92,7 +90,7 @@ def command(
     with Database(database, memory_limit=memory_limit) as opened:
         report = opened.report(
             output,
-            run=run,
+            run=part.run,
             compare=compare,
             start=part.start,
             end=part.end,

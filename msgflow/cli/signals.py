@@ -52,7 +52,7 @@ class SignalHandler:
         except KeyboardInterrupt as error:
             from msgflow.cli.output import print_error
 
-            code = exit_code(error)
+            code = _exit_code(error)
             print_error(code.name.lower())
             raise SystemExit(int(code)) from None
         finally:
@@ -68,7 +68,7 @@ class SignalHandler:
             # Its C++ code would abort the process at an exception. Nothing has begun yet.
             signal.raise_signal(number)
         error = (Terminated if number == signal.SIGTERM else KeyboardInterrupt)()
-        self.came = exit_code(error)
+        self.came = _exit_code(error)
         raise error
 
 
@@ -79,7 +79,7 @@ def restore_default_actions() -> None:
             signal.signal(number, signal.SIG_DFL)
 
 
-def exit_code(error: KeyboardInterrupt) -> ExitCode:
+def _exit_code(error: KeyboardInterrupt) -> ExitCode:
     """Return the exit code of a command that a signal ended."""
     return ExitCode.TERMINATED if isinstance(error, Terminated) else ExitCode.INTERRUPTED
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from typing import Annotated, Any, get_type_hints
 
 import typer
@@ -61,10 +61,9 @@ def with_slice(*names: str, **changed: Any) -> Callable[[Command], Command]:
     options = {name: SLICE_OPTIONS[name] for name in names or SLICE_OPTIONS} | changed
 
     def decorate(command: Command) -> Command:
-        own = signature(command)
         hints = get_type_hints(command, include_extras=True)
         parameters: list[Parameter] = []
-        for parameter in own.parameters.values():
+        for parameter in signature(command).parameters.values():
             if parameter.name != "part":
                 parameters.append(parameter.replace(annotation=hints[parameter.name]))
                 continue
@@ -83,8 +82,13 @@ def with_slice(*names: str, **changed: Any) -> Callable[[Command], Command]:
             part = Slice(**{name: given.pop(name) for name in options})
             command(part=part, **given)
 
-        sliced.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-        sliced.__annotations__ = {each.name: each.annotation for each in parameters}
+        set_parameters(sliced, parameters)
         return sliced
 
     return decorate
+
+
+def set_parameters(command: Command, parameters: Sequence[Parameter]) -> None:
+    """Give a command the parameters from which Typer makes its arguments and options."""
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {each.name: each.annotation for each in parameters}

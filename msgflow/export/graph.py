@@ -11,7 +11,6 @@ from msgflow.export.formats import by_suffix
 from msgflow.export.graph_vertices import GraphVertices
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
-from msgflow.run.slice import LATEST, Slice
 from msgflow.text.json_value import json_value
 from msgflow.text.values import printable
 
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import duckdb
+
+    from msgflow.run.slice import Slice
 
 
 class GraphFormat(StrEnum):
@@ -110,7 +111,7 @@ class Graph(GraphVertices):
 
 
 def read_graph(
-    connection: duckdb.DuckDBPyConnection, part: Slice = LATEST, *, internal: bool = False
+    connection: duckdb.DuckDBPyConnection, part: Slice, *, internal: bool = False
 ) -> Graph:
     """Return the graph of a run.
 

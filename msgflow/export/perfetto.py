@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.run.choice import Run
+    from msgflow.run.slice import Slice
     from msgflow.run.window import Window
 
 _AT_ONCE = 20_000
@@ -57,9 +57,7 @@ class PerfettoTrace:
     gaps: int
 
 
-def write_perfetto(
-    connection: duckdb.DuckDBPyConnection, path: Path, part: Slice = LATEST
-) -> PerfettoTrace:
+def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:
     """Write a run as a Perfetto trace, event by event: memory never holds all of it.
 
     Args:

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.result import QueryResult
-from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.header import Column
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
+
+    from msgflow.run.slice import Slice
 
 # No program shows more columns.
 MOST_COLUMNS = 1_000
@@ -39,9 +40,7 @@ _STATEMENTS = {
 }
 
 
-def read_series(
-    connection: duckdb.DuckDBPyConnection, what: What, part: Slice = LATEST
-) -> QueryResult:
+def read_series(connection: duckdb.DuckDBPyConnection, what: What, part: Slice) -> QueryResult:
     """Return a row per moment (`at_ns`) with a column per thing that was measured [ns].
 
     Args:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
-from msgflow.name_suggestions import nearest
+from msgflow.name_suggestions import meant_or, nearest
 from msgflow.query.compare import STATISTICS, Failure, failures
 from msgflow.query.result import QueryResult
 from msgflow.query.selection import CUT_COLUMN
@@ -148,10 +148,11 @@ def compared(
 def _require_label(choice: Choice, key: str | None) -> None:
     if key is None or key in choice.labels:
         return
-    near = nearest(key, choice.labels)
-    meant = f"did you mean {' or '.join(near)}? " if near else ""
     have = f"the labels are {', '.join(choice.labels)}" if choice.labels else "there are no labels"
-    raise UsageError(f"no run of the lake has such a label — {key}", f"{meant}{have}")
+    raise UsageError(
+        f"no run of the lake has such a label — {key}",
+        meant_or(nearest(key, choice.labels), have, "?"),
+    )
 
 
 def _sides(

@@ -22,7 +22,7 @@ from msgflow.fleet.answers import answers
 from msgflow.fleet.compact import PACK
 from msgflow.fleet.lake import visible
 from msgflow.fleet.layout import RUN, VIEWS, part_path
-from msgflow.name_suggestions import nearest
+from msgflow.name_suggestions import meant_or, nearest
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier
 from msgflow.version import __version__
@@ -133,10 +133,9 @@ def _fitting(
 
 def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> str:
     """Return a hint: the labels and columns of runs, similar names first."""
-    near = nearest(name, [*labels, *columns])
-    meant = f"did you mean {' or '.join(near)}? " if near else ""
     have = f"its labels are {', '.join(labels)}" if labels else "its runs have no labels"
-    return f"{meant}{have}; columns of run are {', '.join(columns)}"
+    near = nearest(name, [*labels, *columns])
+    return meant_or(near, f"{have}; columns of run are {', '.join(columns)}", "?")
 
 
 class Reading:

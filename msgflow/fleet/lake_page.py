@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import pyarrow.compute as pc
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
@@ -93,10 +91,10 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
                 meta={"command": f"{command} --group-by {shlex.quote(column)}"},
             ),
         )
-    result = fleet_query(lake, _FINDINGS, where=where)
-    wrong = result.table.filter(pc.not_equal(result.table["severity"], "info"))
+    wrong = {"where": "severity <> 'info'"}
+    result = fleet_query(lake, _FINDINGS, where=where, selection=wrong)
     command = f"msgflow fleet query {_FINDINGS} {option}"
-    parts.add("page_finding?", _encoded(replace(result, table=wrong), command))
+    parts.add("page_finding?", _encoded(result, command))
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shlex.quote(lake.store.url)}"
     parts.add("page_failure?", encode(_with_time(failures), meta={"command": failed}))

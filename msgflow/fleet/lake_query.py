@@ -30,8 +30,8 @@ from msgflow.fleet.layout import VIEWS
 from msgflow.name_suggestions import did_you_mean
 from msgflow.query.catalogue import query_names
 from msgflow.query.result import QueryResult
-from msgflow.query.runner import bind, without_counts
-from msgflow.query.selection import CUT_COLUMN, INTERNAL_COLUMN, make_selection, selected
+from msgflow.query.runner import bind, shown_rows
+from msgflow.query.selection import make_selection, selected
 from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, relations_of
 from msgflow.sql.interrupt import interruptible
@@ -111,7 +111,8 @@ def fleet_query(
         group_by: labels, or columns of the table `run`. The result has one row for each of their
             values, and the values in its first columns.
         internal: show the rows of ROS's own topics and services too.
-        selection: node, topic, callback, host, via, without, sort and limit of `Database.query`.
+        selection: node, topic, callback, host, via, without, where, sort and limit of
+            `Database.query`.
         parameters: the query's own.
 
     Raises:
@@ -133,18 +134,15 @@ def fleet_query(
             return con.sql(sql, params=own | bindings).to_arrow_table()
 
         table = _asked(lake, name, con, ask)
-    table, total, hidden, cut = without_counts(table)
-    if not internal and INTERNAL_COLUMN in table.column_names:
-        table = table.drop_columns([INTERNAL_COLUMN])
+    table, missing, _ = shown_rows(
+        table,
+        internal=internal,
+        on_hidden=lambda count: f"internal rows are hidden ({count:,}); --internal shows them",
+    )
     notes = []
     if len(choice.runs) < choice.total:
         notes.append(f"{len(choice.runs):,} of {choice.total:,} runs")
-    if table.num_rows < total:
-        notes.append(f"{table.num_rows:,} of {total:,} rows")
-    if hidden:
-        notes.append(f"internal rows are hidden ({hidden:,}); --internal shows them")
-    if cut:
-        notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
+    notes += missing
     is_each_alone = len(choice.runs) == 1 or "run" in group_by
     if _BUCKETS in header.relations and not is_each_alone:
         notes.append("medians and other quantiles of several runs are off by less than 1 %")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
+
+from msgflow.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -312,9 +313,9 @@ def _place(node: Node) -> str:
 
 def _known(what: str, wanted: Text, names: Iterable[str]) -> str:
     known = sorted(set(names))
-    close = difflib.get_close_matches(wanted.value, known, n=1)
-    meant = f"did you mean {close[0]}; " if close else ""
-    return f"{meant}the {what} are {_some(known)}" if known else f"there are no {what}"
+    if not known:
+        return f"there are no {what}"
+    return meant_or(nearest(wanted.value, known)[:1], f"the {what} are {_some(known)}")
 
 
 def _some(names: Iterable[str]) -> str:

@@ -70,7 +70,6 @@ def query_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in resource_directory("queries").glob("*.sql")))
 
 
-@cache
 def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Header:
     """Return the query called `name`.
 
@@ -83,6 +82,11 @@ def load_query(name: str, views: Callable[[], Collection[str]] = tuple) -> Heade
     """
     if name not in query_names():
         raise UsageError(f"there is no such query — {name}", _meant(name, views))
+    return _header(name)
+
+
+@cache
+def _header(name: str) -> Header:
     return read(resource_directory("queries") / f"{name}.sql")
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return notes on the limits of times between hosts, a sentence each.
+    """Return notes on how far times of several hosts can be compared, a sentence each.
 
     A run with several clocks that are not synchronised: their number; clocks that are corrected to
     the same one count as one. A corrected clock: its largest error.

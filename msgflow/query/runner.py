@@ -30,7 +30,7 @@ from msgflow.sql.value import described_type, parse_text
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
@@ -110,21 +110,13 @@ def run_query(
             raise UsageError(
                 f"--where cannot be evaluated: {first_line(error)}", _columns_hint(header, error)
             ) from error
-    table, total, hidden, cut = without_counts(table)
-    if not internal and INTERNAL_COLUMN in table.column_names:
-        table = table.drop_columns([INTERNAL_COLUMN])
+    table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
     notes = [] if runs else ["the database holds no run yet"]
     if part.has_window:
         notes += _beside(connection, runs, window)
-    if table.num_rows < total:
-        notes.append(f"{table.num_rows:,} of {total:,} rows")
-    if hidden:
-        rows = "1 internal row is" if hidden == 1 else f"{hidden} internal rows are"
-        notes.append(f"{rows} hidden; --internal shows them")
-    if cut:
-        notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
+    notes += missing
     narrowing = _narrowing(own, selection)
-    if runs and not total and not hidden and narrowing:
+    if runs and not has_rows and narrowing:
         notes.append(f"nothing fits {' '.join(narrowing)}: try with less")
     if header.note == "clocks" and table.num_rows:
         notes += clock_notes(connection, runs)
@@ -251,9 +243,32 @@ def _parameters(header: Header) -> str:
     return f"its parameters are {', '.join(param.name for param in header.params)}"
 
 
-def without_counts(table: pa.Table) -> tuple[pa.Table, int, int, int]:
-    """Return the rows themselves, and the numbers of all rows, hidden rows and cut rows."""
+def shown_rows(
+    table: pa.Table, *, internal: bool, on_hidden: Callable[[int], str]
+) -> tuple[pa.Table, list[str], bool]:
+    """Return the rows to show, notes on those that are missing, and whether there are any at all.
+
+    Args:
+        table: rows of the SQL that `selected` returns.
+        internal: whether ROS's own rows are shown too.
+        on_hidden: returns the note on so many hidden rows.
+    """
     total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
     if table[PLACE][0].as_py() is None:
         table = table.slice(0, 0)
-    return table.drop_columns([*COUNTS, PLACE]), total, hidden, cut
+    table = table.drop_columns([*COUNTS, PLACE])
+    if not internal and INTERNAL_COLUMN in table.column_names:
+        table = table.drop_columns([INTERNAL_COLUMN])
+    notes = []
+    if table.num_rows < total:
+        notes.append(f"{table.num_rows:,} of {total:,} rows")
+    if hidden:
+        notes.append(on_hidden(hidden))
+    if cut:
+        notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
+    return table, notes, bool(total or hidden)
+
+
+def _on_hidden(count: int) -> str:
+    rows = "1 internal row is" if count == 1 else f"{count} internal rows are"
+    return f"{rows} hidden; --internal shows them"

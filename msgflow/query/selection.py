@@ -72,7 +72,7 @@ def selected(header: Header, selection: Selection, internal: bool) -> tuple[str,
     names = [column.name for column in header.columns]
     conditions, bindings = conditions_of(header, selection)
     if selection.where is not None:
-        # The line break ends a comment at its end.
+        # The line break ends a comment in the condition.
         conditions.append(f"(\n{selection.where}\n)")
     is_hidden = f"coalesce({INTERNAL_COLUMN}, false)" if INTERNAL_COLUMN in names else "false"
     if internal:

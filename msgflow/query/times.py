@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import pyarrow as pa
 
@@ -53,7 +53,7 @@ def converted(
         unit = units.get(name)
         suffix = ""
         if unit == "epoch ns":
-            column, suffix = _moment(column, times, lambda: _starts(table, runs))
+            column, suffix = _moment(column, times, table, runs)
         elif unit == "ns":
             column, suffix = _seconds(column), "_s"
         renamed = name.removesuffix(_NS) + suffix if name.endswith(_NS) and suffix else name
@@ -64,14 +64,14 @@ def converted(
     return pyarrow.table(columns, names=names)
 
 
-def _moment(column: Any, times: Times, starts: Callable[[], Any]) -> tuple[Any, str]:
+def _moment(column: Any, times: Times, table: pa.Table, runs: Sequence[Run]) -> tuple[Any, str]:
     import pyarrow
     from pyarrow import compute
 
     if times is Times.SECONDS:
         return _seconds(column), "_s"
     if times is Times.RELATIVE:
-        return _seconds(compute.subtract(column, starts())), "_s"
+        return _seconds(compute.subtract(column, _starts(table, runs))), "_s"
     stamps = column.cast(pyarrow.timestamp("ns"))
     return compute.strftime(stamps, format="%Y-%m-%dT%H:%M:%SZ"), "_utc"
 

@@ -84,8 +84,8 @@ def skipped_to(seconds: float, runs: Sequence[Run]) -> int:
     Raises:
         UsageError: there is not one run, or the time is out of range.
     """
-    # Some floats are too large for an integer of 64 bits.
     start_ns = _run_start(runs, "--skip-first")
+    # Some floats are too large for an integer of 64 bits.
     if not 0 <= seconds <= MAXIMUM_NS / 1_000_000_000:
         raise UsageError(
             f"--skip-first takes the seconds to leave out — {seconds}", "--skip-first 2.5"

@@ -84,13 +84,11 @@ def query_errors(what: str, message: str) -> Iterator[None]:
     """
     try:
         yield
-    except duckdb.OutOfMemoryException as error:
-        if is_of_the_file(error):
-            raise
-        raise out_of_memory(what) from error
     except duckdb.Error as error:
         if is_of_the_file(error):
             raise
+        if isinstance(error, duckdb.OutOfMemoryException):
+            raise out_of_memory(what) from error
         raise QueryError(message.format(first_line(error))) from error
 
 

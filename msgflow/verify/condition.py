@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from enum import StrEnum
 
-from msgflow.name_suggestions import nearest
+from msgflow.name_suggestions import meant_or, nearest
 from msgflow.text.values import format_duration
 
 OPERATORS = ("<", "<=", ">", ">=")
@@ -150,10 +150,9 @@ def _statistic(given: str | None, statistics: tuple[str, ...], metric: str, exam
     if given is not None and given not in statistics:
         if not statistics:
             raise ConditionError(f"{metric} is one value, it has no {given}", example)
-        near = nearest(given, statistics)
-        meant = f"did you mean {near[0]}; " if near else ""
         raise ConditionError(
-            f"{metric} has no such statistic — {given}", f"{meant}it has {', '.join(statistics)}"
+            f"{metric} has no such statistic — {given}",
+            meant_or(nearest(given, statistics)[:1], f"it has {', '.join(statistics)}"),
         )
     return given or ""
 
@@ -164,10 +163,9 @@ def _value(number: str, unit: str, dimension: Dimension, metric: str) -> float:
         known = [name for of in UNITS.values() for name in of if name]
         fitting = [name for name in units if name.lower() == unit.lower()]
         near = fitting or [name for name in nearest(unit, known) if name in units]
-        meant = f"did you mean {near[0]}; " if near else ""
         what = "no unit" if not unit else f"no such unit for {metric} — {unit}"
         raise ConditionError(
             f"{metric} has {what}" if not unit else f"there is {what}",
-            f"{meant}{metric} is {_NAMES[dimension]}",
+            meant_or(near[:1], f"{metric} is {_NAMES[dimension]}"),
         )
     return float(number) * units[unit]

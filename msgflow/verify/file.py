@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from msgflow.name_suggestions import nearest
+from msgflow.name_suggestions import meant_or, nearest
 from msgflow.verify.condition import Condition, ConditionError, parse_condition
 from msgflow.verify.metrics import PATH, SUBJECTS
 from msgflow.yaml_file import Text, YamlFile, is_null, line_of
@@ -137,10 +137,11 @@ def _kind(file: YamlFile, node: Any) -> str:
     # A timer may be chosen by its callback, and so on: the first key of SUBJECTS is the kind.
     found = [kind for kind in SUBJECTS if kind in names]
     if not found:
-        near = next((near[0] for name in names if (near := nearest(str(name), (*SUBJECTS,)))), None)
-        meant = f"did you mean {near}; " if near else ""
+        near = [kind for name in names for kind in nearest(str(name), (*SUBJECTS,))]
         file.fail(
-            line_of(node), "a target does not say what it is of", f"{meant}it has one of {kinds}"
+            line_of(node),
+            "a target does not say what it is of",
+            meant_or(near[:1], f"it has one of {kinds}"),
         )
     allowed = set(SUBJECTS[found[0]].filters)
     for other in found[1:]:
@@ -157,9 +158,8 @@ def _kind(file: YamlFile, node: Any) -> str:
 def _refuse_unknown(file: YamlFile, key: Any, kind: str, known: tuple[str, ...]) -> None:
     name = str(key.value) if key.id == "scalar" else "…"
     if name not in known:
-        near = nearest(name, known)
-        meant = f"did you mean {near[0]}; " if near else ""
-        file.fail(line_of(key), f"a {kind} has no {name}", f"{meant}it has {', '.join(known)}")
+        hint = meant_or(nearest(name, known)[:1], f"it has {', '.join(known)}")
+        file.fail(line_of(key), f"a {kind} has no {name}", hint)
 
 
 def _path_name(file: YamlFile, node: Any) -> Text | None:

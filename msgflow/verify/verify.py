@@ -14,7 +14,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.result import QueryResult
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
-from msgflow.run.slice import LATEST, Slice
+from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.verify.condition import format_value
 from msgflow.verify.metrics import PATH, SUBJECTS
@@ -111,7 +111,7 @@ class Verification:
 def verify(
     connection: duckdb.DuckDBPyConnection,
     targets: TargetsFile,
-    part: Slice = LATEST,
+    part: Slice,
     *,
     paths: Mapping[str, Mapping[str, Sequence[str]]] | None = None,
 ) -> Verification:
@@ -129,9 +129,10 @@ def verify(
         QueryError: the database could not run a query.
     """
     one = part.one_run(connection, "a verification")
+    part = replace(part, run=one.run_id)
     window = part.window([one])
     _require_names(connection, targets, one)
-    work = _Work(connection, one, window, paths or {})
+    work = _Work(connection, part, window, paths or {})
     rows = [row for target in targets.targets for row in work.rows(target)]
     # Failures come first; otherwise the order of the file stays.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
@@ -153,13 +154,13 @@ class _Work:
     def __init__(
         self,
         connection: duckdb.DuckDBPyConnection,
-        run: Run,
+        part: Slice,
         window: Window,
         paths: Mapping[str, Mapping[str, Sequence[str]]],
     ) -> None:
         self._connection = connection
         self._paths = paths
-        self._run = run
+        self._part = part
         self._window = window
         self.notes: dict[str, None] = {}
 
@@ -220,7 +221,7 @@ class _Work:
         is_named = " OR ".join(f"{column} = $wanted_{field}" for column in columns)
         is_meant = " OR ".join(f"{column} GLOB $wanted_{field}" for column in columns)
         if any(column.name == "is_internal" for column in header.columns):
-            # A pattern does not mean what ROS does for itself: only its name does.
+            # A pattern leaves out what ROS does for itself; an exact name does not.
             is_meant = f"({is_meant}) AND NOT is_internal"
         return f"({is_named} OR ({is_meant}))"
 
@@ -246,9 +247,7 @@ class _Work:
             own |= {word: ",".join(places[word]) for word in ("from", "to") if word in places}
         elif target.kind == PATH:
             own |= {"from": target.topics[0].value, "to": target.topics[-1].value}
-        part = Slice(self._run.run_id)
-        if header.has_window:
-            part = replace(part, start=self._window.start_ns, end=self._window.end_ns)
+        part = self._part if header.has_window else Slice(self._part.run)
         result = run_query(self._connection, around, own, part, internal=True)
         self.notes.update(dict.fromkeys(result.notes))
         rows: list[dict[str, Any]] = result.to_arrow().to_pylist()

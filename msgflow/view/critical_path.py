@@ -50,7 +50,7 @@ def critical_path(
         "detail": "full",
     }
     header = load_query("critical-path")
-    result = run_query(connection, header, asked, Slice(str(run.run_id)))
+    result = run_query(connection, header, asked, Slice(run.run_id))
     options = " ".join(
         f"--{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in asked.items()
     )

@@ -24,7 +24,6 @@ DIRECTORY = Path(__file__).parent / "sql"
 _PAGES = Statements(DIRECTORY)
 
 page_query = _PAGES.header
-statement = _PAGES.text
 
 
 def run_page_query(

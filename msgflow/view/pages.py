@@ -194,7 +194,7 @@ class Pages:
             raise UsageError(f"pages do not show such a query — {name}")
         header = load_query(name)
         extent = self.extent(connection, params)
-        part = Slice(str(extent.run.run_id))
+        part = Slice(extent.run.run_id)
         if header.has_window and self._window != WHOLE:
             part = replace(part, start=self._window.start_ns, end=self._window.end_ns)
         result = run_query(connection, header, {}, part, internal=bool(params.get("internal")))
@@ -301,11 +301,6 @@ class Pages:
         is_cut = table.num_rows > MOST_LINKS
         return encode(table.slice(0, MOST_LINKS), meta={"is_cut": is_cut}, units=_units("links"))
 
-    def _edge(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
-        extent = self.extent(connection, params)
-        values = extent.frame(self.window(extent, params))
-        return encode(run_page_query(connection, "edge", values), units=_units("edge"))
-
     def _flow(self, connection: duckdb.DuckDBPyConnection, params: Params) -> bytes:
         extent = self.extent(connection, params)
         values: Params = {
@@ -348,11 +343,10 @@ ANSWERS: dict[str, Callable[[Pages, duckdb.DuckDBPyConnection, Params], bytes]] 
     "compare": Pages._compare,
     "segments": Pages._segments,
     "links": Pages._links,
-    "edge": Pages._edge,
     "flow": Pages._flow,
     "critical": Pages._critical,
 }
-"""The method that gives an answer of more than one page query, by the name of the answer."""
+"""Methods of the answers that are no plain page query, by name."""
 
 _PLAIN = ("row", "gap", "path", "executor_share", "executor_node", "neighbour")
 _OF_PATH = ("path_histogram", "path_share", "path_point", "path_slowest")

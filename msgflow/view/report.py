@@ -15,7 +15,7 @@ from pyarrow import compute
 
 from msgflow.atomic import replacing
 from msgflow.errors import UsageError
-from msgflow.run.slice import LATEST, Slice
+from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, Pages
@@ -60,7 +60,7 @@ class Report:
 def write_report(
     connection: duckdb.DuckDBPyConnection,
     path: Path,
-    part: Slice = LATEST,
+    part: Slice,
     *,
     compare: str | int | None = None,
     through: str | None = None,
@@ -84,9 +84,9 @@ def write_report(
     """
     one = part.one_run(connection, "a report")
     window = part.window([one])
-    maker = _Maker(connection, str(one.run_id), window, through, max_size, progress)
+    maker = _Maker(connection, one.run_id, window, through, max_size, progress)
     try:
-        content, notes = maker.make(None if compare is None else str(compare))
+        content, notes = maker.make(compare)
     finally:
         maker.pages.close()
     written = content.encode()
@@ -104,7 +104,7 @@ class _Maker:
     def __init__(
         self,
         connection: duckdb.DuckDBPyConnection,
-        run: str,
+        run: int,
         window: Window,
         through: str | None,
         max_size: int,
@@ -128,7 +128,7 @@ class _Maker:
         known = "&".join(sorted(f"{key}={value}" for key, value in params.items()))
         self.parts.add(f"{name}?{known}", self.answer(name, **params))
 
-    def make(self, compare: str | None) -> tuple[str, list[str]]:
+    def make(self, compare: str | int | None) -> tuple[str, list[str]]:
         extent = self.extent
         begin = max(extent.origin_ns, self.window.start_ns)
         end = min(extent.origin_ns + extent.length_ns + 1, self.window.end_ns)
@@ -144,7 +144,8 @@ class _Maker:
                 " (--start, --end)."
             )
         self.progress("tables")
-        self.runs(compare)
+        other = None if compare is None else self.other(compare)
+        self.runs(other)
         self.keep("finding")
         for name in NAMED:
             self.keep("query", name=name)
@@ -152,21 +153,23 @@ class _Maker:
             self.keep(name)
         self.progress("paths")
         chosen = self.paths()
-        if compare is not None:
+        if other is not None:
             self.progress("comparison")
-            self.compared(compare, chosen)
+            self.compared(other, chosen)
         self.progress("timeline")
         head = self.timeline(Window(begin, end), chosen)
         return single_page(self.parts, head), self.notes
 
-    def runs(self, compare: str | None) -> None:
+    def other(self, compare: str | int) -> Run:
+        """Return the run to compare with."""
+        other = Slice(compare).one_run(self.connection, "the other side")
+        if other.run_id == self.extent.run.run_id:
+            raise UsageError("a run is not compared with itself", "give another --compare")
+        return other
+
+    def runs(self, other: Run | None) -> None:
         table = run_page_query(self.connection, "run", {})
-        wanted = [self.extent.run.run_id]
-        if compare is not None:
-            other = Slice(compare).one_run(self.connection, "the other side")
-            if other.run_id == self.extent.run.run_id:
-                raise UsageError("a run is not compared with itself", "give another --compare")
-            wanted.insert(0, other.run_id)
+        wanted = [*([] if other is None else [other.run_id]), self.extent.run.run_id]
         rows = table.filter(compute.is_in(table["run_id"], pa.array(wanted)))
         order = sorted(
             range(rows.num_rows), key=lambda row: wanted.index(rows["run_id"][row].as_py())
@@ -222,11 +225,10 @@ class _Maker:
             content = self.answer("critical", kind="take", id=take, **{"from": topic})
             self.parts.add(f"critical?id={take}&kind=take", content)
 
-    def compared(self, compare: str, chosen: list[int]) -> None:
-        other = Slice(compare).one_run(self.connection, "the other side")
+    def compared(self, other: Run, chosen: list[int]) -> None:
         for what in ("paths", "callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
-        params = {"run": str(other.run_id)}
+        params = {"run": other.run_id}
         extent = self.pages.extent(self.connection, params)
         for name in ("path", "row"):
             self.parts.add(

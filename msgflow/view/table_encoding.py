@@ -16,6 +16,8 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import compute
 
+from msgflow.trace.numpy_arrow import is_valid, to_numpy
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -57,31 +59,16 @@ def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
             if max(abs(limits["min"] - origin), abs(limits["max"] - origin)) > LARGEST_EXACT:
                 shifted = compute.subtract(column, origin) if origin else column
                 return _text(compute.cast(shifted, pa.string()))
-        return _integers(_values(column, pa.int64()) - origin, _nulls(column))
+        return _integers(to_numpy(column).astype(np.int64) - origin, ~is_valid(column))
     if pa.types.is_boolean(kind):
-        return _integers(_values(column, pa.int64()), _nulls(column), "boolean")
+        return _integers(to_numpy(column).astype(np.int64), ~is_valid(column), "boolean")
     if pa.types.is_floating(kind):
-        values = _values(column, pa.float64())
-        if column.null_count:
-            values = np.where(_nulls(column), np.nan, values)
-        return {"type": "double"}, np.ascontiguousarray(values, dtype="<f8").tobytes()
+        values = np.where(is_valid(column), to_numpy(column), np.nan).astype("<f8")
+        return {"type": "double"}, values.tobytes()
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         return _text(column)
     texts = json.dumps(column.to_pylist(), ensure_ascii=False, default=str)
     return {"type": "json"}, texts.encode()
-
-
-# Arrow's to_numpy imports pandas if that is installed, and so does an array made of Python values:
-# 30 MB, and half a second.
-def _values(column: pa.Array, kind: pa.DataType) -> np.ndarray[Any, Any]:
-    """Return the values as `kind`; a NULL becomes any value."""
-    column = compute.cast(column, kind)
-    values = np.frombuffer(column.buffers()[1] or b"", dtype=kind.to_pandas_dtype())
-    return values[column.offset : column.offset + len(column)]
-
-
-def _nulls(column: pa.Array) -> np.ndarray[Any, Any]:
-    return _values(column.is_null(), pa.uint8()).astype(np.bool_)
 
 
 def _integers(
@@ -108,6 +95,6 @@ def _text(column: pa.Array) -> tuple[dict[str, Any], bytes]:
     encoded = column.dictionary_encode()
     words = json.dumps(encoded.dictionary.to_pylist(), ensure_ascii=False).encode()
     # 0 means NULL.
-    codes = np.where(_nulls(column), 0, _values(encoded.indices, pa.int64()) + 1)
+    codes = np.where(is_valid(encoded.indices), to_numpy(encoded.indices).astype(np.int64) + 1, 0)
     head, body = _integers(codes, np.zeros(len(codes), np.bool_))
     return {"type": "text", "width": head["width"], "words": len(words)}, words + body

@@ -130,6 +130,20 @@ def test_findings_of_several_runs_say_which(msgflow: Msgflow, database: Path) ->
     assert "   run other (2): everything — nothing was published" in every
 
 
+def test_runs_of_a_label_are_several_runs(msgflow: Msgflow, database: Path) -> None:
+    labels = {"labels": "['site=berlin']"}
+    add(database, "run", *({"run_id": n, "name": f"other {n}"} | labels for n in ("2", "3")))
+    text = msgflow("check", "--run", "site=berlin", "--db", database).stdout
+    assert "   run other 2 (2): everything — nothing was published" in text
+    assert "   run other 3 (3): everything — nothing was published" in text
+
+
+def test_a_database_without_runs(msgflow: Msgflow, fresh_database: Path) -> None:
+    result = msgflow("check", "--db", fresh_database)
+    assert result.exit_code == 0
+    assert result.stderr == "nothing is wrong with the recording\n"
+
+
 def test_broken_rules_of_the_database_are_shown_alike(
     msgflow: Msgflow, fresh_database: Path
 ) -> None:

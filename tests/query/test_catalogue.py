@@ -4,7 +4,7 @@ import pytest
 
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
-from msgflow.name_suggestions import nearest
+from msgflow.name_suggestions import meant_or, nearest
 from msgflow.query.catalogue import QUERIES_BY_WORD, load_queries, load_query, query_names
 
 
@@ -12,6 +12,10 @@ def test_the_catalogue_is_the_folder() -> None:
     assert "info-topics" in query_names()
     assert [header.name for header in load_queries()] == list(query_names())
     assert load_query("info-topics").title == "Topics"
+
+
+def test_a_file_is_parsed_once() -> None:
+    assert load_query("info-topics") is load_query("info-topics", public_names)
 
 
 def test_an_unknown_query_is_refused_with_similar_ones() -> None:
@@ -33,6 +37,12 @@ def test_nearest_finds_slips_and_parts() -> None:
     assert nearest("duration", known)[0] == "callback-duration"
     assert nearest("", known) == []
     assert nearest("foo", ("roots", "reached")) == []
+
+
+def test_what_may_be_meant_comes_before_what_there_is() -> None:
+    assert meant_or(["flows"], "it has a and b") == "did you mean flows; it has a and b"
+    assert meant_or(["a", "b"], "there is c", "?") == "did you mean a or b? there is c"
+    assert meant_or([], "it has a and b") == "it has a and b"
 
 
 @pytest.mark.parametrize(

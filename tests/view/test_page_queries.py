@@ -12,10 +12,12 @@ import duckdb
 import pytest
 from tables import decoded
 
-from msgflow.view.page_query import DIRECTORY, page_query, run_page_query, statement
+from msgflow.sql.statement import Statements
+from msgflow.view.page_query import DIRECTORY, page_query, run_page_query
 from msgflow.view.pages import LEVEL_BINS, Pages
 
-NAMES = sorted(path.stem for path in DIRECTORY.glob("*.sql"))
+PAGES = Statements(DIRECTORY)
+NAMES = PAGES.names()
 OVER_SCRATCH = {"level", "path_histogram", "path_point", "path_share", "path_slowest"}
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 
@@ -33,7 +35,7 @@ def test_headers_say_what_a_page_query_has(name: str, demo: Path, read: Read) ->
     if header.kind == "inline" or name in OVER_SCRATCH:
         return
     connection = read(demo)
-    named = connection.extract_statements(statement(name))[0].named_parameters
+    named = connection.extract_statements(PAGES.text(name))[0].named_parameters
     assert named == {param.name for param in header.params}
     given = (
         dict.fromkeys(named, 1) | {"kind": "take"} if "kind" in named else dict.fromkeys(named, 1)
@@ -258,7 +260,7 @@ def test_arrows_of_a_window_do_not_take_memory_for_what_is_far_from_it(
     window = pages.window(extent, {"start": middle, "end": middle + extent.length_ns // 100})
     known = extent.frame(window) | {"limit": 10**6}
     known |= run_page_query(connection, "window_ids", known).to_pylist()[0]
-    sql = statement("links")
+    sql = PAGES.text("links")
     named = connection.extract_statements(sql)[0].named_parameters
     rows = connection.execute(
         f"EXPLAIN (ANALYZE, FORMAT json) {sql}", {name: known[name] for name in named}

@@ -218,10 +218,10 @@ def test_what_nobody_waits_for_ends(
 
     from msgflow.view import pages
 
-    monkeypatch.setitem(pages.ANSWERS, "edge", long)
+    monkeypatch.setitem(pages.ANSWERS, "flow", long)
     with socket.create_connection(("127.0.0.1", server.port)) as reader:
         reader.sendall(
-            f"GET /api/edge HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+            f"GET /api/flow HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
             f"Cookie: msgflow_{server.port}={server.token}\r\n\r\n".encode()
         )
         time.sleep(0.5)

@@ -64,3 +64,15 @@ def test_pandas_is_not_imported_where_it_is_installed() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("False\n", "")
+
+
+def test_a_slice_is_encoded_as_its_own_rows_are() -> None:
+    columns = (
+        [True, None, False, True],
+        [1, 2, None, 4],
+        [0.5, None, 1.5, 2.5],
+        ["a", None, "b", ""],
+    )
+    table = pa.table({str(place): column for place, column in enumerate(columns)})
+    part = table.slice(1, 2)
+    assert decoded(encode(part)).rows == part.to_pylist()

@@ -8,11 +8,11 @@
 -- param: origin_ns BIGINT  What times count from, epoch ns
 -- param: start_ns BIGINT  Begin of the window, epoch ns
 -- param: end_ns BIGINT  Its end, epoch ns, exclusive
--- param: first_take BIGINT  Least identity of a take in the window, see window_ids.sql
--- param: last_take BIGINT  Greatest
--- param: first_publication BIGINT  Least identity of a publication in the window
--- param: last_publication BIGINT  Greatest
--- param: last_instance BIGINT  Greatest identity of a callback instance in the window
+-- param: first_take BIGINT  As in window_ids.sql
+-- param: last_take BIGINT  As in window_ids.sql
+-- param: first_publication BIGINT  As in window_ids.sql
+-- param: last_publication BIGINT  As in window_ids.sql
+-- param: last_instance BIGINT  As in window_ids.sql
 -- param: limit BIGINT = 50000  Most links
 -- column: link_kind UTINYINT  0 transport, 1 direct, 2 periodic_async, 3 partial_sync,
 --     4 take_adjacent

@@ -34,7 +34,7 @@ class SourceError extends Error {
   }
 }
 
-// The data of pages that a server sent: answers of the server, the latest 60 of them kept.
+// The answers of a server. It keeps the latest 60.
 class ServedSource {
   constructor() {
     this.isServed = true;
