@@ -11,12 +11,12 @@
 -- severity: warning
 WITH unended AS (
     SELECT callback_instance_id, callback_id, process_id, thread_id, start_ns
-    FROM store.callback_instance
+    FROM main.callback_instance
     WHERE end_ns IS NULL AND NOT is_loss_affected
 ),
 near AS (
     SELECT thread_id, callback_id, start_ns
-    FROM store.callback_instance
+    FROM main.callback_instance
     WHERE thread_id IN (SELECT thread_id FROM unended)
 ),
 last AS (
@@ -31,7 +31,7 @@ open AS (
 cut AS (
     SELECT i.callback_instance_id
     FROM open AS i
-    ASOF JOIN store.thread_break AS b ON i.thread_id = b.thread_id AND i.start_ns < b.resumed_ns
+    ASOF JOIN main.thread_break AS b ON i.thread_id = b.thread_id AND i.start_ns < b.resumed_ns
     ASOF LEFT JOIN near AS n
         ON i.thread_id = n.thread_id AND i.callback_id = n.callback_id AND i.start_ns < n.start_ns
     WHERE coalesce(b.resumed_ns <= n.start_ns, n.start_ns IS NULL)
