@@ -14,7 +14,7 @@ WITH step AS (
     FROM derive.stamp_shift
 )
 SELECT
-    h.run_id,
+    s.run_id,
     h.hostname AS subject,
     count(*) AS count,
     printf(
@@ -26,4 +26,4 @@ JOIN main.host AS h ON s.host_id = h.host_id
 -- A clock that is slewed moves by 5 ms in ten seconds (adjtime: 500 ppm); the rest is for stamps of
 -- threads that had to wait for the CPU.
 WHERE abs(s.step_ns) > 100_000_000
-GROUP BY h.run_id, h.host_id, h.hostname
+GROUP BY s.run_id, h.host_id, h.hostname

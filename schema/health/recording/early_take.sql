@@ -8,19 +8,23 @@
 -- grain: one row per run
 -- severity: info
 SELECT
-    l.run_id,
+    run_id,
     count(*) AS count,
     printf(
         'messages that were received up to %.3f ms before the call of publish() returned, on the '
         || 'same clock: latency counts from the last event of the call, and is negative for them',
-        -min(l.latency_ns) / 1e6
+        -min(latency_ns) / 1e6
     ) AS detail
-FROM main.link_transport AS l
-JOIN main.publication AS b ON l.publication_id = b.publication_id
-JOIN main.process AS bp ON b.process_id = bp.process_id
-JOIN main.host AS bh ON bp.host_id = bh.host_id
-JOIN main.take AS t ON l.take_id = t.take_id
-JOIN main.process AS tp ON t.process_id = tp.process_id
-JOIN main.host AS th ON tp.host_id = th.host_id
-WHERE l.latency_ns < 0 AND bh.clock_id = th.clock_id
-GROUP BY l.run_id
+FROM (
+    SELECT
+        l.run_id,
+        derive.corrected_ns(t.taken_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
+        - derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latency_ns
+    FROM store.link_transport AS l
+    JOIN store.publication AS b ON l.publication_id = b.publication_id
+    JOIN store.take AS t ON l.take_id = t.take_id
+    JOIN derive.process_clock AS c ON b.process_id = c.process_id
+    JOIN derive.process_clock AS o ON t.process_id = o.process_id AND c.clock_id = o.clock_id
+)
+WHERE latency_ns < 0
+GROUP BY run_id

@@ -10,6 +10,7 @@
 --     ingest both.
 -- grain: one row per process
 -- severity: warning
+-- when: store.gap
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,

@@ -9,25 +9,32 @@
 --     exceptions.
 -- grain: one row per process
 -- severity: warning
-WITH run AS (
-    SELECT
-        *,
-        max(start_ns) OVER (PARTITION BY thread_id) AS last_start_ns,
-        lead(start_ns) OVER (PARTITION BY thread_id, callback_id ORDER BY start_ns)
-            AS next_start_ns
+WITH unended AS (
+    SELECT callback_instance_id, callback_id, process_id, thread_id, start_ns
     FROM main.callback_instance
+    WHERE end_ns IS NULL AND NOT is_loss_affected
+),
+near AS (
+    SELECT thread_id, callback_id, start_ns
+    FROM main.callback_instance
+    WHERE thread_id IN (SELECT thread_id FROM unended)
+),
+last AS (
+    SELECT thread_id, max(start_ns) AS start_ns FROM near GROUP BY thread_id
 ),
 open AS (
-    SELECT *
-    FROM run
-    WHERE end_ns IS NULL AND NOT is_loss_affected AND start_ns < last_start_ns
+    SELECT u.*
+    FROM unended AS u
+    JOIN last AS l ON u.thread_id = l.thread_id AND u.start_ns < l.start_ns
 ),
 -- Others may have run inside before the gap came that has the end.
 cut AS (
     SELECT i.callback_instance_id
     FROM open AS i
     ASOF JOIN main.thread_break AS b ON i.thread_id = b.thread_id AND i.start_ns < b.resumed_ns
-    WHERE coalesce(b.resumed_ns <= i.next_start_ns, i.next_start_ns IS NULL)
+    ASOF LEFT JOIN near AS n
+        ON i.thread_id = n.thread_id AND i.callback_id = n.callback_id AND i.start_ns < n.start_ns
+    WHERE coalesce(b.resumed_ns <= n.start_ns, n.start_ns IS NULL)
 )
 SELECT
     p.run_id,

@@ -7,6 +7,7 @@
 --     trace_ends_early and message_without_stamp say what can be done.
 -- grain: one row per trace, for messages with a stamp and without
 -- severity: warning
+-- when: store.orphan_take
 SELECT
     run_id,
     trace_id,
@@ -16,11 +17,11 @@ SELECT
     || string_agg(printf('%s (%d)', topic_name, number), ', ' ORDER BY topic_name) AS detail
 FROM (
     SELECT
-        t.run_id, t.trace_id, coalesce(s.topic_name, '?') AS topic_name,
+        o.run_id, t.trace_id, coalesce(s.topic_name, '?') AS topic_name,
         t.source_timestamp_ns IS NULL AS has_no_stamp, count(*) AS number
-    FROM store.take AS t
-    LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
-    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
+    FROM store.orphan_take AS o
+    JOIN store.take AS t ON o.take_id = t.take_id
+    LEFT JOIN store.subscription AS s ON o.subscription_id = s.subscription_id
     GROUP BY ALL
 )
 GROUP BY run_id, trace_id, has_no_stamp

@@ -7,17 +7,17 @@
 WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,
-        coalesce(m.event_id, d.event_id) AS end_event_id,
-        coalesce(d.trace_index, m.trace_index) AS trace_index,
-        coalesce(d.thread_index, m.thread_index) AS thread_index,
-        coalesce(m.message, d.buffer) AS message,
+        m.event_id AS end_event_id,
+        m.trace_index,
+        m.thread_index,
+        m.message,
         m.taken,
         m.ts_ns AS rmw_ns,
         m.rmw_subscription_handle AS rmw_handle,
         nullif(m.source_timestamp, 0) AS stamp
-    FROM staging.call('dds_read') AS d
-    FULL JOIN staging.call('ros2_rmw_take') AS m
-        ON d.event_id = m.previous_event_id AND d.buffer = m.message
+    FROM staging.call('ros2_rmw_take') AS m
+    LEFT JOIN raw.dds_read AS d
+        ON m.previous_event_id = d.event_id AND m.message = d.buffer
 ),
 rcl AS (
     SELECT
@@ -29,9 +29,7 @@ rcl AS (
         m.taken, m.rmw_ns, r.ts_ns AS rcl_ns, m.rmw_handle, m.stamp
     FROM middleware AS m
     FULL JOIN staging.call('ros2_rcl_take') AS r
-        ON m.end_event_id = r.previous_event_id
-        AND m.message = r.message
-        AND m.rmw_ns IS NOT NULL
+        ON m.end_event_id = r.previous_event_id AND m.message = r.message
 ),
 rclcpp AS (
     SELECT
@@ -43,9 +41,7 @@ rclcpp AS (
         r.taken, r.rmw_ns, r.rcl_ns, r.rmw_handle, r.stamp
     FROM rcl AS r
     FULL JOIN staging.call('ros2_rclcpp_take') AS u
-        ON r.end_event_id = u.previous_event_id
-        AND r.message = u.message
-        AND coalesce(r.rcl_ns, r.rmw_ns) IS NOT NULL
+        ON r.end_event_id = u.previous_event_id AND r.message = u.message
 ),
 chain AS (
     SELECT
@@ -73,13 +69,16 @@ located AS (
         AND h.start_event_id < c.until_event_id
     WHERE h.taken IS DISTINCT FROM 0
 ),
+rcl_reader AS (
+    SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL
+),
 known_reader AS (
     SELECT process_id, rmw_handle FROM staging.subscription_known
     UNION
-    SELECT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL
+    SELECT process_id, rmw_handle FROM rcl_reader
 ),
 rcl_traced AS (
-    SELECT DISTINCT process_id FROM located WHERE rcl_ns IS NOT NULL
+    SELECT DISTINCT process_id FROM rcl_reader
 )
 SELECT
     t.start_event_id,

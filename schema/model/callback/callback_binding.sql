@@ -8,7 +8,7 @@ WITH begun AS NOT MATERIALIZED (
     SELECT
         start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,
         previous_event_id, previous_executor_event_id
-    FROM staging.callback_run
+    FROM staging.callback_pair
 ),
 known AS (
     SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known
@@ -16,8 +16,15 @@ known AS (
 run AS (
     SELECT
         b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
-        b.is_intra_process, b.previous_event_id, b.previous_executor_event_id,
-        b.object_event_id AS callback_event_id, k.kind, k.subscription_event_id
+        b.is_intra_process, b.object_event_id AS callback_event_id, k.kind,
+        k.subscription_event_id,
+        -- As recorded: what the executor said after the take stands, whatever else was lost. It is
+        -- NULL only where the thread had no executor event at all.
+        CASE
+            WHEN coalesce(k.kind IN ('subscription', 'unknown'), true)
+                AND coalesce(b.previous_executor_event_id < b.previous_event_id, true)
+                THEN b.previous_event_id
+        END AS take_end_event_id
     FROM staging.with_latest('begun', 'known') AS b
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
 )
@@ -32,11 +39,6 @@ SELECT
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id
 FROM run AS r
 LEFT JOIN staging.take_subscription AS t
-    ON r.previous_event_id = t.end_event_id
-    -- As recorded: what the executor said after the take stands, whatever else was lost. It is NULL
-    -- only where the thread had no executor event at all.
-    AND (r.previous_executor_event_id IS NULL OR r.previous_executor_event_id < t.end_event_id)
+    ON r.take_end_event_id = t.end_event_id
     AND r.is_intra_process = (t.method = 'ring_buffer')
-    AND r.kind IS DISTINCT FROM 'timer'
-    AND r.kind IS DISTINCT FROM 'service'
     AND coalesce(r.subscription_event_id = t.subscription_event_id, true)

@@ -4,10 +4,7 @@
 --     instances at once, all three would stay in memory beside them.
 -- grain: one row per callback instance
 WITH never_added AS (
-    SELECT process_id, callback_handle, min(callback_id) AS callback_id
-    FROM staging.callback
-    WHERE created_ns IS NULL
-    GROUP BY process_id, callback_handle
+    SELECT process_id, callback_handle, callback_id FROM staging.callback WHERE created_ns IS NULL
 ),
 -- What is sorted should be narrow.
 run AS (
@@ -15,9 +12,7 @@ run AS (
     FROM staging.callback_binding AS b
     LEFT JOIN staging.callback AS c ON b.callback_event_id = c.event_id
     LEFT JOIN never_added AS n
-        ON b.callback_event_id IS NULL
-        AND b.process_id = n.process_id
-        AND b.callback_handle = n.callback_handle
+        ON b.process_id = n.process_id AND b.callback_handle = n.callback_handle
 ),
 numbered AS (
     SELECT

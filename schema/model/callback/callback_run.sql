@@ -15,7 +15,6 @@ SELECT
     p.is_intra_process,
     p.previous_event_id,
     p.executor_event_id,
-    p.previous_executor_event_id,
     p.is_plain,
     coalesce(d.depth, 1) AS depth
 FROM staging.callback_pair AS p

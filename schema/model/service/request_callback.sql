@@ -5,7 +5,7 @@
 -- grain: one row per request that was taken and led to a callback instance
 SELECT e.event_id AS take_event_id, r.start_event_id
 FROM staging.service_event AS e
-JOIN staging.callback_run AS r ON e.event_id = r.previous_event_id
+JOIN staging.callback_pair AS r ON e.event_id = r.previous_event_id
 JOIN staging.callback_binding AS b ON r.start_event_id = b.start_event_id
 LEFT JOIN staging.callback_known AS k ON b.callback_event_id = k.event_id
 WHERE e.is_request
