@@ -168,6 +168,8 @@ def ingest(
                 set_memory_limit(con, limit)
                 limit_threads(con)
                 con.execute("SET temp_directory = ?", [str(directory)])
+                # A checkpoint would write many of the row groups that were just written again.
+                con.execute("SET max_vacuum_tasks = 0")
                 if not target.is_new:
                     attach(con, target.path)
                     if name is not None and not replace:

@@ -30,14 +30,13 @@ def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False) -> None:
     headers = objects.load("model")
     empty = staging.empty_tables(con)
     staging.narrow(con, empty)
-    dropped: set[str] = set()
+    last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):
         create(con, header, empty)
-        if not keep:
+        for name, last_use in last_uses.items():
             # A table without rows is no burden.
-            for name in _finished(headers, position) - dropped - empty:
+            if last_use == position and name not in empty:
                 con.execute(f"DROP TABLE {name}")
-                dropped.add(name)
 
 
 def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:
@@ -63,17 +62,23 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
             empty.add(header.name)
 
 
-def _finished(headers: tuple[Header, ...], position: int) -> set[str]:
-    """Return the tables, built or read, that nothing after the object at `position` needs."""
+def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:
+    """Return the position of the last object that needs a table: of each, built or read.
+
+    Tables that `store` copies, and what they need at that moment, are not in it.
+    """
     stored = {f"staging.{table.name}" for table in STORE.tables.values()}
     unfolded = {header.name: header for header in headers if header.kind != "view"}
-    later = {name for name in stored if name in unfolded}  # evaluated when they are stored
-    for header in headers[position + 1 :]:
+    last = dict.fromkeys(_raw_tables(), 0)
+    for position, header in enumerate(headers):
         if header.kind == "view":
-            later |= {header.name} | _needs(header)
-    _unfold(later, unfolded)
-    built = {header.name for header in headers[: position + 1] if header.kind == "view"}
-    return (built | _raw_tables()) - later - stored
+            last[header.name] = position
+            needs = set(_needs(header))
+            _unfold(needs, unfolded)
+            last |= dict.fromkeys(needs & last.keys(), position)
+    kept = set(stored)
+    _unfold(kept, unfolded)
+    return {name: position for name, position in last.items() if name not in kept}
 
 
 def _unfold(names: set[str], unfolded: Mapping[str, Header]) -> None:

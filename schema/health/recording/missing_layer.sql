@@ -15,6 +15,8 @@ WITH seen AS MATERIALIZED (
         EXISTS (FROM store.take WHERE run_id = $run_id AND method <> 'callback_only') AS has_takes,
         EXISTS (FROM store.callback_instance WHERE run_id = $run_id) AS has_callbacks,
         EXISTS (FROM store.executor_state WHERE run_id = $run_id) AS has_states
+    FROM store.run
+    WHERE run_id = $run_id
 )
 SELECT $run_id AS run_id, 'everything' AS subject, 1::BIGINT AS count,
     'nothing was published or taken and no callback ran, as far as traced: no answers' AS detail
