@@ -1,6 +1,7 @@
 # `make demo` shows msgflow at work, `make test` checks it. Both start on a bare machine: everything
 # is installed into .venv, except what only the distribution has: python3-venv, and for the tests
-# Babeltrace 2 to compare with and Chromium to look with. apt installs these where that is allowed.
+# Babeltrace 2 to compare with, Chromium to look with and LTTng to record real ROS 2. apt installs
+# these where that is allowed.
 
 SHELL := /bin/sh
 PYTHON ?= python3
@@ -8,6 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := .demo
 HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()' 2>/dev/null
+HAS_LTTNG := { command -v lttng-sessiond && command -v gcc && gcc -E -include lttng/tracepoint.h -xc /dev/null; } >/dev/null 2>&1
 HAS_CHROMIUM := PYTHONPATH=tests/support $(BIN)/python -c 'from browser import find_browser; exit(not find_browser())'
 
 # Shell function: apt_install PACKAGE...; fails where apt is missing or not allowed.
@@ -18,7 +20,7 @@ APT := apt_install() { \
 	$$root env DEBIAN_FRONTEND=noninteractive \
 		apt-get install -y -qq --no-install-recommends "$$@"; }
 
-.PHONY: help demo quick test test-all bench truth fuzz mutants babeltrace chromium clean
+.PHONY: help demo quick test test-all bench truth real fuzz mutants babeltrace chromium ros clean
 
 help:
 	@echo 'make demo    simulate a robot, ingest its trace, print end-to-end latency'
@@ -27,6 +29,7 @@ help:
 	@echo 'make test-all the same with thorough tests: what others show on one input, on all of them'
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth   precision and recall on systems with known truth, minutes'
+	@echo 'make real    the same on real ROS 2: nodes of rclpy, recorded with LTTng'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make mutants changes numbers and comparisons of SQL rules, and says what no test notices'
 	@echo 'make clean   remove what these made'
@@ -53,7 +56,7 @@ quick: $(VENV)/.developed
 		tests/style/test_generated.py tests/style/test_headers.py tests/style/test_sql_style.py
 
 test: SELECTED := -m 'not thorough'
-test test-all: $(VENV)/.developed babeltrace chromium
+test test-all: $(VENV)/.developed babeltrace chromium ros
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --num-workers auto
@@ -68,6 +71,9 @@ bench: $(VENV)/.installed babeltrace
 
 truth: $(VENV)/.installed
 	$(BIN)/python benchmarks/truth.py
+
+real: $(VENV)/.installed ros
+	$(BIN)/python benchmarks/real.py --python $(VENV)/ros/bin/python
 
 fuzz: $(VENV)/.installed
 	$(BIN)/python benchmarks/fuzz.py
@@ -104,6 +110,15 @@ chromium:
 		apt_install chromium-headless-shell || apt_install chromium || true; }
 	@$(HAS_CHROMIUM) \
 		|| echo "note: no chromium: the tests that look at pages are skipped" >&2
+
+# Programs to record with, and an environment with the wheels of ROS 2.
+ros: $(VENV)/.made
+	@$(HAS_LTTNG) || { $(APT); apt_install lttng-tools liblttng-ust-dev gcc libc6-dev || true; }
+	@test -e $(VENV)/ros/.installed || { $(BIN)/python -m venv --clear $(VENV)/ros \
+		&& $(VENV)/ros/bin/python -m pip install --quiet --upgrade 'pip>=25.1' \
+		&& $(VENV)/ros/bin/python -m pip install --quiet --group ros \
+		&& touch $(VENV)/ros/.installed; } \
+		|| echo "note: no rclpy: the tests with real ROS 2 are skipped" >&2
 
 clean:
 	rm -rf $(VENV) $(DEMO)

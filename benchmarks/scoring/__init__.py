@@ -8,6 +8,6 @@ what is linked and whether the trace decides it. The thinking is in the `.sql` f
 
 from __future__ import annotations
 
-from scoring.compare import Drop, Score, compare_recorded, compare_simulated
+from scoring.compare import Drop, Score, compare_real, compare_recorded, compare_simulated
 
-__all__ = ["Drop", "Score", "compare_recorded", "compare_simulated"]
+__all__ = ["Drop", "Score", "compare_real", "compare_recorded", "compare_simulated"]

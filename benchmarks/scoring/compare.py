@@ -23,6 +23,18 @@ _RECORDED_COLUMNS = """{
     flavour: 'VARCHAR', hosts: 'MAP(VARCHAR, STRUCT(hostname VARCHAR))'
 }"""
 
+_REAL_COLUMNS = """{
+    k: 'VARCHAR', clock_offset_ns: 'BIGINT', node: 'VARCHAR', kind: 'VARCHAR', name: 'VARCHAR',
+    topic: 'VARCHAR', id: 'BIGINT', n: 'BIGINT', cb: 'BIGINT', pid: 'INTEGER', tid: 'INTEGER',
+    t0: 'BIGINT', t1: 'BIGINT', causes: 'JSON'
+}"""
+
+_STEPS = {
+    "simulated": ("holes", "simulated", "found", "score"),
+    "recorded": ("recorded", "found", "score"),
+    "real": ("real", "found", "known", "score"),
+}
+
 
 @dataclass(frozen=True)
 class Score:
@@ -111,6 +123,16 @@ def compare_recorded(database: Path, truth: Path) -> list[Score]:
         return _score(connection, "recorded")
 
 
+def compare_real(database: Path, truth: Path) -> list[Score]:
+    """Compare a recording of real ROS 2 with the `truth.jsonl.gz` that its nodes wrote."""
+    with _open(database) as connection:
+        connection.execute(
+            f"CREATE TEMP VIEW real AS FROM read_json('{truth}', "
+            f"format = 'newline_delimited', columns = {_REAL_COLUMNS})"
+        )
+        return _score(connection, "real")
+
+
 def _open(database: Path) -> duckdb.DuckDBPyConnection:
     connection = duckdb.connect()
     connection.execute(f"ATTACH '{database}' AS analysed (READ_ONLY)")
@@ -130,7 +152,6 @@ def _excused(connection: duckdb.DuckDBPyConnection, excused: int) -> Score:
 
 
 def _score(connection: duckdb.DuckDBPyConnection, source: str) -> list[Score]:
-    steps = ("holes", source) if source == "simulated" else (source,)
-    for name in (*steps, "found", "score"):
+    for name in _STEPS[source]:
         connection.execute((_SQL / f"{name}.sql").read_text())
     return [Score(*row) for row in connection.execute("FROM score").fetchall()]

@@ -1,0 +1,1 @@
+"""Records real ROS 2: nodes of rclpy, which write down what they do."""

@@ -1,0 +1,251 @@
+"""One process of a system of real ROS 2 nodes, which write down what they do.
+
+    python nodes.py SYSTEM PROCESS SECONDS TRUTH
+
+Needs rclpy and no package of msgflow: another Python runs it. The rows of TRUTH are JSON, a line
+each: `callback` (what ran, with which message), `publication`, `request` and `response` (what was
+sent, and in which callback). Times are of CLOCK_MONOTONIC, around the call.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import rclpy
+from rcl_interfaces.srv import ListParameters
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from std_msgs.msg import UInt64
+
+
+class Witness(Node):
+    """A node that writes down its callbacks and what it sends.
+
+    Ids of messages and requests are unique in the system: process, then a running number.
+    """
+
+    def __init__(self, name: str, truth: Truth) -> None:
+        super().__init__(name)
+        self._truth = truth
+        self._ids = itertools.count(os.getpid() << 32)
+        self._numbers = itertools.count(1)
+        self._running = threading.local()
+        self._senders = {}
+
+    def every(self, seconds: float, work, group=None) -> None:
+        """Do some work at a period."""
+
+        def run() -> None:
+            with self._callback("timer", str(seconds), 0):
+                work()
+
+        self.create_timer(seconds, run, callback_group=group)
+
+    def on(self, topic: str, work, group=None) -> None:
+        """Do some work with each message of a topic."""
+
+        def run(message: UInt64) -> None:
+            with self._callback("sub", topic, message.data):
+                work()
+
+        self.create_subscription(UInt64, topic, run, 10, callback_group=group)
+
+    def serve(self, service: str, work) -> None:
+        """Do some work for each request, and answer."""
+
+        def run(request: ListParameters.Request, response: ListParameters.Response):
+            with self._callback("service", service, request.depth):
+                work()
+            response.result.names = [str(request.depth)]
+            return response
+
+        self.create_service(ListParameters, service, run)
+
+    def sender(self, topic: str):
+        """Return a function that publishes a message to a topic."""
+        publisher = self.create_publisher(UInt64, topic, 10)
+
+        def send() -> None:
+            message = UInt64(data=next(self._ids))
+            with self._sent("publication", topic, message.data):
+                publisher.publish(message)
+
+        return send
+
+    def caller(self, service: str, work):
+        """Return a function that sends a request, and does some work when the answer comes."""
+        client = self.create_client(ListParameters, service)
+
+        def answered(future) -> None:
+            (answer,) = future.result().result.names
+            with self._callback("client", service, int(answer)):
+                work()
+
+        def send() -> None:
+            if client.service_is_ready():
+                request = ListParameters.Request(depth=next(self._ids))
+                with self._sent("request", service, request.depth):
+                    future = client.call_async(request)
+                future.add_done_callback(answered)
+
+        return send
+
+    @contextmanager
+    def _callback(self, kind: str, name: str, message: int):
+        number = self._running.number = next(self._numbers)
+        begin = time.monotonic_ns()
+        yield
+        self._running.number = 0
+        self._write("callback", begin, kind=kind, name=name, id=message, n=number)
+
+    @contextmanager
+    def _sent(self, kind: str, topic: str, message: int):
+        begin = time.monotonic_ns()
+        yield
+        number = getattr(self._running, "number", 0)
+        self._write(kind, begin, topic=topic, id=message, cb=number)
+
+    def _write(self, what: str, begin: int, **row: object) -> None:
+        place = {
+            "node": self.get_fully_qualified_name(),
+            "pid": os.getpid(),
+            "tid": threading.get_native_id(),
+        }
+        times = {"t0": begin, "t1": time.monotonic_ns()}
+        self._truth.write({"k": what, **row, **place, **times})
+
+
+class Truth:
+    """The rows of a process: what happened."""
+
+    def __init__(self) -> None:
+        self._rows = []
+
+    def write(self, row: dict[str, object]) -> None:
+        """Add a row."""
+        self._rows.append(json.dumps(row))
+
+    def save(self, path: Path) -> None:
+        """Write all rows, a line each."""
+        path.write_text("".join(f"{row}\n" for row in self._rows))
+
+
+def busy(seconds: float) -> None:
+    """Use the CPU for so long."""
+    end = time.thread_time() + seconds
+    while time.thread_time() < end:
+        pass
+
+
+def source(truth: Truth) -> list[Node]:
+    """Publish /scan with a period of 50 ms."""
+    node = Witness("source", truth)
+    node.every(0.05, node.sender("/scan"))
+    return [node]
+
+
+def relay(truth: Truth, name: str = "filter", heard: str = "/scan", said: str = "/filtered"):
+    """Answer each message of a topic after a millisecond."""
+    node = Witness(name, truth)
+    send = node.sender(said)
+
+    def work() -> None:
+        busy(0.001)
+        send()
+
+    node.on(heard, work)
+    return [node]
+
+
+def sink(truth: Truth) -> list[Node]:
+    """Hear what others publish."""
+    node = Witness("sink", truth)
+    for topic in ("/filtered", "/tick", "/result"):
+        node.on(topic, lambda: busy(0.000_2))
+    return [node]
+
+
+def relay_with_timer(truth: Truth) -> list[Node]:
+    """Answer each message, and publish /tick with a period of its own."""
+    (node,) = relay(truth)
+    node.every(0.02, node.sender("/tick"))
+    return [node]
+
+
+def server(truth: Truth) -> list[Node]:
+    """Answer requests, and publish a message meanwhile."""
+    node = Witness("server", truth)
+    node.serve("/answer", node.sender("/filtered"))
+    return [node]
+
+
+def client(truth: Truth) -> list[Node]:
+    """Send a request each 60 ms, and publish /result when it is answered."""
+    node = Witness("client", truth)
+    node.every(0.06, node.caller("/answer", node.sender("/result")))
+    return [node]
+
+
+def several(truth: Truth) -> list[Node]:
+    """Three nodes for one executor, one with callbacks that may run side by side."""
+    node = Witness("reentrant", truth)
+    group = ReentrantCallbackGroup()
+    send = node.sender("/tick")
+    node.on("/scan", lambda: (time.sleep(0.03), send()), group)
+    exclusive = Witness("exclusive", truth)
+    one = MutuallyExclusiveCallbackGroup()
+    result = exclusive.sender("/result")
+    exclusive.on("/tick", lambda: (busy(0.001), result()), one)
+    exclusive.every(0.035, lambda: busy(0.000_5), one)
+    return [node, exclusive, *relay(truth)]
+
+
+SYSTEMS = {
+    "pipeline": {"sink": (sink, SingleThreadedExecutor), "filter": (relay, SingleThreadedExecutor),
+                 "source": (source, SingleThreadedExecutor)},
+    "timer": {"sink": (sink, SingleThreadedExecutor),
+              "filter": (relay_with_timer, SingleThreadedExecutor),
+              "source": (source, SingleThreadedExecutor)},
+    "services": {"sink": (sink, SingleThreadedExecutor), "server": (server, SingleThreadedExecutor),
+                 "client": (client, SingleThreadedExecutor)},
+    "multi_threaded": {"sink": (sink, SingleThreadedExecutor),
+                       "several": (several, MultiThreadedExecutor),
+                       "source": (source, SingleThreadedExecutor)},
+    "events": {"sink": (sink, EventsExecutor), "filter": (relay, EventsExecutor),
+               "source": (source, EventsExecutor)},
+}  # fmt: skip
+
+
+def main() -> None:
+    """Run a process of a system for so many seconds."""
+    system, process, seconds, path = sys.argv[1:]
+    make, executor_class = SYSTEMS[system][process]
+    truth = Truth()
+    rclpy.init()
+    executor = executor_class()
+    for node in make(truth):
+        executor.add_node(node)
+    end = threading.Timer(float(seconds), rclpy.shutdown)
+    end.start()
+    with suppress(ExternalShutdownException):
+        # Its spin() of rclpy 9.1 does nothing but use the CPU.
+        while executor_class is EventsExecutor and rclpy.ok():
+            executor.spin_once(0.1)
+        executor.spin()
+    end.join()
+    truth.save(Path(path))
+    # Threads of the middleware may still call Python while it ends.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()
