@@ -127,11 +127,11 @@ class Creator:
     ) -> PublisherObject:
         """A publisher; those that are not of rclcpp have a handle that is copied later."""
         self.work(250 * MICROSECOND)
-        self.announce()
         memory, topic = self._memory, description.topic
         address: Callable[[], int] = memory.allocate if is_rclcpp else memory.on_stack
         rmw_handle, init_handle = memory.allocate(), address()
         self._writer(rmw_handle, f"rt{topic}")
+        self.announce()
         self.emit(
             "rcl_publisher_init", init_handle, node.handle, rmw_handle, topic, description.depth
         )
@@ -160,12 +160,12 @@ class Creator:
     ) -> SubscriptionObject:
         """A subscription, which gets messages once it has been given to `listen`."""
         self.work(400 * MICROSECOND)
-        self.announce()
         memory, topic = self._memory, description.topic
         rmw_handle, handle = memory.allocate(), memory.allocate()
         subscription, callback = memory.allocate(), memory.allocate()
         group, executor = node.groups[description.group]
         self._reader(rmw_handle, f"rt{topic}")
+        self.announce()
         self.emit(
             "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
         )

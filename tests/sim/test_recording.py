@@ -38,7 +38,7 @@ FAULTS = {
     ),
     "last_snapshot": Recording(
         snapshots=(SECOND // 2, SECOND),
-        kept_packets=9,
+        kept_packets=16,
         is_last_snapshot_only=True,
         packet_bytes=4096,
     ),
