@@ -1,7 +1,8 @@
 -- name: derive.link_causal
 -- kind: macro
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
---     events where a gap touches its callback instance, or its take, or its publication.
+--     events where a gap touches its callback instance, or its take, or its publication. In a
+--     process that is several with equal ids, the cause may be one of another process.
 -- grain: one row per callback instance, or take outside of any, and publication that it led to, and
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
@@ -38,7 +39,13 @@ SELECT
     l.publisher_id,
     l.kind,
     l.annotation_id,
-    l.candidate_count,
+    greatest(l.candidate_count, CASE WHEN p.is_ambiguous THEN 2 END) AS candidate_count,
     coalesce(l.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
 LEFT JOIN store.take AS t ON l.take_id = t.take_id AND t.run_id = only_run
+LEFT JOIN (
+    SELECT u.publisher_id, p.is_ambiguous
+    FROM store.publisher AS u
+    JOIN store.process AS p ON u.process_id = p.process_id
+    WHERE u.run_id = only_run AND p.is_ambiguous
+) AS p ON l.publisher_id = p.publisher_id

@@ -8,7 +8,8 @@
 --     of the receiver's trace likewise, the better candidate may be in the gap. A reader of ring
 --     buffers may get a message through the middleware as well, without a callback: that take is
 --     a copy that no callback gets. So are the takes of a placeholder that nothing joins with the
---     reader of the buffer.
+--     reader of the buffer. Where a process is several with equal ids, nothing says whose messages
+--     it sent or got.
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
@@ -147,7 +148,9 @@ SELECT
     l.publisher_id,
     l.subscription_id,
     l.method,
-    l.candidate_count,
+    greatest(
+        l.candidate_count, CASE WHEN pp.is_ambiguous OR sp.is_ambiguous THEN 2 END
+    ) AS candidate_count,
     coalesce(
         p.topic_name IN ('/tf', '/tf_static')
         AND (
@@ -162,6 +165,8 @@ FROM link AS l
 LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 LEFT JOIN store.subscription AS s
     ON l.subscription_id = s.subscription_id
+LEFT JOIN store.process AS pp ON p.process_id = pp.process_id
+LEFT JOIN store.process AS sp ON s.process_id = sp.process_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
 LEFT JOIN copy AS c ON l.take_id = c.take_id
