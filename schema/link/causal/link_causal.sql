@@ -29,6 +29,12 @@ WITH link AS (
     JOIN store.callback_instance AS i ON x.callback_instance_id = i.callback_instance_id
     JOIN store.publication AS b ON x.publication_id = b.publication_id
     WHERE i.run_id = only_run AND b.run_id = only_run
+),
+mixed AS (
+    SELECT publication_id
+    FROM store.publication
+    WHERE run_id = only_run
+        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
 )
 SELECT
     l.run_id,
@@ -39,13 +45,10 @@ SELECT
     l.publisher_id,
     l.kind,
     l.annotation_id,
-    greatest(l.candidate_count, CASE WHEN p.is_ambiguous THEN 2 END) AS candidate_count,
+    greatest(
+        l.candidate_count, CASE WHEN m.publication_id IS NOT NULL THEN 2 END
+    ) AS candidate_count,
     coalesce(l.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
 LEFT JOIN store.take AS t ON l.take_id = t.take_id AND t.run_id = only_run
-LEFT JOIN (
-    SELECT u.publisher_id, p.is_ambiguous
-    FROM store.publisher AS u
-    JOIN store.process AS p ON u.process_id = p.process_id
-    WHERE u.run_id = only_run AND p.is_ambiguous
-) AS p ON l.publisher_id = p.publisher_id
+LEFT JOIN mixed AS m ON l.publication_id = m.publication_id

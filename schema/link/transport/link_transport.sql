@@ -140,6 +140,19 @@ copy AS (
     JOIN silent AS n
         ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
     WHERE l.method <> 'ring_buffer'
+),
+-- Of processes that are several with equal ids.
+mixed_publication AS (
+    SELECT publication_id
+    FROM store.publication
+    WHERE run_id = only_run
+        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
+),
+mixed_take AS (
+    SELECT take_id
+    FROM store.take
+    WHERE run_id = only_run
+        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
 )
 SELECT
     l.run_id,
@@ -149,7 +162,7 @@ SELECT
     l.subscription_id,
     l.method,
     greatest(
-        l.candidate_count, CASE WHEN pp.is_ambiguous OR sp.is_ambiguous THEN 2 END
+        l.candidate_count, CASE WHEN coalesce(mb.publication_id, mt.take_id) IS NOT NULL THEN 2 END
     ) AS candidate_count,
     coalesce(
         p.topic_name IN ('/tf', '/tf_static')
@@ -165,8 +178,8 @@ FROM link AS l
 LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 LEFT JOIN store.subscription AS s
     ON l.subscription_id = s.subscription_id
-LEFT JOIN store.process AS pp ON p.process_id = pp.process_id
-LEFT JOIN store.process AS sp ON s.process_id = sp.process_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
 LEFT JOIN copy AS c ON l.take_id = c.take_id
+LEFT JOIN mixed_publication AS mb ON l.publication_id = mb.publication_id
+LEFT JOIN mixed_take AS mt ON l.take_id = mt.take_id
