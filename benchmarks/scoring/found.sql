@@ -1,11 +1,24 @@
 -- What msgflow has found (the database `analysed`): every link by the places and times of its ends.
 -- Times are those of the trace, which the tables of the store have.
 CREATE OR REPLACE TEMP TABLE found_link AS
-WITH place AS (
-    SELECT t.thread_id, h.hostname AS host, p.pid, t.tid
+WITH seen AS (
+    SELECT process_id, trace_id FROM analysed.store.publication
+    UNION
+    SELECT process_id, trace_id FROM analysed.store.take
+),
+-- Recordings have a folder for each host, also for containers with one hostname.
+folder AS (
+    SELECT s.process_id, nullif(regexp_extract(any_value(t.path), '/trace-([^/]+)/', 1), '') AS host
+    FROM seen AS s
+    JOIN analysed.store.trace AS t ON s.trace_id = t.trace_id
+    GROUP BY s.process_id
+),
+place AS (
+    SELECT t.thread_id, coalesce(f.host, h.hostname) AS host, p.pid, t.tid
     FROM analysed.store.thread AS t
     JOIN analysed.store.process AS p ON t.process_id = p.process_id
     JOIN analysed.store.host AS h ON p.host_id = h.host_id
+    LEFT JOIN folder AS f ON p.process_id = f.process_id
 ),
 instance AS (
     SELECT 'publication' AS kind, publication_id AS id, thread_id, start_ns AS ts_ns

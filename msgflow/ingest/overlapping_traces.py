@@ -1,13 +1,15 @@
-"""Overlapping traces: corrections of events that two traces of a host hold.
+"""Overlapping traces: corrections of what several traces of a host, or containers, have in common.
 
-Two sessions may record one process at the same time. Which events are there twice shows only when
-all have been read. The traces are then read again, without the copies, so that the predecessor of
-an event on its thread is what really happened before it. The same is done where only some traces of
-a host know the PID namespace of a process.
+Two sessions may record one process at the same time, or processes of two containers that have the
+same ids. Which events are there twice, and which ids mean several processes, shows only when all
+have been read. The traces are then read again, without the copies and with PID namespaces where
+they were missing, so that the predecessor of an event on its thread is what really happened before
+it.
 """
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -17,10 +19,11 @@ import numpy as np
 from msgflow.ingest.catalogue import load
 from msgflow.resources import resource_directory
 from msgflow.sql.statement import Statements
-from msgflow.trace.numpy_arrow import distinct, is_valid, to_arrow, to_numpy
+from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping
+    from contextlib import ExitStack
 
     import duckdb
     import pyarrow as pa
@@ -28,10 +31,11 @@ if TYPE_CHECKING:
 
 # By how much the two records of one event may be apart [ns], at the ends of a recording.
 _SLACK_NS = 100_000
+# Two sessions record an event one after the other, in the same call. Another process on that CPU
+# has to be switched to, and to come as far, in between [ns].
+_TWIN_NS = 10_000
 
-# Temporary tables, each made from those before it.
-_TABLES = ("session_trace", "process_namespace")
-_OVERLAP_TABLES = ("coverage", "overlap_window")
+_PARAMETERS = {"slack_ns": _SLACK_NS, "twin_ns": _TWIN_NS}
 
 
 @dataclass(frozen=True)
@@ -40,16 +44,18 @@ class Corrections:
 
     Attributes:
         duplicates: ids of events that another trace holds as well, in order.
-        processes: (host, pid) of the processes whose PID namespace is filled in where it is
+        processes: (session, pid, name of the thread) whose PID namespace is filled in where it is
             missing, as one number each, in order.
         namespaces: the PID namespace of each.
-        hosts: trace index -> a number that traces of the same host share.
+        sessions: trace index -> number of its session.
+        names: name of a thread -> its number.
     """
 
     duplicates: NDArray[np.int64]
     processes: NDArray[np.int64]
     namespaces: NDArray[np.int64]
-    hosts: NDArray[np.int64]
+    sessions: NDArray[np.int64]
+    names: Mapping[str | None, int]
 
     def __bool__(self) -> bool:
         return bool(self.duplicates.size or self.processes.size)
@@ -67,7 +73,16 @@ class Corrections:
         return batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
 
     def _with_namespaces(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        processes = _process(self.hosts[to_numpy(batch["trace_index"])], to_numpy(batch["vpid"]))
+        names = batch["procname"]
+        # The last one stands for no name.
+        texts = [*names.dictionary.to_pylist(), None]
+        numbers = np.array([self.names.get(text, -1) for text in texts], np.int64)
+        processes = _process(
+            self.sessions[to_numpy(batch["trace_index"])],
+            to_numpy(batch["vpid"]),
+            numbers[np.where(is_valid(names.indices), to_numpy(names.indices), -1)],
+            len(self.names),
+        )
         is_known, places = _are_among(processes, self.processes)
         is_given = is_valid(batch["pid_ns"])
         values = np.where(is_given, to_numpy(batch["pid_ns"]), self.namespaces[places])
@@ -81,24 +96,31 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
     Args:
         con: connection with `raw` and `staging` attached and filled.
     """
-    for table in _TABLES:
-        _make(con, table)
-    known = con.execute("SELECT host, vpid, pid_ns FROM process_namespace").fetchnumpy()
-    traces = con.execute(
-        "SELECT host, session FROM session_trace ORDER BY trace_index"
-    ).fetchnumpy()
-    # One session records no event twice.
-    has_sessions = distinct(traces["session"]).size > 1
-    duplicates = _duplicates(con) if has_sessions else np.empty(0, np.int64)
-    for table in _TABLES:
-        con.execute(f"DROP TABLE {table}")
-    processes = _process(known["host"], known["vpid"])
+    with contextlib.ExitStack() as made:
+        for table in ("session_trace", "process_namespace", "coverage", "overlap_window"):
+            _make(con, made, table)
+        duplicates = np.empty(0, np.int64)
+        if con.execute("SELECT 1 FROM overlap_window LIMIT 1").fetchall():
+            _create(con, made, f"VIEW thread_event AS {_events()}")
+            _create(con, made, f"VIEW session_event AS {statements().header('session_event').body}")
+            for table in ("session_pair", "session_container", "duplicate_event"):
+                _make(con, made, table)
+            duplicates = _duplicates(con)
+        else:
+            _create(con, made, "TABLE session_container (session BIGINT, container BIGINT)")
+        _make(con, made, "alternating_name")
+        known = con.execute(statements().header("given_namespace").body).fetchnumpy()
+        traces = con.execute("SELECT session FROM session_trace ORDER BY trace_index").fetchnumpy()
+    names = {name: n for n, name in enumerate(dict.fromkeys(known["procname"].tolist()))}
+    numbers = np.array([names[name] for name in known["procname"].tolist()], np.int64)
+    processes = _process(known["session"], known["vpid"], numbers, len(names))
     order = np.argsort(processes)
     return Corrections(
         duplicates,
         processes[order],
         np.asarray(known["pid_ns"], np.int64)[order],
-        np.asarray(traces["host"], np.int64),
+        np.asarray(traces["session"], np.int64),
+        names,
     )
 
 
@@ -107,27 +129,28 @@ def _duplicates(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
 
     Their counts go to `staging.left_out`.
     """
-    event_ids = np.empty(0, np.int64)
-    for table in _OVERLAP_TABLES:
-        _make(con, table)
-    if con.execute("SELECT 1 FROM overlap_window LIMIT 1").fetchall():
-        con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
-        _make(con, "duplicate_event")
-        con.execute("DROP VIEW thread_event")
-        con.execute("INSERT INTO staging.left_out\n" + statements().header("duplicate_count").body)
-        found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
-        event_ids = np.asarray(found["event_id"], np.int64)
-        con.execute("DROP TABLE duplicate_event")
-    for table in _OVERLAP_TABLES:
-        con.execute(f"DROP TABLE {table}")
-    return event_ids
+    con.execute("INSERT INTO staging.left_out\n" + statements().header("duplicate_count").body)
+    found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
+    return np.asarray(found["event_id"], np.int64)
 
 
-def _make(con: duckdb.DuckDBPyConnection, table: str) -> None:
+def _make(con: duckdb.DuckDBPyConnection, made: ExitStack, table: str) -> None:
     """Make a temporary table as `schema/overlap` has it."""
     header = statements().header(table)
-    values = {"slack_ns": _SLACK_NS} if header.params else {}
-    con.execute(f"CREATE OR REPLACE TEMP TABLE {table} AS\n{header.body}", values)
+    values = {param.name: _PARAMETERS[param.name] for param in header.params}
+    _create(con, made, f"TABLE {table} AS\n{header.body}", values)
+
+
+def _create(
+    con: duckdb.DuckDBPyConnection,
+    made: ExitStack,
+    definition: str,
+    values: Mapping[str, int] | None = None,
+) -> None:
+    """Create a temporary table or view, which `made` drops."""
+    con.execute(f"CREATE OR REPLACE TEMP {definition}", values)
+    kind, name, _ = definition.split(maxsplit=2)
+    made.callback(con.execute, f"DROP {kind} temp.{name}")
 
 
 @cache
@@ -145,9 +168,11 @@ def _events() -> str:
 
 
 def _process(
-    hosts: NDArray[np.int64], pids: Sequence[int] | NDArray[np.int32]
+    sessions: NDArray[np.int64], pids: NDArray[np.int32], names: NDArray[np.int64], name_count: int
 ) -> NDArray[np.int64]:
-    return (np.asarray(hosts, np.int64) << 32) | np.asarray(pids, np.int64)
+    """Number (session, pid, name); a negative one where the name is none of those with a number."""
+    numbers = np.where(names < 0, names, np.asarray(sessions, np.int64) * name_count + names)
+    return (numbers << 32) | np.asarray(pids, np.int64)
 
 
 def _are_among(

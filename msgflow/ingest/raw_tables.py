@@ -71,6 +71,7 @@ class RawTables:
             return
         self.add("thread", item.threads)
         self.add("thread_name", item.thread_names)
+        self.add("cpu_return", item.cpu_returns)
         tracepoints = load().tracepoints
         for name, rows in item.batches:
             self.add(tracepoints[name].table, rows)

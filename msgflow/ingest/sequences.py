@@ -47,8 +47,18 @@ THREAD_NAME_SCHEMA = pa.schema(
 )
 """Stretches of events of a thread under one name; several may follow each other."""
 
+CPU_RETURN_SCHEMA = pa.schema(
+    [
+        pa.field("thread_index", pa.int32(), nullable=False),
+        pa.field("event_id", pa.int64(), nullable=False),
+    ]
+)
+"""Events of a thread that changed its CPU twice faster than a thread can."""
+
 _LEADING = ("event_id", "ts_ns", "trace_index", "cpu_id")
 _CONTEXTS = len(COMMON_SCHEMA)
+# A thread is switched out and in for each change: both take some 100 us where they were measured.
+_SHORTEST_RETURN_NS = 10_000
 _NONE = -1
 
 
@@ -60,11 +70,13 @@ class Placed:
         batches: (event name, batch), with the columns of the staging tables.
         threads: rows of `THREAD_SCHEMA` that were not there before.
         thread_names: rows of `THREAD_NAME_SCHEMA`.
+        cpu_returns: rows of `CPU_RETURN_SCHEMA`.
     """
 
     batches: tuple[tuple[str, pa.RecordBatch], ...]
     threads: pa.RecordBatch
     thread_names: pa.RecordBatch
+    cpu_returns: pa.RecordBatch
 
 
 class Sequences:
@@ -137,7 +149,10 @@ class Sequences:
             for (name, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True)
         )
         return Placed(
-            placed, _new_threads(batches, threads, known), _names(batches, groups, events)
+            placed,
+            _new_threads(batches, threads, known),
+            _names(batches, groups, events),
+            _cpu_returns(batches, groups, events),
         )
 
     def _memberships(self, name: str) -> np.uint8:
@@ -344,6 +359,27 @@ def _names(
             ),
         ],
         schema=THREAD_NAME_SCHEMA,
+    )
+
+
+def _cpu_returns(
+    batches: Sequence[tuple[str, pa.RecordBatch]],
+    groups: _Groups,
+    events: Mapping[Origin, NDArray[Any]],
+) -> pa.RecordBatch:
+    cpus = _gathered(batches, "cpu_id")[groups.rows]
+    is_change = np.append(False, cpus[1:] != cpus[:-1])
+    is_change[groups.starts] = False
+    changes = np.flatnonzero(is_change)
+    first, second = changes[:-1], changes[1:]
+    times = events[Origin.TS_NS]
+    is_fast = (groups.threads[first] == groups.threads[second]) & (
+        times[second] - times[first - 1] < _SHORTEST_RETURN_NS
+    )
+    found = second[is_fast]
+    return pa.RecordBatch.from_arrays(
+        [to_arrow(groups.threads[found]), to_arrow(events[Origin.EVENT_ID][found])],
+        schema=CPU_RETURN_SCHEMA,
     )
 
 

@@ -2,7 +2,8 @@
 
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
-tracepoint, the packets, and the threads, all as read.
+tracepoint, the packets, and the threads, all as read (`raw.cpu_return`: events of threads that
+changed their CPU twice faster than a thread can).
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
@@ -43,7 +44,8 @@ CREATE TABLE raw.thread (
 CREATE TABLE raw.thread_name (
     thread_index INTEGER, procname VARCHAR, first_event_id BIGINT, last_event_id BIGINT,
     first_seen_ns BIGINT, last_seen_ns BIGINT
-)
+);
+CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT)
 """
 
 _SOURCE_TABLE = """
@@ -149,7 +151,7 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    for table in (*event_tables(), "packet", "thread", "thread_name"):
+    for table in (*event_tables(), "packet", "thread", "thread_name", "cpu_return"):
         con.execute(f"TRUNCATE raw.{table}")
 
 

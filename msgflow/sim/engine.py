@@ -186,11 +186,14 @@ def _start(
     discovery = Discovery()
     version = layouts()[scenario.layout].version
     processes = []
-    lives: Counter[tuple[str, int]] = Counter()
+    lives: Counter[tuple[str, str, int]] = Counter()
     for number, description in enumerate(scenario.processes):
         machine = machines[description.hostname]
-        place = (description.hostname, description.pid)
-        process = RunningProcess(scheduler, machine, description, number, course, lives[place])
+        place = (description.hostname, description.container, description.pid)
+        # Processes with equal ids in containers of one machine have addresses of their own.
+        name = description.hostname if machine.hostname != description.hostname else ""
+        seed = f"{course}{name}{description.container}"
+        process = RunningProcess(scheduler, machine, description, number, seed, lives[place])
         lives[place] += 1
         startup = Startup(process, middleware, discovery, network, version)
         scheduler.at(description.start_ns, startup.begin)
@@ -247,7 +250,7 @@ def _machine(
     boot = sha256(f"{identity_key}/{host.boot}".encode()).digest() if host.boot else digest
     identity = TraceIdentity(
         session=scenario.name,
-        hostname=host.hostname,
+        hostname=host.recorded_as or host.hostname,
         uuid=UUID(bytes=digest[:16], version=4),
         boot_uuid=UUID(bytes=boot[16:], version=4),
         epoch_ns=clock.epoch_ns,
@@ -265,7 +268,7 @@ def _machine(
         length,
     )
     return Machine(
-        host.hostname, clock, recorder, recording, host.stamp_resolution_ns, host.publish_pace,
+        identity.hostname, clock, recorder, recording, host.stamp_resolution_ns, host.publish_pace,
     )  # fmt: skip
 
 

@@ -95,8 +95,8 @@ class Process:
     Attributes:
         name: name of the executable; the trace shows its first 15 characters.
         hostname: the host it runs on.
-        pid: process id, also the id of the main thread; at least 10 apart on one host for
-            processes that run at the same time, since threads have the ids that follow.
+        pid: process id, also the id of the main thread; at least 10 apart in one container or host
+            for processes that run at the same time, since threads have the ids that follow.
         nodes: created in this order.
         start_ns: when it starts, after the begin of tracing.
         executors: its executors.
@@ -107,6 +107,7 @@ class Process:
         starved_ns: period, and how long at its end none of its threads gets a CPU; one that runs
             already goes on.
         threads_from: threads other than the main one have ids above this; the process id if None.
+        container: the container of its host that it runs in, which numbers processes by itself.
     """
 
     name: str
@@ -120,6 +121,7 @@ class Process:
     client_library: str = "rclcpp"
     starved_ns: tuple[int, int] = (0, 0)
     threads_from: int | None = None
+    container: str = ""
 
     def tid(self, number: int) -> int:
         """Id of a thread; number 0 is the main one."""
@@ -143,6 +145,7 @@ class Host:
             that follow each other closely the same stamp.
         recording: how it is recorded; None: as the scenario says.
         publish_pace: how long a publication takes from layer to layer, as a share of the usual.
+        recorded_as: hostname that its trace shows, and the truth; its own if empty.
     """
 
     hostname: str
@@ -153,6 +156,7 @@ class Host:
     stamp_resolution_ns: int = 1
     recording: Recording | None = None
     publish_pace: float = 1.0
+    recorded_as: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,10 +202,10 @@ class Scenario:
 
 def _check_ids(scenario: Scenario) -> None:
     """No thread has an id that another one has at the same time."""
-    latest: dict[tuple[str, int], int | None] = {}
+    latest: dict[tuple[str, str, int], int | None] = {}
     for process in sorted(scenario.processes, key=lambda each: each.start_ns):
         for number in range(_THREADS_PER_PROCESS + 1):
-            key = (process.hostname, process.tid(number))
+            key = (process.hostname, process.container, process.tid(number))
             if key in latest:
                 end = latest[key]
                 if end is None or end >= process.start_ns:

@@ -2,31 +2,14 @@
 -- kind: inline
 -- description: Events to leave out because another session recorded them as well. Of the sessions
 --     that recorded a tracepoint on a thread, the one with most events of the thread counts; the
---     others keep what lies outside of its time. `thread_event` has the events of all threads.
+--     others keep what lies outside of its time.
 -- grain: one row per event that is left out
-WITH thread AS (
-    SELECT
-        r.thread_index,
-        min(r.thread_index) OVER (
-            PARTITION BY s.host, coalesce(r.pid_ns, n.pid_ns), r.vpid, r.vtid
-        ) AS thread
-    FROM raw.thread AS r
-    JOIN session_trace AS s ON r.trace_index = s.trace_index
-    LEFT JOIN process_namespace AS n ON s.host = n.host AND r.vpid = n.vpid
-),
-placed AS (
-    SELECT e.event_id, e.tracepoint, e.ts_ns, e.cpu_id, e.trace_index, s.session, t.thread
-    FROM thread_event AS e
-    JOIN session_trace AS s ON e.trace_index = s.trace_index
-    JOIN thread AS t ON e.thread_index = t.thread_index
-    WHERE s.session IN (SELECT left_session FROM overlap_window)
-),
-recorded AS (
+WITH recorded AS (
     SELECT
         thread, tracepoint, session,
         sum(count(*)) OVER (PARTITION BY thread, session) AS event_count,
         min(min(trace_index)) OVER (PARTITION BY session) AS first_index
-    FROM placed
+    FROM session_event
     GROUP BY thread, tracepoint, session
 ),
 preferred AS (
@@ -38,6 +21,9 @@ preferred AS (
         ON l.thread = u.thread
         AND l.tracepoint = u.tracepoint
         AND (-u.event_count, u.first_index) < (-l.event_count, l.first_index)
+    LEFT JOIN session_container AS lc ON l.session = lc.session
+    LEFT JOIN session_container AS uc ON u.session = uc.session
+    WHERE lc.container IS NOT DISTINCT FROM uc.container
 )
 SELECT
     p.event_id,
@@ -45,7 +31,7 @@ SELECT
     min(f.used_index) AS used_index,
     any_value(p.thread) AS thread,
     any_value(p.ts_ns) AS ts_ns
-FROM placed AS p
+FROM session_event AS p
 JOIN preferred AS f
     ON p.thread = f.thread AND p.tracepoint = f.tracepoint AND p.session = f.left_session
 JOIN overlap_window AS o

@@ -161,6 +161,7 @@ def older(path: Path) -> dict[int, str]:
     with duckdb.connect(str(path)) as con:
         objects.drop(con)
         con.execute("ALTER TABLE store.run DROP COLUMN clock_sync")
+        con.execute("ALTER TABLE store.process DROP COLUMN is_ambiguous")
         con.execute("UPDATE store.alembic_version SET version_num = '0001'")
         con.execute("DELETE FROM store.run WHERE run_id > 2")
         con.execute(

@@ -34,7 +34,8 @@ events = st.builds(
     vpid=st.sampled_from([-1, 100, 2**31 - 1]),
     vtid=st.sampled_from([-1, 100, 101]),
     procname=st.sampled_from([None, "talker", "dds"]),
-    gap=st.integers(1, 3),
+    cpu_id=st.sampled_from([0, 0, 1]),
+    gap=st.sampled_from([1, 2, 3, 1_001]),
 )
 
 
@@ -110,6 +111,25 @@ def test_predecessors_are_the_latest_of_their_sequence(rounds: list[list[Event]]
         ]
         assert all(covered)
         assert all(a[1] < b[0] for a, b in itertools.pairwise(stretches))
+
+
+@settings(deadline=None)
+@given(st.lists(events, min_size=1, max_size=20))
+def test_two_changes_of_the_cpu_in_no_time(of_round: list[Event]) -> None:
+    """Of a thread that is one of several processes, in one round."""
+    rounds_of([of_round])
+    found, placed = place(Sequences(load(), HOSTS), of_round)
+    of_threads: dict[int, list[Event]] = {}
+    expected = []
+    for event, row in zip(of_round, found, strict=True):
+        of_thread = of_threads.setdefault(row["thread_index"], [])
+        before = [each for each in of_thread if each["cpu_id"] == event["cpu_id"]]
+        is_change = bool(of_thread) and of_thread[-1]["cpu_id"] != event["cpu_id"]
+        if is_change and before and event["ts_ns"] - before[-1]["ts_ns"] < 10_000:
+            expected.append((row["thread_index"], event["event_id"]))
+        of_thread.append(event)
+    rows = [tuple(row.values()) for row in placed.cpu_returns.to_pylist()]
+    assert sorted(rows, key=lambda row: row[1]) == expected
 
 
 def _value(event: Event | None, origin: Origin) -> Any:

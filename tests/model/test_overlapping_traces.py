@@ -240,3 +240,129 @@ def test_a_pid_in_several_namespaces_is_left_apart(system: RosSystem, analyse: A
     system.publish(session(1), 0x10, 1)
     model = analyse(system)
     assert model.column("SELECT pid_namespace FROM store.process ORDER BY ALL") == [1, 2, None]
+
+
+def containers(system: RosSystem, *threads: Thread, rounds: int = 4) -> None:
+    """Equal ids in several sessions, one thread each; they take turns."""
+    sessions(system, *["alpha"] * len(threads))
+    for thread in threads:
+        create(system, thread)
+    for number in range(rounds):
+        for place, thread in enumerate(threads):
+            cycle(system, 10 * number + place, thread)
+
+
+def namespaces(model: Analysis) -> list[int | None]:
+    return model.column("SELECT pid_namespace FROM store.process ORDER BY process_id")
+
+
+def test_containers_with_one_hostname_are_no_copies(system: RosSystem, analyse: Analyse) -> None:
+    containers(system, session(0), session(1))
+    model = analyse(system)
+    assert counts(model) == (8, 8, 8, 8)
+    assert model.rows(FOUND) == []
+    assert namespaces(model) == [None, -2]
+    assert model.rows(
+        "SELECT count, detail FROM store.finding WHERE name = 'equal_process_ids'"
+    ) == [(1, "processes with ids that others had as well: main 100 on alpha")]
+    assert failed_checks(model) == []
+
+
+def test_most_events_have_a_twin_where_sessions_record_one_thread(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """The second session lost a third of the first one's events, and has some alone."""
+    threads = session(0), session(1)
+    sessions(system, "alpha", "alpha")
+    create(system, *threads)
+    for number in range(12):
+        cycle(system, number, *(threads if number % 3 else threads[number % 2 :][:1]))
+    model = analyse(system)
+    assert namespaces(model) == [None]
+    assert counts(model)[2] >= 10
+
+
+def test_few_events_have_one_by_chance(system: RosSystem, analyse: Analyse) -> None:
+    threads = session(0), session(1)
+    sessions(system, "alpha", "alpha")
+    for thread in threads:
+        create(system, thread)
+        system.wait(PERIOD)
+    for number in range(4):
+        for thread in threads:
+            cycle(system, 10 * number + thread.trace, thread)
+    cycle(system, 50, *threads)
+    cycle(system, 51, *threads)
+    cycle(system, 52, threads[0])
+    cycle(system, 53, threads[1])
+    model = analyse(system)
+    assert namespaces(model) == [None, -2]
+    assert counts(model)[:3] == (14, 14, 14)
+
+
+@pytest.mark.parametrize(("late_ns", "is_same"), [(9_000, True), (11_000, False)])
+def test_a_twin_follows_at_once(
+    system: RosSystem, analyse: Analyse, late_ns: int, is_same: bool
+) -> None:
+    sessions(system, "alpha", "alpha")
+    threads = session(0), session(1)
+    create(system, threads[0])
+    system.wait(PERIOD)
+    create(system, threads[1])
+    for number in range(6):
+        begin = system.now
+        for place, thread in enumerate(threads):
+            at = begin + PERIOD + place * late_ns
+            system.add("ros2:rcl_publish", thread, ts=at, publisher_handle=0x10, message=number)
+    model = analyse(system)
+    assert namespaces(model) == ([None] if is_same else [None, -2])
+
+
+def test_a_twin_is_on_the_same_cpu(system: RosSystem, analyse: Analyse) -> None:
+    """Two processes do the same on two CPUs, at one moment."""
+    threads = session(0), session(1, cpu=1)
+    sessions(system, "alpha", "alpha")
+    create(system, *threads)
+    system.node(session(0, 200, cpu=1), 0x1, "other")
+    for number in range(4):
+        cycle(system, number, *threads)
+    model = analyse(system)
+    assert namespaces(model) == [None, -2, None]
+    assert counts(model)[:3] == (8, 8, 8)
+
+
+def test_two_sessions_of_the_second_container(system: RosSystem, analyse: Analyse) -> None:
+    """They are copies of each other, and both are of one container."""
+    first, *others = session(0), session(1), session(2)
+    sessions(system, "alpha", "alpha", "alpha")
+    create(system, first)
+    create(system, *others)
+    for number in range(4):
+        cycle(system, 10 * number, first)
+        cycle(system, 10 * number + 1, *others)
+    model = analyse(system)
+    assert counts(model) == (8, 8, 8, 8)
+    assert [row[0] for row in model.rows(FOUND)] == [3]
+    assert namespaces(model) == [None, -2]
+
+
+def test_two_sessions_of_the_first_container(system: RosSystem, analyse: Analyse) -> None:
+    """That the second one differs from one of them does not make a container of the other."""
+    one, other, twin = session(0), session(1), session(2)
+    sessions(system, "alpha", "alpha", "alpha")
+    create(system, one, twin)
+    create(system, other)
+    for number in range(4):
+        cycle(system, 10 * number, one, twin)
+        cycle(system, 10 * number + 1, other)
+    model = analyse(system)
+    assert counts(model) == (8, 8, 8, 8)
+    assert [row[0] for row in model.rows(FOUND)] == [3]
+    assert namespaces(model) == [None, -2]
+
+
+def test_a_namespace_is_not_that_of_another_container(system: RosSystem, analyse: Analyse) -> None:
+    containers(system, session(0, pid_ns=7), session(1))
+    model = analyse(system)
+    assert namespaces(model) == [7, -2]
+    assert counts(model) == (8, 8, 8, 8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from analysis import Analyse
 from ros_system import RosSystem
 from staged_events import Thread
@@ -62,6 +63,86 @@ def test_namespaces_of_process_ids_keep_processes_apart(
     assert model.column(
         "SELECT topic_name FROM publication JOIN publisher USING (publisher_id)"
     ) == ["/1"]
+
+
+MILLISECOND = 1_000_000
+NAMESPACES = "SELECT name, pid_namespace FROM store.process ORDER BY process_id"
+
+
+def called(system: RosSystem, *threads: Thread) -> None:
+    """A callback on each thread; each has its publisher and publishes."""
+    for thread in threads:
+        handle = sum(thread.name.encode())
+        system.publisher(thread, handle, f"/{thread.name}")
+    for number in range(3):
+        for thread in threads:
+            handle = sum(thread.name.encode())
+            system.add("ros2:callback_start", thread, callback=handle, is_intra_process=0)
+            system.publish(thread, handle, number + handle)
+            system.add("ros2:callback_end", thread, callback=handle)
+            system.wait(MILLISECOND)
+
+
+def test_a_name_that_comes_back_is_of_another_process(system: RosSystem, analyse: Analyse) -> None:
+    """Two containers share a session daemon. One thread has the name of its process."""
+    called(system, Thread(7, name="front"), Thread(7, name="rear"))
+    system.publish(Thread(7, 8, name="rear"), sum(b"rear"), 1)
+    model = analyse(system)
+    assert model.rows(NAMESPACES) == [("front", -1), ("rear", -2)]
+    assert model.rows(
+        "SELECT topic_name, count(*) FROM publication JOIN publisher USING (publisher_id) "
+        "GROUP BY ALL ORDER BY ALL"
+    ) == [("/front", 3), ("/rear", 4)]
+    assert model.value("SELECT count(*) FROM store.finding WHERE name = 'mixed_processes'") == 0
+
+
+def test_a_recorded_namespace_counts_more_than_a_name(system: RosSystem, analyse: Analyse) -> None:
+    called(system, Thread(7, name="front", pid_ns=1), Thread(7, name="rear", pid_ns=1))
+    model = analyse(system)
+    assert model.rows(NAMESPACES) == [("rear", 1)]
+
+
+def test_a_name_that_does_not_come_back_is_a_new_name(system: RosSystem, analyse: Analyse) -> None:
+    called(system, Thread(7, name="python3"))
+    called(system, Thread(7, name="listener"))
+    assert analyse(system).rows(NAMESPACES) == [("listener", None)]
+
+
+def test_a_thread_that_renames_itself_in_callbacks_is_one(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    for number in range(3):
+        system.add("ros2:callback_start", Thread(7, name="idle"), callback=0x1)
+        system.publish(Thread(7, name="busy"), 0x10, number)
+        system.add("ros2:callback_end", Thread(7, name="busy"), callback=0x1)
+        system.add("ros2:rclcpp_executor_wait_for_work", Thread(7, name="idle"), timeout=-1)
+    assert analyse(system).rows(NAMESPACES) == [("idle", None)]
+
+
+@pytest.mark.parametrize(("return_ns", "is_ambiguous"), [(9_990, True), (10_000, False)])
+def test_a_thread_on_two_cpus_at_one_moment_is_of_several_processes(
+    system: RosSystem, analyse: Analyse, return_ns: int, is_ambiguous: bool
+) -> None:
+    system.publisher(Thread(7), 0x10, "/a")
+    system.subscription(Thread(7), 0x20, "/a", callback=0x30)
+    system.subscription(Thread(9), 0x20, "/a")
+    system.wait(MILLISECOND)
+    system.add("ros2:callback_start", Thread(7), callback=0x30, is_intra_process=0)
+    begin = system.publish(Thread(7), 0x10, 1)
+    system.add("ros2:rmw_take", Thread(9), rmw_subscription_handle=0x1020, source_timestamp=1, taken=1)
+    system.add("ros2:callback_end", Thread(7, cpu=1), ts=begin + 100, callback=0x30)
+    begin = system.now - 80
+    system.add("ros2:rclcpp_executor_wait_for_work", Thread(7), ts=begin + return_ns, timeout=-1)
+    model = analyse(system)
+    assert model.rows("SELECT pid, is_ambiguous FROM store.process ORDER BY pid") == [
+        (7, is_ambiguous),
+        (9, False),
+    ]
+    for view in ("link_transport", "link_causal"):
+        assert model.column(f"SELECT candidate_count FROM {view}") == [1 + is_ambiguous], view
+    assert model.rows(
+        "SELECT count, detail FROM store.finding WHERE name = 'mixed_processes'"
+    ) == [(1, "processes that are several with equal ids: main 7 on alpha")] * is_ambiguous
 
 
 def test_a_pid_used_again(system: RosSystem, analyse: Analyse) -> None:

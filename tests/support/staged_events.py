@@ -205,6 +205,7 @@ class StagedEvents:
             placed = Sequences(load(), numbers).place(batches)
             _insert(con, "raw.thread", placed.threads)
             _insert(con, "raw.thread_name", placed.thread_names)
+            _insert(con, "raw.cpu_return", placed.cpu_returns)
             for name, batch in placed.batches:
                 _insert(con, f"raw.{load().tracepoints[name].table}", batch)
         _insert(con, "raw.packet", packets)

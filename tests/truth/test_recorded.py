@@ -25,6 +25,8 @@ TRUE_TRACES = {
     "services": "service",
     "periodic_async_jazzy24": "periodic_async",
     "partial_sync": "partial_sync",
+    "containers_one_daemon": "direct",
+    "containers_same_name": "direct",
 }
 EXPORTS = {
     "pairs": """
@@ -91,11 +93,20 @@ SERVICE_EXPORTS = {
         WHERE e.from_kind = 'callback_instance' AND coalesce(i.take_id, i.request_id) IS NOT NULL
     """,
 }
+# Each host has a folder, also if it is a container that has its hostname from another one.
 PLACE = """
 CREATE TEMP VIEW IF NOT EXISTS place AS
-SELECT p.process_id, h.hostname, p.pid
+WITH seen AS (
+    SELECT process_id, trace_id FROM publication
+    UNION
+    SELECT process_id, trace_id FROM take
+)
+SELECT
+    p.process_id, regexp_extract(any_value(t.path), '/trace-([^/]+)/', 1) AS hostname, p.pid
 FROM process AS p
-JOIN host AS h ON p.host_id = h.host_id
+JOIN seen AS s ON p.process_id = s.process_id
+JOIN trace AS t ON s.trace_id = t.trace_id
+GROUP BY p.process_id, p.pid
 """
 
 
@@ -107,7 +118,7 @@ def checker(shared_traces: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", few(TRUE_TRACES, "sync_1_1", "services"))
+@pytest.mark.parametrize("name", few(TRUE_TRACES, "sync_1_1", "services", "containers_one_daemon", "containers_same_name"))
 def test_scores(
     recordings: Callable[[str], Ingested],
     shared_traces: Path,

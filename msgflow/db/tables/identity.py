@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from sqlalchemy import INTEGER, Column, Table
+from sqlalchemy import BOOLEAN, INTEGER, Column, Table
 
 from msgflow.db.tables.column import (
     STORE,
+    column,
     event_order,
     flag,
     handle,
@@ -46,12 +47,21 @@ Table(
     text("tracetools_version", "Version that rcl_init reported; for display only"),
     moment("first_seen_ns", "First event", clock="process_id"),
     moment("last_seen_ns", "Last event", clock="process_id"),
-    number("pid_namespace", "PID namespace, where the trace has it"),
+    number(
+        "pid_namespace",
+        "PID namespace, where the trace has it; a negative one where processes with equal ids are"
+        " told apart without it",
+    ),
     Column(
         "life",
         INTEGER,
         nullable=False,
         comment="Number of this life among those of the pid, from 1",
+    ),
+    column(
+        "is_ambiguous",
+        BOOLEAN,
+        "Several processes with equal ids are one here: nothing tells them apart",
     ),
     comment="One row per process life",
     info={"view": "Process lives: a pid that is used again is another process."},

@@ -1,7 +1,8 @@
 -- name: derive.link_causal
 -- kind: macro
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
---     events where a gap touches its callback instance, or its take, or its publication.
+--     events where a gap touches its callback instance, or its take, or its publication. In a
+--     process that is several with equal ids, the cause may be one of another process.
 -- grain: one row per callback instance, or take outside of any, and publication that it led to, and
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
@@ -28,6 +29,12 @@ WITH link AS (
     JOIN store.callback_instance AS i ON x.callback_instance_id = i.callback_instance_id
     JOIN store.publication AS b ON x.publication_id = b.publication_id
     WHERE i.run_id = only_run AND b.run_id = only_run
+),
+mixed AS (
+    SELECT publication_id
+    FROM store.publication
+    WHERE run_id = only_run
+        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
 )
 SELECT
     l.run_id,
@@ -38,7 +45,10 @@ SELECT
     l.publisher_id,
     l.kind,
     l.annotation_id,
-    l.candidate_count,
+    greatest(
+        l.candidate_count, CASE WHEN m.publication_id IS NOT NULL THEN 2 END
+    ) AS candidate_count,
     coalesce(l.is_loss_affected, false) AS is_loss_affected
 FROM link AS l
 LEFT JOIN store.take AS t ON l.take_id = t.take_id AND t.run_id = only_run
+LEFT JOIN mixed AS m ON l.publication_id = m.publication_id

@@ -8,7 +8,8 @@
 --     of the receiver's trace likewise, the better candidate may be in the gap. A reader of ring
 --     buffers may get a message through the middleware as well, without a callback: that take is
 --     a copy that no callback gets. So are the takes of a placeholder that nothing joins with the
---     reader of the buffer.
+--     reader of the buffer. Where a process is several with equal ids, nothing says whose messages
+--     it sent or got.
 -- grain: one row per take whose publication is known
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport(only_run) AS TABLE
@@ -139,6 +140,19 @@ copy AS (
     JOIN silent AS n
         ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
     WHERE l.method <> 'ring_buffer'
+),
+-- Of processes that are several with equal ids.
+mixed_publication AS (
+    SELECT publication_id
+    FROM store.publication
+    WHERE run_id = only_run
+        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
+),
+mixed_take AS (
+    SELECT take_id
+    FROM store.take
+    WHERE run_id = only_run
+        AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
 )
 SELECT
     l.run_id,
@@ -147,7 +161,9 @@ SELECT
     l.publisher_id,
     l.subscription_id,
     l.method,
-    l.candidate_count,
+    greatest(
+        l.candidate_count, CASE WHEN coalesce(mb.publication_id, mt.take_id) IS NOT NULL THEN 2 END
+    ) AS candidate_count,
     coalesce(
         p.topic_name IN ('/tf', '/tf_static')
         AND (
@@ -165,3 +181,5 @@ LEFT JOIN store.subscription AS s
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
 LEFT JOIN copy AS c ON l.take_id = c.take_id
+LEFT JOIN mixed_publication AS mb ON l.publication_id = mb.publication_id
+LEFT JOIN mixed_take AS mt ON l.take_id = mt.take_id

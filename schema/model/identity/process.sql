@@ -1,6 +1,7 @@
 -- name: staging.process
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
---     thread seen; the version is what rcl_init stated, for display only.
+--     thread seen; the version is what rcl_init stated, for display only. A thread that was on two
+--     CPUs at one moment is several of processes with equal ids: all of these are ambiguous.
 -- grain: one row per process life
 WITH life AS (
     SELECT
@@ -33,6 +34,11 @@ version AS (
         AND i.event_id >= l.from_event_id
         AND i.event_id < l.until_event_id
     GROUP BY ALL
+),
+ambiguous AS (
+    SELECT DISTINCT host_id, pid_ns, vpid
+    FROM staging.thread_seen
+    WHERE thread_index IN (SELECT thread_index FROM raw.cpu_return)
 )
 SELECT
     row_number() OVER (ORDER BY l.first_event_id) AS process_id,
@@ -43,10 +49,13 @@ SELECT
     l.first_seen_ns,
     l.last_seen_ns,
     l.pid_ns AS pid_namespace,
-    l.life::INTEGER AS life
+    l.life::INTEGER AS life,
+    a.vpid IS NOT NULL AS is_ambiguous
 FROM life AS l
 LEFT JOIN version AS v
     ON l.host_id = v.host_id
     AND l.pid_ns IS NOT DISTINCT FROM v.pid_ns
     AND l.vpid = v.vpid
     AND l.life = v.life
+LEFT JOIN ambiguous AS a
+    ON l.host_id = a.host_id AND l.pid_ns IS NOT DISTINCT FROM a.pid_ns AND l.vpid = a.vpid

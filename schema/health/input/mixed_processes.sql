@@ -1,0 +1,18 @@
+-- name: finding.mixed_processes
+-- title: Processes with equal ids cannot be told apart
+-- description: Threads were on two CPUs at one moment: they are threads of several processes that
+--     have the same ids and names. Each such mixture is one process here. Its objects, callbacks
+--     and executors may be those of any of them, and all its links have a candidate_count above 1.
+-- cause: Containers number their processes alike, and share a session daemon, or a hostname.
+-- cure: Record the namespace of the ids (lttng add-context -u -t pid_ns), or start a session daemon
+--     in each container and give each a hostname.
+-- grain: one row, if there are any
+-- severity: error
+SELECT
+    count(*) AS count,
+    'processes that are several with equal ids: '
+    || string_agg(l.label, ', ' ORDER BY l.process_id) AS detail
+FROM process_label AS l
+JOIN staging.process AS p ON l.process_id = p.process_id
+WHERE p.is_ambiguous
+HAVING count(*) > 0
