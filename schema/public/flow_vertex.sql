@@ -110,12 +110,14 @@ JOIN (
         coalesce(q.sender_thread_id, q.receiver_thread_id) AS thread_id,
         q.client_id, q.service_id,
         CASE
-            WHEN q.callback_instance_id IS NULL THEN 'callback'
+            WHEN q.callback_instance_id IS NULL AND l.taken_request_id IS NULL THEN 'callback'
             WHEN r.request_id IS NULL THEN 'response'
         END AS missing
     FROM main.request AS q
     LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
         ON q.request_id = r.request_id
+    LEFT JOIN (SELECT DISTINCT taken_request_id FROM store.link_call) AS l
+        ON q.request_id = l.taken_request_id
     UNION ALL
     SELECT
         'response', response_id, run_id, sent_ns, taken_ns,

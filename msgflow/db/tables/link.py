@@ -157,6 +157,28 @@ Table(
 )
 
 Table(
+    "link_call",
+    STORE,
+    run_id(),
+    reference("taken_request_id", "Cause: a request", to="request.request_id"),
+    reference("taken_response_id", "Cause: a response", to="response.response_id"),
+    reference("publication_id", "Effect: a publication", to="publication.publication_id"),
+    reference("publisher_id", "Its publisher", to="publisher.publisher_id"),
+    reference("request_id", "Effect: a request", to="request.request_id"),
+    reference("response_id", "Effect: a response", to="response.response_id"),
+    number(
+        "candidate_count",
+        "1; 2 where the thread sends such messages by itself, too",
+        required=True,
+    ),
+    comment=(
+        "One row per message that a thread sent after it took a request or response without a "
+        "callback"
+    ),
+    info={"view": "What threads sent after they took a request or response, in no callback."},
+)
+
+Table(
     "undelivered",
     STORE,
     run_id(),
