@@ -106,6 +106,16 @@ link AS (
     FROM analysed.store.link_response
     WHERE callback_instance_id IS NOT NULL
     UNION ALL
+    SELECT
+        'link_call', CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END,
+        CASE WHEN taken_request_id IS NULL THEN 'response_taken' ELSE 'request_taken' END,
+        coalesce(taken_request_id, taken_response_id),
+        CASE WHEN publication_id IS NULL THEN 'request_sent' ELSE 'publication' END,
+        coalesce(publication_id, request_id),
+        candidate_count > 1
+    FROM analysed.store.link_call
+    WHERE response_id IS NULL
+    UNION ALL
     SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id, false
     FROM analysed.store.request
     WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL

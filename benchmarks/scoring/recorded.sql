@@ -86,4 +86,9 @@ SELECT
     CASE type WHEN 'service' THEN 'link_response' ELSE type END, 'callback_instance', cb,
     CASE type WHEN 'service' THEN 'response_sent' ELSE 'publication' END, "out", is_seen
 FROM link
-WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL;
+WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL
+UNION ALL
+SELECT 'link_call', 'response_taken', k.id, 'publication', l."out", l.seen = 1
+FROM recorded AS l
+JOIN take AS k ON l."in" = k.id
+WHERE l.t = 'link' AND k.kind = 'response';
