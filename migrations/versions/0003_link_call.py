@@ -1,6 +1,6 @@
 """What threads do with requests and responses without a callback, and how flows go on from there.
 
-Both tables are derived from others: an upgrade fills them.
+All of it is derived from other tables: an upgrade does so anew.
 """
 
 from alembic import op
@@ -12,7 +12,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Add the one table, and make the other anew."""
+    """Add a table and columns."""
     op.execute("""
         CREATE TABLE store.link_call (
             run_id BIGINT NOT NULL, taken_request_id BIGINT, taken_response_id BIGINT,
@@ -20,12 +20,6 @@ def upgrade() -> None:
             candidate_count BIGINT NOT NULL
         )
     """)
-    op.execute("DROP TABLE store.flow_call")
-    op.execute("""
-        CREATE TABLE store.flow_call (
-            run_id BIGINT NOT NULL, publication_id BIGINT NOT NULL, publisher_id BIGINT,
-            kind VARCHAR NOT NULL, callback_instance_id BIGINT, taken_request_id BIGINT,
-            taken_response_id BIGINT, caller_id BIGINT NOT NULL, route BIGINT[] NOT NULL,
-            take_id BIGINT, subscription_id BIGINT
-        )
-    """)
+    op.execute("ALTER TABLE store.flow_call ALTER COLUMN callback_instance_id DROP NOT NULL")
+    op.execute("ALTER TABLE store.flow_call ADD COLUMN taken_request_id BIGINT")
+    op.execute("ALTER TABLE store.flow_call ADD COLUMN taken_response_id BIGINT")

@@ -20,8 +20,6 @@ Table(
         "Callback instance of the service; NULL: what was taken led to it without one",
         to="callback_instance.callback_instance_id",
     ),
-    reference("taken_request_id", "Request that the service took", to="request.request_id"),
-    reference("taken_response_id", "Response that the caller took", to="response.response_id"),
     reference(
         "caller_id",
         "Callback instance that called",
@@ -31,6 +29,8 @@ Table(
     route(),
     reference("take_id", "Message that the caller processed; NULL: none", to="take.take_id"),
     reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
+    reference("taken_request_id", "Request that the service took", to="request.request_id"),
+    reference("taken_response_id", "Response that the caller took", to="response.response_id"),
     comment=(
         "One row per publication that a call led to, callback instance that called, and way it "
         "did so"
