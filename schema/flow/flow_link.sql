@@ -1,6 +1,6 @@
 -- name: derive.flow_link
 -- description: All links in one shape: publication to take, take or request to the callback
---     instance that it was for, callback instance (or a take outside of any) to publication,
+--     instance that it was for, callback instance (or a take without one) to publication,
 --     callback instance to request or response. Where no service callback was traced, a request
 --     leads to its response. What was sent after a request or response was taken, in no callback,
 --     follows from that. Self loops are left out: flows do not pass through them.

@@ -178,7 +178,7 @@ SELECT
     a.link_kind,
     CASE
         WHEN a.link_kind IN (
-            'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent'
+            'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent', 'polled'
         )
             THEN d.start_ns - f.end_ns
         WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns

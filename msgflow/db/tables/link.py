@@ -121,7 +121,7 @@ Table(
     ),
     reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
     reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
-    text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
+    text("kind", "'direct', 'periodic_async', 'partial_sync', 'take_adjacent' or 'polled'", required=True),
     reference(
         "annotation_id",
         "Annotation that declares it; NULL for direct links",
@@ -133,7 +133,7 @@ Table(
         "indirect link and had no message when the publishing callback began",
     ),
     flag("is_loss_affected", "A gap of the trace may hide a better partner"),
-    comment="One row per callback instance, or take outside of any, and publication that it led to",
+    comment="One row per callback instance, or take without one, and publication that it led to",
 )
 
 Table(
