@@ -80,25 +80,24 @@ behind AS MATERIALIZED (
     FROM sent AS s
     ASOF JOIN turn AS t ON s.thread_id = t.thread_id AND s.sent_ns > t.at_ns
 ),
-independent AS (
-    SELECT DISTINCT thread_id, kind, object_id
-    FROM behind
-    WHERE taken_request_id IS NULL AND taken_response_id IS NULL
-),
-linked AS (
-    SELECT b.*, h.process_id
+-- Where something may be missing between the two, nothing is known.
+behind_gap AS (
+    SELECT b.thread_id, b.sent_ns
     FROM behind AS b
     JOIN store.thread AS h ON b.thread_id = h.thread_id
-    LEFT JOIN store.response AS r ON b.response_id = r.response_id
-    -- That a request leads to its own response goes without saying.
-    WHERE b.taken_response_id IS NOT NULL OR b.taken_request_id IS DISTINCT FROM r.request_id
-),
-behind_gap AS (
-    SELECT l.thread_id, l.sent_ns
-    FROM linked AS l
     ASOF JOIN derive.process_gap(only_run) AS g
-        ON l.process_id = g.process_id AND l.sent_ns > g.start_ns
-    WHERE g.start_ns >= l.at_ns OR g.covered_until_ns > l.at_ns
+        ON h.process_id = g.process_id AND b.sent_ns > g.start_ns
+    WHERE g.start_ns >= b.at_ns OR g.covered_until_ns > b.at_ns
+),
+known AS MATERIALIZED (
+    SELECT b.*
+    FROM behind AS b
+    ANTI JOIN behind_gap AS g ON b.thread_id = g.thread_id AND b.sent_ns = g.sent_ns
+),
+independent AS (
+    SELECT DISTINCT thread_id, kind, object_id
+    FROM known
+    WHERE taken_request_id IS NULL AND taken_response_id IS NULL
 )
 SELECT
     only_run AS run_id,
@@ -109,7 +108,9 @@ SELECT
     l.request_id,
     l.response_id,
     (1 + (i.thread_id IS NOT NULL)::BIGINT) AS candidate_count
-FROM linked AS l
-ANTI JOIN behind_gap AS g ON l.thread_id = g.thread_id AND l.sent_ns = g.sent_ns
+FROM known AS l
 LEFT JOIN independent AS i
     ON l.thread_id = i.thread_id AND l.kind = i.kind AND l.object_id = i.object_id
+LEFT JOIN store.response AS r ON l.response_id = r.response_id
+-- That a request leads to its own response goes without saying.
+WHERE l.taken_response_id IS NOT NULL OR l.taken_request_id IS DISTINCT FROM r.request_id
