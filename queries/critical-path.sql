@@ -33,7 +33,8 @@
 -- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap
 -- column: hop BIGINT               Number of the message on the path that it belongs or leads to
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
---     'service', 'publish' or its layer, 'publish_to_take' or 'take_to_callback'
+--     'service', 'response_to_take', 'publish' or its layer, 'publish_to_take' or
+--     'take_to_callback'
 -- column: activity VARCHAR         What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'blocked' (a callback ran that excludes the waiting
 --     one) or 'undecided' (nothing shows when the message arrived); in a cache 'timer' (not due

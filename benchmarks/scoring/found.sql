@@ -109,15 +109,28 @@ link AS (
     FROM analysed.store.link_causal
     WHERE callback_instance_id IS NULL
     UNION ALL
-    SELECT 'link_request', 'request', 'callback_instance', callback_instance_id, 'request_sent',
-        request_id, false
-    FROM analysed.store.link_request
-    WHERE callback_instance_id IS NOT NULL
+    -- Several services may take one request.
+    SELECT 'link_request', 'request', 'callback_instance', l.callback_instance_id, 'request_sent',
+        min(l.request_id), false
+    FROM analysed.store.link_request AS l
+    JOIN analysed.store.request AS q ON l.request_id = q.request_id
+    WHERE l.callback_instance_id IS NOT NULL
+    GROUP BY l.callback_instance_id, q.sender_thread_id, q.sent_ns
     UNION ALL
     SELECT 'link_response', 'response', 'callback_instance', callback_instance_id,
         'response_sent', response_id, false
     FROM analysed.store.link_response
     WHERE callback_instance_id IS NOT NULL
+    UNION ALL
+    SELECT
+        'link_call', CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END,
+        CASE WHEN taken_request_id IS NULL THEN 'response_taken' ELSE 'request_taken' END,
+        coalesce(taken_request_id, taken_response_id),
+        CASE WHEN publication_id IS NULL THEN 'request_sent' ELSE 'publication' END,
+        coalesce(publication_id, request_id),
+        candidate_count > 1
+    FROM analysed.store.link_call
+    WHERE response_id IS NULL
     UNION ALL
     SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id, false
     FROM analysed.store.request

@@ -80,10 +80,25 @@ SELECT
     CASE kind WHEN 'request' THEN 'link_request' ELSE 'direct' END, 'callback_instance', cb,
     CASE kind WHEN 'request' THEN 'request_sent' ELSE 'publication' END, id, seen = 1
 FROM pub
-WHERE cb IS NOT NULL AND kind <> 'response'
+-- What clients do with a response is in no callback that is traced.
+WHERE kind <> 'response' AND cb IN (SELECT id FROM callback WHERE kind <> 'client')
 UNION ALL
 SELECT
     CASE type WHEN 'service' THEN 'link_response' ELSE type END, 'callback_instance', cb,
     CASE type WHEN 'service' THEN 'response_sent' ELSE 'publication' END, "out", is_seen
 FROM link
-WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL;
+WHERE type NOT LIKE 'direct%' AND cb IS NOT NULL
+UNION ALL
+SELECT 'link_call', 'response_taken', k.id, 'publication', l."out", l.seen = 1
+FROM recorded AS l
+JOIN take AS k ON l."in" = k.id
+WHERE l.t = 'link' AND k.kind = 'response'
+UNION ALL
+-- What a callback still has of an earlier one does not show.
+SELECT 'polled', 'take', l."in", 'publication', l."out", l.seen = 1 AND k.host = c.host
+    AND k.vpid = c.vpid AND k.vtid = c.vtid AND list_min(map_values(k.ev)) > c."start"
+FROM recorded AS l
+JOIN take AS k ON l."in" = k.id
+JOIN pub AS b ON l."out" = b.id
+JOIN callback AS c ON b.cb = c.id
+WHERE l.t = 'link' AND l.type = 'polled';

@@ -318,6 +318,25 @@ doubtful AS (
     WHERE c.kind IN ('periodic_async', 'partial_sync')
         AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
 ),
+-- What threads sent after they took a request or response, in no callback.
+call AS (
+    SELECT
+        row_number() OVER () AS id,
+        CASE WHEN is_response THEN 'response_taken' ELSE 'request_taken' END AS taken_kind,
+        request_id::VARCHAR AS taken_id,
+        CASE WHEN publication_id IS NULL THEN 'request_sent' ELSE 'publication' END AS sent_kind,
+        coalesce(publication_id, sent_request_id)::VARCHAR AS sent_id
+    FROM simulated_link_call
+),
+doubtful_call AS (
+    SELECT DISTINCT c.id
+    FROM call AS c
+    JOIN truth_event AS t ON c.taken_kind = t.kind AND c.taken_id = t.id
+    JOIN truth_event AS e ON c.sent_kind = e.kind AND c.sent_id = e.id
+    JOIN truth_hole AS h
+        ON e.host = h.host AND coalesce(e.pid = h.pid, true)
+        AND t.ts_ns < h.end_ns AND e.ts_ns > h.begin_ns
+),
 -- Who is annotated says so once, by handles.
 untold_process AS (
     FROM unknown_process
@@ -408,6 +427,14 @@ JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.i
 JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id
 WHERE c.callback_instance_id IS NULL
 UNION ALL
+-- What a thread turned to before or meanwhile may be missing.
+SELECT
+    'link_call', t.kind, t.id, e.kind, e.id,
+    t.is_whole AND e.is_whole AND c.id NOT IN (SELECT id FROM doubtful_call), NULL
+FROM call AS c
+JOIN recorded AS t ON c.taken_kind = t.kind AND c.taken_id = t.id
+JOIN recorded AS e ON c.sent_kind = e.kind AND c.sent_id = e.id
+UNION ALL
 SELECT
     split_part(s.kind, '_', 1), s.kind, s.id, t.kind, t.id, s.is_any AND t.is_any,
     NULL
@@ -430,7 +457,8 @@ SELECT
 FROM simulated_request AS q
 JOIN recorded AS s ON s.kind = 'response_sent' AND q.request_id::VARCHAR = s.id
 JOIN recorded AS t ON t.kind = 'request_taken' AND q.request_id::VARCHAR = t.id
-LEFT JOIN whole_callback AS w ON q.callback_instance_id::VARCHAR = w.id;
+LEFT JOIN whole_callback AS w ON q.callback_instance_id::VARCHAR = w.id
+WHERE q.callback_instance_id IS NOT NULL;
 
 -- Instances that a loss may have torn in two.
 CREATE OR REPLACE TEMP TABLE truth_torn AS

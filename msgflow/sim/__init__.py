@@ -50,9 +50,10 @@ a topic has a take or a row here:
     ring buffer), 'take_failed' (expired, and the take found nothing), 'expired' (and the take
     found a newer message), 'subscription_ended', 'pending_at_end'
 causal — one row per publication made inside a callback, or with a message taken without one, and
-one per message of another input that it was made of (annotated nodes):
+one per message of another input that it was made of (annotated nodes), or that the callback took:
     callback_instance_id, publication_id, host, pid, tid (of the callback), kind ('direct';
-    'take_adjacent' without a callback; 'periodic_async', 'partial_sync' of another input),
+    'take_adjacent' without a callback; 'periodic_async', 'partial_sync' of another input; 'polled'
+    without a callback, the last message of each topic that the publishing callback took itself),
     callback_start_ns, take_id, take_rmw_ns (NULL for timers), topic_name,
     publication_rcl_ns, publication_rmw_ns, is_internal, is_reuse (an earlier publication by the
     same link used the message too; a program that empties its caches uses it only once)
@@ -63,6 +64,9 @@ request — one row per request:
 response — one row per request that was answered:
     request_id, service_name, client_gid, sequence_number, source_timestamp_ns,
     service_{host,pid,tid}, sent_ns, client_{host,pid,tid}, taken_ns
+link_call — one row per publication or request that followed from a request, or a response, without
+a callback that is traced:
+    request_id (which was taken, or answered), is_response, publication_id, sent_request_id
 lifecycle_transition — one row per change of state of a managed node:
     host, pid, tid, node, at_ns, start_state, goal_state
 end_to_end — one row per flow from a run of a timer's callback (one that uses no messages) to a
@@ -104,6 +108,7 @@ from msgflow.sim.entity import (
     Client,
     MessageLink,
     Poll,
+    Publish,
     Publisher,
     Service,
     Spin,
@@ -129,6 +134,7 @@ __all__ = [
     "Node",
     "Poll",
     "Process",
+    "Publish",
     "Publisher",
     "Recording",
     "Scenario",

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from msgflow.sim.entity import Call, Poll, Spin, Transition
+from msgflow.sim.entity import Call, Poll, Publish, Spin, Transition
+from msgflow.sim.publication import publish
 from msgflow.sim.services import ClientObject, call
 from msgflow.sim.take import take
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from msgflow.sim.executor import Executor
     from msgflow.sim.executor_thread import ExecutorThread
     from msgflow.sim.machine import Steps
-    from msgflow.sim.objects import SubscriptionObject
+    from msgflow.sim.objects import PublisherObject, SubscriptionObject
     from msgflow.sim.transport import Middleware
 
 _LONGEST_WAIT_NS = 1_000_000_000
@@ -43,6 +44,7 @@ class NodeObjects:
     """What actions of the callbacks of a node refer to."""
 
     executors: Sequence[Executor]
+    publishers: dict[str, PublisherObject]
     clients: dict[str, ClientObject] = field(default_factory=dict)
     polled: dict[str, SubscriptionObject] = field(default_factory=dict)
     lifecycle: Lifecycle | None = None
@@ -97,13 +99,27 @@ def _poll(
     thread: ExecutorThread,
     middleware: Middleware,
     time: int,
-    _: CallbackInstance | None,
+    instance: CallbackInstance | None,
 ) -> Steps:
     subscription = objects.polled[action.topic]
     taken, time = take(thread, middleware, subscription, time)
     if taken is not None:
         taken.write(thread, subscription, None)
+        if instance is not None:
+            instance.polled[action.topic] = taken
     return time + 500
+    yield  # It takes no step, but is called as one that does.
+
+
+def _publish(
+    action: Publish,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    middleware: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    return publish(thread, middleware, objects.publishers[action.topic], time, instance)
     yield  # It takes no step, but is called as one that does.
 
 
@@ -137,5 +153,6 @@ _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Call: _call,
     Spin: _spin,
     Poll: _poll,
+    Publish: _publish,
     Transition: _transition,
 }

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from msgflow.sim.take import Taken
 
 
 @dataclass(slots=True)
@@ -25,12 +29,16 @@ Origin = tuple[Root, tuple[str, ...]]
 class CallbackInstance:
     """A run of a callback that is going on; what it publishes is caused by it.
 
-    Without `callback_instance_id`, what is done with a message that was taken without a callback.
+    Without `callback_instance_id`, what is done with something that was taken without a callback:
+    a message, a request or a response.
 
     Attributes:
         origins: where the flows that lead to it began, or begin with it.
         start: time of callback_start, or of the take.
         causes: what else its next publication is made of.
+        request_id: the request that was taken, or answered by the response that was.
+        is_response: it was a response.
+        polled: by topic, the message that was taken last in the callback itself.
     """
 
     callback_instance_id: int | None
@@ -41,6 +49,9 @@ class CallbackInstance:
     tid: int
     start: int = 0
     causes: tuple[Cause, ...] = ()
+    request_id: int | None = None
+    is_response: bool = False
+    polled: dict[str, Taken] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +68,15 @@ class Cause:
 
 def origins_on(instance: CallbackInstance, topic: str) -> tuple[Origin, ...]:
     """The flows that a message is part of; a timer is no begin where it uses messages."""
-    if not instance.causes:
+    if not instance.causes and not instance.polled:
         return tuple((root, (*path, topic)) for root, path in instance.origins)
-    inputs = [cause.instance for cause in instance.causes]
+    inputs = [cause.instance.origins for cause in instance.causes]
+    inputs += [taken.message.origins for taken in instance.polled.values()]
     if instance.take_id is not None:
-        inputs.insert(0, instance)
+        inputs.insert(0, instance.origins)
     origins = {
         (root.callback_instance_id, path): (root, (*path, topic))
         for each in inputs
-        for root, path in each.origins
+        for root, path in each
     }
     return tuple(origins.values())

@@ -5,7 +5,7 @@ What DDS and the middleware layer do for each is in `Creator` too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from msgflow.sim import entity, symbols
@@ -66,7 +66,9 @@ class NodeContext:
             number = node.executor if group.executor is None else group.executor
             groups[group.name] = (CallbackGroup(group.is_reentrant), executors[number])
         own = tuple(link for link in links if node.full_name in {link.filled_by, link.used_by})
-        return cls(node, handle, groups, NodeObjects(executors), own)
+        publishers: dict[str, PublisherObject] = {}
+        objects = NodeObjects(executors, publishers)
+        return cls(node, handle, groups, objects, own, publishers)
 
 
 class Creator:
@@ -227,10 +229,13 @@ class Creator:
             self._entity(event, memory.allocate(), dds_topic, self._process.gid(kind))
         rmw_handle = memory.allocate()
         self.emit("rcl_service_init", handle, node.handle, rmw_handle, name)
-        self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
-        self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
         group, executor = node.groups[description.group]
         code = self._code(node, description, executor)
+        if description.is_action:
+            code = replace(code, is_callback=False)
+        else:
+            self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
+            self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
         return ServiceObject(
             self._network, self._process, executor, group, node.description.full_name, name,
             handle, rmw_handle, callback, memory.on_stack(), code,
@@ -255,9 +260,11 @@ class Creator:
         self.emit("rmw_client_init", rmw_handle, gid[:16])
         self.emit("rcl_client_init", handle, node.handle, rmw_handle, name)
         group, executor = node.groups[description.group]
+        actions = deeds(description.does, node.objects)
         code = UserCode(
-            entity.Work(), tuple(node.publishers[topic] for topic in description.publishes), None
-        )
+            entity.Work(), tuple(node.publishers[topic] for topic in description.publishes), None,
+            actions, bool(actions),
+        )  # fmt: skip
         client = ClientObject(
             self._network, self._process, executor, group, node.description.full_name, name,
             handle, rmw_handle, gid[:16], memory.on_stack(), code,

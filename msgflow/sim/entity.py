@@ -67,11 +67,18 @@ class Poll:
 
 
 @dataclass(frozen=True, slots=True)
+class Publish:
+    """Publish on a topic of the node, after what was done before."""
+
+    topic: str
+
+
+@dataclass(frozen=True, slots=True)
 class Transition:
     """Take a managed node to its next state: configured, active, inactive, active, and so on."""
 
 
-Action = Call | Spin | Poll | Transition
+Action = Call | Spin | Poll | Publish | Transition
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +195,11 @@ class Timer:
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """A service of a node and what its callback does; see `Subscription`."""
+    """A service of a node and what its callback does; see `Subscription`.
+
+    Attributes:
+        is_action: it is of an action server, whose callbacks are not traced.
+    """
 
     name: str
     publishes: tuple[str, ...] = ()
@@ -196,12 +207,17 @@ class Service:
     logs: bool = False
     does: tuple[Action, ...] = ()
     group: str = ""
+    is_action: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Client:
-    """A client of a service; the thread that takes a response then publishes, in no callback."""
+    """A client of a service, and what the thread does that took a response; see `Subscription`.
+
+    It does so in no callback that is traced.
+    """
 
     service: str
     publishes: tuple[str, ...] = ()
+    does: tuple[Action, ...] = ()
     group: str = ""

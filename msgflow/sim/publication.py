@@ -77,12 +77,22 @@ def write_publication(
     )  # fmt: skip
     if instance is None:
         return
+    if instance.request_id is not None:
+        truth.link_call.add(
+            instance.request_id, instance.is_response, message.publication_id, None
+        )
+        return
     truth.causal.add(
         instance.callback_instance_id, message.publication_id, hostname, pid, tid,
         "take_adjacent" if instance.callback_instance_id is None else "direct",
         instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
         message.rcl_ns, message.rmw_ns, is_internal, False,
     )  # fmt: skip
+    for taken in instance.polled.values():
+        truth.causal.add(
+            None, message.publication_id, hostname, pid, tid, "polled", None, taken.take_id,
+            taken.rmw_ns, topic, message.rcl_ns, message.rmw_ns, is_internal, False,
+        )  # fmt: skip
     for cause in instance.causes:
         used = cause.instance
         truth.causal.add(

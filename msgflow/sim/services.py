@@ -10,13 +10,13 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from msgflow.sim.callback_instance import CallbackInstance
 from msgflow.sim.callbacks import run_callback
 from msgflow.sim.latency import latency_between
 from msgflow.sim.machine import Run, settle
 from msgflow.sim.user_code import execute
 
 if TYPE_CHECKING:
-    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.executor import CallbackGroup, Executor
     from msgflow.sim.machine import RunningProcess, Steps, Thread
     from msgflow.sim.objects import UserCode
@@ -148,6 +148,10 @@ def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstanc
         next(thread.scheduler.request_ids), client, client.sequence_number,
         None if cause is None else cause.callback_instance_id, thread.tid, sent + machine.epoch,
     )  # fmt: skip
+    if cause is not None and cause.request_id is not None:
+        thread.scheduler.truth.link_call.add(
+            cause.request_id, cause.is_response, None, request.request_id
+        )
     client.network.send_request(sent, request)
     return sent + 2_000 + int(random() * 4_000)
 
@@ -164,13 +168,18 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
         service.rmw_handle, service.message, client.gid, request.sequence_number, 1,
     )  # fmt: skip
     request.service, request.taken_tid, request.taken_ns = service, thread.tid, time + epoch
-    request.callback_instance_id = next(thread.scheduler.callback_instance_ids)
-    end = yield from settle(
-        run_callback(
-            thread, middleware, service.code, time + 600 + int(random() * 1_500),
-            service.callback, service.node, "service", instance_id=request.callback_instance_id,
-        )
-    )  # fmt: skip
+    start = time + 600 + int(random() * 1_500)
+    if service.code.is_callback:
+        request.callback_instance_id = next(thread.scheduler.callback_instance_ids)
+        end = yield from settle(
+            run_callback(
+                thread, middleware, service.code, start, service.callback, service.node, "service",
+                instance_id=request.callback_instance_id,
+            )
+        )  # fmt: skip
+    else:
+        turn = _turn(thread, request, time, is_response=False)
+        end = yield from settle(execute(thread, middleware, service.code, start, turn))
     stamp = end + 300 + int(random() * 500)
     sent = stamp + 60 + int(random() * 300)
     request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + epoch
@@ -194,7 +203,16 @@ def run_client(thread: Thread, middleware: Middleware, client: ClientObject, tim
     )  # fmt: skip
     request.received_tid, request.received_ns = thread.tid, time + machine.epoch
     client.answered = request.sequence_number
-    return execute(thread, middleware, client.code, time + 1_000, None)
+    turn = _turn(thread, request, time, is_response=True)
+    return execute(thread, middleware, client.code, time + 1_000, turn)
+
+
+def _turn(thread: Thread, request: Request, time: int, *, is_response: bool) -> CallbackInstance:
+    """What a thread does with what it took, without a callback that is traced."""
+    return CallbackInstance(
+        None, None, (), None, None, thread.tid, time,
+        request_id=request.request_id, is_response=is_response,
+    )  # fmt: skip
 
 
 def write_request(truth: Truth, request: Request) -> None:

@@ -13,6 +13,7 @@ from msgflow.sim.entity import (
     Call,
     Client,
     MessageLink,
+    Publish,
     Publisher,
     Service,
     Subscription,
@@ -256,11 +257,12 @@ def _check_topics(node: Node) -> None:
         *node.timers,
         *node.services,
     )
-    used = {topic for callback in (*callbacks, *node.clients) for topic in callback.publishes}
+    actions = [action for each in (*callbacks, *node.clients) for action in each.does]
+    used = {topic for each in (*callbacks, *node.clients) for topic in each.publishes}
+    used |= {action.topic for action in actions if isinstance(action, Publish)}
     if missing := sorted(used - own):
         raise UsageError(f"no publisher of {', '.join(missing)} — node {node.full_name}")
     clients = {client.service for client in node.clients}
-    actions = (action for callback in callbacks for action in callback.does)
     calls = {action.service for action in actions if isinstance(action, Call)}
     if missing := sorted(calls - clients):
         raise UsageError(f"no client of {', '.join(missing)} — node {node.full_name}")

@@ -92,6 +92,9 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         service_host=_TEXT, service_pid=_NUMBER, service_tid=_NUMBER, sent_ns=_TIME,
         client_host=_TEXT, client_pid=_NUMBER, client_tid=_NUMBER, taken_ns=_TIME,
     ),
+    "link_call": _schema(
+        request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID
+    ),
     "lifecycle_transition": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, at_ns=_TIME, start_state=_TEXT,
         goal_state=_TEXT,

@@ -7,11 +7,9 @@ WITH pair AS (
     FROM store.link_causal
     WHERE take_id IS NOT NULL
     UNION
-    SELECT l.run_id, t.subscription_id, l.publisher_id
-    FROM derive.flow_caller AS c
-    JOIN store.callback_instance AS i ON c.caller_id = i.callback_instance_id
-    JOIN store.take AS t ON i.take_id = t.take_id
-    JOIN store.link_causal AS l ON c.callback_instance_id = l.callback_instance_id
+    SELECT run_id, subscription_id, publisher_id
+    FROM store.flow_call
+    WHERE take_id IS NOT NULL
 )
 SELECT p.run_id, p.subscription_id, p.publisher_id
 FROM pair AS p

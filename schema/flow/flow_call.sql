@@ -1,7 +1,8 @@
 -- name: derive.flow_call
 -- kind: macro
--- description: Publications that the callbacks of services led to. Each has the callback instance
---     on whose request they ran, and the message that this instance was for, if any.
+-- description: Publications that calls of services led to: of the services, and of clients that
+--     got the response. Each has the callback instance that called first, and the message that this
+--     instance was for, if any.
 -- grain: one row per publication, callback instance that called for it, and way it did so
 
 -- What a join looks up stays in memory until the query ends, and how often services were called is
@@ -21,7 +22,9 @@ taking AS (
 ),
 published AS (
     SELECT
-        l.run_id, l.callback_instance_id, l.publication_id, l.publisher_id, l.kind
+        l.run_id, derive.vertex_key('callback_instance', l.callback_instance_id) AS called_key,
+        l.callback_instance_id, NULL::BIGINT AS taken_request_id,
+        NULL::BIGINT AS taken_response_id, l.publication_id, l.publisher_id, l.kind
     FROM store.link_causal AS l
     SEMI JOIN (
         SELECT callback_instance_id
@@ -29,11 +32,21 @@ published AS (
         WHERE run_id = only_run AND request_id IS NOT NULL
     ) AS i ON l.callback_instance_id = i.callback_instance_id
     WHERE l.run_id = only_run
+    UNION ALL
+    SELECT
+        run_id,
+        coalesce(
+            derive.vertex_key('request', taken_request_id),
+            derive.vertex_key('response', taken_response_id)
+        ),
+        NULL, taken_request_id, taken_response_id, publication_id, publisher_id, 'take_adjacent'
+    FROM store.link_call
+    WHERE run_id = only_run AND publication_id IS NOT NULL
 )
 SELECT
-    p.run_id, p.publication_id, p.publisher_id, p.kind, p.callback_instance_id, c.caller_id,
-    c.route, t.take_id, t.subscription_id
+    p.run_id, p.publication_id, p.publisher_id, p.kind, p.callback_instance_id,
+    p.taken_request_id, p.taken_response_id, c.caller_id, c.route, t.take_id, t.subscription_id
 FROM derive.flow_caller AS c
 JOIN taking AS t ON c.caller_id = t.callback_instance_id
-JOIN published AS p ON c.callback_instance_id = p.callback_instance_id
+JOIN published AS p ON c.called_key = p.called_key
 WHERE c.run_id = only_run

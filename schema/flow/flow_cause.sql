@@ -1,6 +1,6 @@
 -- name: derive.flow_cause
 -- description: Causes of publications, each once, however many annotations declare it.
--- grain: one row per callback instance, or take outside of any, publication that it led to, and
+-- grain: one row per callback instance, or take without one, publication that it led to, and
 --     kind of link
 SELECT
     run_id, callback_instance_id, take_id, publication_id, kind, candidate_count,

@@ -1,8 +1,9 @@
 -- name: derive.flow_link
 -- description: All links in one shape: publication to take, take or request to the callback
---     instance that it was for, callback instance (or a take outside of any) to publication,
+--     instance that it was for, callback instance (or a take without one) to publication,
 --     callback instance to request or response. Where no service callback was traced, a request
---     leads to its response. Self loops are left out: flows do not pass through them.
+--     leads to its response. What was sent after a request or response was taken, in no callback,
+--     follows from that. Self loops are left out: flows do not pass through them.
 -- grain: one row per cause, effect and kind of link
 SELECT
     run_id,
@@ -59,3 +60,16 @@ SELECT
     'service'
 FROM store.response
 WHERE callback_instance_id IS NULL AND request_id IS NOT NULL
+UNION ALL
+SELECT
+    run_id,
+    CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END,
+    coalesce(taken_request_id, taken_response_id),
+    CASE
+        WHEN publication_id IS NOT NULL THEN 'publication'
+        WHEN request_id IS NOT NULL THEN 'request'
+        ELSE 'response'
+    END,
+    coalesce(publication_id, request_id, response_id),
+    'take_adjacent'
+FROM store.link_call

@@ -9,12 +9,13 @@
 CREATE OR REPLACE MACRO derive.flow_root(only_run) AS TABLE
 WITH called AS (
     SELECT run_id, publication_id, publisher_id, caller_id, take_id, route
-    FROM store.flow_call AS l
-    ANTI JOIN derive.flow_caller AS f ON l.caller_id = f.callback_instance_id
-    WHERE l.run_id = only_run
+    FROM store.flow_call
+    WHERE run_id = only_run
 ),
 caller AS (
-    SELECT DISTINCT callback_instance_id FROM derive.flow_caller
+    SELECT DISTINCT called_key // 8 AS callback_instance_id
+    FROM derive.flow_caller
+    WHERE derive.vertex_kind(called_key) = 'callback_instance'
 ),
 -- Each publication, and once more for each cause that it has. They are grouped, not joined: what a
 -- join looks up stays in memory until the query ends.

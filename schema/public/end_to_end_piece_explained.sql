@@ -28,7 +28,8 @@
 --     (publishing, layer not known), 'publish_to_take' (from its end to the take: the network, an
 --     idle executor or a busy one, see main.executor_wait), 'take_to_callback', 'request_to_take'
 --     (from the sending of a request), 'service' (from the start of the service callback to what
---     it publishes or calls)
+--     it publishes or calls, or to the sending of the response), 'response_to_take' (from there on;
+--     what the client does then is a 'callback' again, from the take on)
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
@@ -57,15 +58,23 @@ callback AS NOT MATERIALIZED (
 -- Publications to which their own callback did not lead directly: what led to each instead, of the
 -- callback instance that the flow came in with.
 roundabout AS MATERIALIZED (
-    SELECT c.publication_id, c.entered_id, c.publishing_id, c.kind
+    SELECT c.publication_id, c.entered_id, c.publishing_id, c.publishing_key, c.kind
     FROM (
         SELECT
             publication_id, callback_instance_id AS entered_id,
-            callback_instance_id AS publishing_id, kind
+            callback_instance_id AS publishing_id,
+            derive.vertex_key('callback_instance', callback_instance_id) AS publishing_key, kind
         FROM store.link_causal
         WHERE list_contains(runs, run_id) AND kind <> 'direct'
         UNION ALL
-        SELECT publication_id, caller_id, callback_instance_id, kind
+        SELECT
+            publication_id, caller_id, callback_instance_id,
+            coalesce(
+                derive.vertex_key('callback_instance', callback_instance_id),
+                derive.vertex_key('request', taken_request_id),
+                derive.vertex_key('response', taken_response_id)
+            ),
+            kind
         FROM store.flow_call
         WHERE list_contains(runs, run_id)
     ) AS c
@@ -78,33 +87,78 @@ roundabout AS MATERIALIZED (
     WHERE c.entered_id IS NOT NULL
     QUALIFY row_number() OVER (
         PARTITION BY c.publication_id, c.entered_id
-        ORDER BY c.publishing_id <> c.entered_id, c.kind <> 'direct', c.publishing_id
+        ORDER BY
+            c.publishing_key <> derive.vertex_key('callback_instance', c.entered_id),
+            c.kind <> 'direct',
+            c.publishing_key
     ) = 1
 ),
--- Calls of services between the two, from the last one back to the first.
-leg (publishing_id, caller_id, level, request_id, service_id, sender_id) AS (
-    SELECT c.publishing_id, c.entered_id, 1, i.request_id, c.publishing_id, l.callback_instance_id
+-- The request that each thing came from, and what sent it.
+origin AS MATERIALIZED (
+    SELECT a.called_key, a.request_id, s.sender_key
     FROM (
-        SELECT DISTINCT publishing_id, entered_id FROM roundabout WHERE publishing_id <> entered_id
-    ) AS c
-    JOIN store.callback_instance AS i ON c.publishing_id = i.callback_instance_id
-    JOIN store.link_request AS l ON i.request_id = l.request_id
-    UNION
-    SELECT g.publishing_id, g.caller_id, g.level + 1, i.request_id, g.sender_id,
-        l.callback_instance_id
-    FROM leg AS g
-    JOIN store.callback_instance AS i ON g.sender_id = i.callback_instance_id
-    JOIN store.link_request AS l ON i.request_id = l.request_id
-    WHERE g.sender_id <> g.caller_id
+        SELECT
+            derive.vertex_key('callback_instance', callback_instance_id) AS called_key, request_id
+        FROM store.callback_instance
+        WHERE list_contains(runs, run_id) AND request_id IS NOT NULL
+        UNION ALL
+        SELECT derive.vertex_key('request', request_id), request_id
+        FROM store.request
+        WHERE list_contains(runs, run_id)
+        UNION ALL
+        SELECT derive.vertex_key('response', response_id), request_id
+        FROM store.response
+        WHERE list_contains(runs, run_id)
+    ) AS a
+    JOIN (
+        SELECT
+            request_id, derive.vertex_key('callback_instance', callback_instance_id) AS sender_key
+        FROM store.link_request
+        WHERE callback_instance_id IS NOT NULL
+        UNION ALL
+        SELECT
+            request_id,
+            coalesce(
+                derive.vertex_key('request', taken_request_id),
+                derive.vertex_key('response', taken_response_id)
+            )
+        FROM store.link_call
+        WHERE request_id IS NOT NULL
+    ) AS s ON a.request_id = s.request_id
 ),
+-- Calls of services between the two, from the last one back to the first.
+leg (publishing_key, caller_id, level, request_id, called_key, sender_key) AS (
+    SELECT c.publishing_key, c.entered_id, 1, o.request_id, o.called_key, o.sender_key
+    FROM (
+        SELECT DISTINCT publishing_key, entered_id
+        FROM roundabout
+        WHERE publishing_key <> derive.vertex_key('callback_instance', entered_id)
+    ) AS c
+    JOIN origin AS o ON c.publishing_key = o.called_key
+    UNION
+    SELECT g.publishing_key, g.caller_id, g.level + 1, o.request_id, o.called_key, o.sender_key
+    FROM leg AS g
+    JOIN origin AS o ON g.sender_key = o.called_key
+    WHERE g.sender_key <> derive.vertex_key('callback_instance', g.caller_id)
+),
+-- A call, and its response if that is what led on. Where no callback is traced, the service works
+-- from its take on; where nothing of it is traced, from the sending on.
 call AS (
     SELECT
-        c.publication_id, c.entered_id, g.level, q.sent_ns, q.taken_ns, i.start_ns,
+        c.publication_id, c.entered_id, g.level, q.sent_ns, q.taken_ns,
+        coalesce(i.start_ns, q.taken_ns, q.sent_ns) AS start_ns,
+        r.sent_ns AS answered_ns,
+        CASE WHEN derive.vertex_kind(g.called_key) = 'response' THEN r.taken_ns END
+            AS returned_ns,
         i.callback_instance_id, i.callback_id, i.busy_min_ns, i.busy_max_ns
     FROM roundabout AS c
-    JOIN leg AS g ON c.publishing_id = g.publishing_id AND c.entered_id = g.caller_id
+    JOIN leg AS g ON c.publishing_key = g.publishing_key AND c.entered_id = g.caller_id
     JOIN main.request AS q ON g.request_id = q.request_id
-    JOIN callback AS i ON g.service_id = i.callback_instance_id
+    LEFT JOIN main.response AS r ON g.called_key = derive.vertex_key('response', r.response_id)
+    LEFT JOIN callback AS i
+        ON CASE WHEN derive.vertex_kind(g.called_key) = 'callback_instance'
+            THEN g.called_key // 8 ELSE coalesce(r.callback_instance_id, q.callback_instance_id)
+        END = i.callback_instance_id
 ),
 cached AS (
     SELECT
@@ -119,21 +173,33 @@ cached AS (
 -- The moments at which a part begins. Those of a hop are in the order of `rank`.
 detour AS (
     SELECT
-        publication_id, entered_id, -3 * level AS rank, 'request_to_take' AS part, sent_ns AS at_ns,
+        publication_id, entered_id, -5 * level AS rank, 'request_to_take' AS part, sent_ns AS at_ns,
         callback_instance_id, callback_id, busy_min_ns, busy_max_ns, NULL::BIGINT AS about_id
     FROM call
-    WHERE sent_ns IS NOT NULL
+    WHERE sent_ns IS NOT NULL AND (taken_ns IS NOT NULL OR callback_instance_id IS NOT NULL)
     UNION ALL
     SELECT
-        publication_id, entered_id, 1 - 3 * level, 'take_to_callback', taken_ns,
+        publication_id, entered_id, 1 - 5 * level, 'take_to_callback', taken_ns,
         callback_instance_id, callback_id, NULL, NULL, NULL
     FROM call
-    WHERE taken_ns IS NOT NULL
+    WHERE taken_ns IS NOT NULL AND callback_instance_id IS NOT NULL
     UNION ALL
     SELECT
-        publication_id, entered_id, 2 - 3 * level, 'service', start_ns, callback_instance_id,
+        publication_id, entered_id, 2 - 5 * level, 'service', start_ns, callback_instance_id,
         callback_id, NULL, NULL, NULL
     FROM call
+    UNION ALL
+    SELECT
+        publication_id, entered_id, 3 - 5 * level, 'response_to_take', answered_ns, NULL, NULL,
+        NULL, NULL, NULL
+    FROM call
+    WHERE answered_ns IS NOT NULL
+    UNION ALL
+    SELECT
+        publication_id, entered_id, 4 - 5 * level, 'callback', returned_ns, NULL, NULL, NULL, NULL,
+        NULL
+    FROM call
+    WHERE returned_ns IS NOT NULL
     UNION ALL
     SELECT
         publication_id, entered_id, 0, 'cache', stored_ns, callback_instance_id, callback_id, NULL,

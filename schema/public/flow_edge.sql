@@ -3,14 +3,15 @@
 --     that a message takes.
 -- grain: one row per cause, effect and kind of link, however many annotations declare it
 -- column: run_id BIGINT  Run that the row belongs to
--- column: from_kind VARCHAR  Cause: 'publication', 'take', 'callback_instance' or 'request'
+-- column: from_kind VARCHAR  Cause: 'publication', 'take', 'callback_instance', 'request' or
+--     'response'
 -- column: from_id BIGINT  Identity of the cause
--- column: to_kind VARCHAR  Effect: one of these, or 'response'
+-- column: to_kind VARCHAR  Effect: one of these
 -- column: to_id BIGINT  Identity of the effect
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' (from a request to its response),
 --     or the kind of the causal link
--- column: from_ns BIGINT [epoch ns]  End of the publication, the take (also of a request), or start
---     of the callback instance
+-- column: from_ns BIGINT [epoch ns]  End of the publication, the take (also of a request or
+--     response), or start of the callback instance
 -- column: to_ns BIGINT [epoch ns]  Take, start of the callback instance or publication, or sending
 --     of the request or response
 SELECT
@@ -105,3 +106,23 @@ SELECT
 FROM main.response AS r
 JOIN main.request AS q ON r.request_id = q.request_id
 WHERE r.callback_instance_id IS NULL
+UNION ALL
+SELECT
+    l.run_id,
+    CASE WHEN l.taken_request_id IS NULL THEN 'response' ELSE 'request' END,
+    coalesce(l.taken_request_id, l.taken_response_id),
+    CASE
+        WHEN l.publication_id IS NOT NULL THEN 'publication'
+        WHEN l.request_id IS NOT NULL THEN 'request'
+        ELSE 'response'
+    END,
+    coalesce(l.publication_id, l.request_id, l.response_id),
+    'take_adjacent',
+    coalesce(tq.taken_ns, tr.taken_ns),
+    coalesce(b.start_ns, q.sent_ns, r.sent_ns)
+FROM main.link_call AS l
+LEFT JOIN main.request AS tq ON l.taken_request_id = tq.request_id
+LEFT JOIN main.response AS tr ON l.taken_response_id = tr.response_id
+LEFT JOIN main.publication AS b ON l.publication_id = b.publication_id
+LEFT JOIN main.request AS q ON l.request_id = q.request_id
+LEFT JOIN main.response AS r ON l.response_id = r.response_id

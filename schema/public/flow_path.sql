@@ -51,7 +51,8 @@ called AS (
             coalesce(s.service_name, '?'),
             CASE WHEN p.process_id IS NULL THEN '?'
                 ELSE derive.node_label(n.full_name, p.name, p.pid) END
-        ) AS label
+        ) AS label,
+        s.node_id
     FROM (
         SELECT
             route, unnest(route[2:]) AS service_id, unnest(range(2, len(route) + 1)) AS position
@@ -68,7 +69,8 @@ route AS (
             CASE WHEN p.process_id IS NULL THEN '?'
                 ELSE derive.node_label(n.full_name, p.name, p.pid) END
         ) AS caller,
-        string_agg(c.label, ' → ' ORDER BY c.position) AS services
+        string_agg(c.label, ' → ' ORDER BY c.position) AS services,
+        arg_max_null(c.node_id, c.position) AS last_node_id
     FROM called AS c
     LEFT JOIN store.node AS n ON c.route[1] = n.node_id
     LEFT JOIN store.process AS p ON coalesce(n.process_id, -c.route[1]) = p.process_id
@@ -89,6 +91,9 @@ step AS (
             CASE WHEN c.depth = 1
                 THEN coalesce(r.caller, derive.node_label(pn.full_name, pp.name, pp.pid)) END,
             r.services,
+            -- Who called publishes with the response that came back.
+            CASE WHEN r.services IS NOT NULL AND r.last_node_id IS DISTINCT FROM p.node_id
+                THEN derive.node_label(pn.full_name, pp.name, pp.pid) END,
             coalesce(p.topic_name, '?'),
             derive.node_label(sn.full_name, sp.name, sp.pid)
         ) AS label

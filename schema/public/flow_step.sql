@@ -78,6 +78,23 @@ aside AS MATERIALIZED (
     JOIN store.request AS q ON l.request_id = q.request_id
     JOIN store.client AS c ON q.client_id = c.client_id
     WHERE c.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
+    UNION ALL
+    SELECT
+        coalesce(
+            derive.vertex_key('request', l.taken_request_id),
+            derive.vertex_key('response', l.taken_response_id)
+        ),
+        coalesce(
+            derive.vertex_key('publication', l.publication_id),
+            derive.vertex_key('request', l.request_id)
+        )
+    FROM store.link_call AS l
+    LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    LEFT JOIN store.request AS q ON l.request_id = q.request_id
+    LEFT JOIN store.client AS c ON q.client_id = c.client_id
+    WHERE (p.is_internal OR c.is_internal)
+        AND NOT internal
+        AND l.run_id IN (SELECT run_id FROM origin)
 ),
 link AS (
     SELECT
@@ -161,12 +178,12 @@ SELECT
     a.link_kind,
     CASE
         WHEN a.link_kind IN (
-            'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent'
+            'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent', 'polled'
         )
             THEN d.start_ns - f.end_ns
         WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns
     END AS wait_ns,
-    coalesce(lt.candidate_count, lc.candidate_count) AS candidate_count,
+    coalesce(lt.candidate_count, lc.candidate_count, ls.candidate_count) AS candidate_count,
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
     d.kind,
     d.id,
@@ -193,6 +210,16 @@ LEFT JOIN derive.flow_cause AS lc
     AND a.from_id = coalesce(lc.callback_instance_id, lc.take_id)
     AND a.to_id = lc.publication_id
     AND a.link_kind = lc.kind
+LEFT JOIN store.link_call AS ls
+    ON a.from_kind IN ('request', 'response')
+    AND a.link_kind = 'take_adjacent'
+    AND a.from_id
+        = CASE a.from_kind WHEN 'request' THEN ls.taken_request_id ELSE ls.taken_response_id END
+    AND a.to_id = CASE d.kind
+        WHEN 'publication' THEN ls.publication_id
+        WHEN 'request' THEN ls.request_id
+        ELSE ls.response_id
+    END
 LEFT JOIN store.thread AS h ON d.thread_id = h.thread_id
 JOIN store.process AS q ON d.process_id = q.process_id
 JOIN store.host AS m ON q.host_id = m.host_id

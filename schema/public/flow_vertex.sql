@@ -60,7 +60,7 @@ LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN derive.flow_end AS x ON x.kind = 'take' AND t.take_id = x.id
 LEFT JOIN store.callback_instance AS i ON t.take_id = i.take_id
 LEFT JOIN (
-    SELECT DISTINCT take_id FROM store.link_causal WHERE kind = 'take_adjacent'
+    SELECT DISTINCT take_id FROM store.link_causal WHERE kind IN ('take_adjacent', 'polled')
 ) AS y
     ON t.take_id = y.take_id
 LEFT JOIN (
@@ -110,12 +110,14 @@ JOIN (
         coalesce(q.sender_thread_id, q.receiver_thread_id) AS thread_id,
         q.client_id, q.service_id,
         CASE
-            WHEN q.callback_instance_id IS NULL THEN 'callback'
+            WHEN q.callback_instance_id IS NULL AND l.taken_request_id IS NULL THEN 'callback'
             WHEN r.request_id IS NULL THEN 'response'
         END AS missing
     FROM main.request AS q
     LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
         ON q.request_id = r.request_id
+    LEFT JOIN (SELECT DISTINCT taken_request_id FROM store.link_call) AS l
+        ON q.request_id = l.taken_request_id
     UNION ALL
     SELECT
         'response', response_id, run_id, sent_ns, taken_ns,

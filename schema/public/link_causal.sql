@@ -1,6 +1,6 @@
 -- name: main.link_causal
 -- description: What led to each publication.
--- grain: one row per callback instance, or take outside of any, and publication that it led to
+-- grain: one row per callback instance, or take without one, and publication that it led to
 -- column: run_id
 -- column: callback_instance_id
 -- column: take_id
@@ -21,6 +21,7 @@ SELECT
     CASE l.kind
         WHEN 'direct' THEN 0
         WHEN 'take_adjacent' THEN b.start_ns - t.taken_ns
+        WHEN 'polled' THEN b.start_ns - t.taken_ns
         ELSE b.start_ns - i.end_ns
     END AS wait_ns,
     l.candidate_count,
@@ -29,4 +30,5 @@ FROM store.link_causal AS l
 LEFT JOIN main.callback_instance AS i
     ON l.callback_instance_id = i.callback_instance_id
 JOIN main.publication AS b ON l.publication_id = b.publication_id
-LEFT JOIN main.take AS t ON l.kind = 'take_adjacent' AND l.take_id = t.take_id
+LEFT JOIN main.take AS t
+    ON l.kind IN ('take_adjacent', 'polled') AND l.take_id = t.take_id

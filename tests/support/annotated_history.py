@@ -83,19 +83,36 @@ def _links(
             there = [run for run in runs if emptied < run.ended <= cut]
             inside = [run for run in runs if b.run in run.outer and run.ended <= read]
             since = max((run.ended, run.start) for run in there)[1] if there else 0
-            possible = [run for run in runs if run.start < read and run.ended > max(since, kept)]
+            possible = [
+                run
+                for run in runs
+                if run.start < read
+                and run.ended > max(since, kept)
+                and not (kind == "partial_sync" and _is_used(run, firings))
+            ]
             chosen = inside or there
             if kind == "partial_sync" and not chosen:
                 chosen = [run for run in possible if run.ended <= read] or possible
             if not chosen:
                 continue
             latest = max(chosen, key=lambda run: run.ended)
+            if b.run is not None and latest in b.run.outer:
+                continue
             if _is_broken(history, latest.thread, latest.start, b.at) or _is_broken(
                 history, b.thread, latest.start, b.at
             ):
                 continue
-            links.append((latest.start, b.at, kind, len(possible) + (not there)))
+            if kind == "partial_sync" and inside:
+                count = len(possible) + 1
+            else:
+                count = max(len(possible), 1) + (not there)
+            links.append((latest.start, b.at, kind, count))
     return links
+
+
+def _is_used(run: Run, firings: list[Publication]) -> bool:
+    """Tell whether a run was nested in a firing, and ended before that published last."""
+    return any(b.run in run.outer and run.ended <= b.at for b in firings)
 
 
 def _is_broken(history: History, thread: int, since: int, until: int) -> bool:

@@ -212,7 +212,7 @@ def test_arrows_are_the_links(systems: Path, read: Read) -> None:
     ).fetchall()
     messages = [arrow for arrow in arrows if arrow["link_kind"] == 0]
     assert [(len(messages), sum(one["to_at"] - one["from_at"] for one in messages))] == transport
-    codes = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent"]
+    codes = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent", "polled"]
     causes = dict(
         connection.execute(
             "SELECT kind, count(*) FROM link_causal WHERE run_id = 3 GROUP BY kind"

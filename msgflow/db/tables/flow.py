@@ -17,9 +17,8 @@ Table(
     text("kind", "Kind of the causal link to the publication", required=True),
     reference(
         "callback_instance_id",
-        "Callback instance of the service",
+        "Callback instance of the service; NULL: what was taken led to it without one",
         to="callback_instance.callback_instance_id",
-        required=True,
     ),
     reference(
         "caller_id",
@@ -30,8 +29,10 @@ Table(
     route(),
     reference("take_id", "Message that the caller processed; NULL: none", to="take.take_id"),
     reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
+    reference("taken_request_id", "Request that the service took", to="request.request_id"),
+    reference("taken_response_id", "Response that the caller took", to="response.response_id"),
     comment=(
-        "One row per publication of a service, callback instance that called for it, and way it "
+        "One row per publication that a call led to, callback instance that called, and way it "
         "did so"
     ),
 )

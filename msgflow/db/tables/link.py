@@ -121,7 +121,7 @@ Table(
     ),
     reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
     reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
-    text("kind", "'direct', 'periodic_async', 'partial_sync' or 'take_adjacent'", required=True),
+    text("kind", "'direct', 'periodic_async', 'partial_sync', 'take_adjacent' or 'polled'", required=True),
     reference(
         "annotation_id",
         "Annotation that declares it; NULL for direct links",
@@ -133,7 +133,7 @@ Table(
         "indirect link and had no message when the publishing callback began",
     ),
     flag("is_loss_affected", "A gap of the trace may hide a better partner"),
-    comment="One row per callback instance, or take outside of any, and publication that it led to",
+    comment="One row per callback instance, or take without one, and publication that it led to",
 )
 
 Table(
@@ -154,6 +154,28 @@ Table(
     reference("callback_instance_id", "Cause", to="callback_instance.callback_instance_id"),
     comment="One row per response and the callback instance that sent it",
     info={"view": "Responses and the callback instance that sent them."},
+)
+
+Table(
+    "link_call",
+    STORE,
+    run_id(),
+    reference("taken_request_id", "Cause: a request", to="request.request_id"),
+    reference("taken_response_id", "Cause: a response", to="response.response_id"),
+    reference("publication_id", "Effect: a publication", to="publication.publication_id"),
+    reference("publisher_id", "Its publisher", to="publisher.publisher_id"),
+    reference("request_id", "Effect: a request", to="request.request_id"),
+    reference("response_id", "Effect: a response", to="response.response_id"),
+    number(
+        "candidate_count",
+        "1; 2 where the thread sends such messages by itself, too",
+        required=True,
+    ),
+    comment=(
+        "One row per message that a thread sent after it took a request or response without a "
+        "callback"
+    ),
+    info={"view": "What threads sent after they took a request or response, in no callback."},
 )
 
 Table(

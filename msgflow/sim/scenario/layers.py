@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from msgflow.sim.entity import MILLISECOND, SECOND, Poll, Publisher, Subscription, Timer
+from msgflow.sim.entity import (
+    MILLISECOND,
+    SECOND,
+    Poll,
+    Publish,
+    Publisher,
+    Subscription,
+    Timer,
+)
 from msgflow.sim.system import Executor, Host, Node, Process, Scenario
 
 
@@ -89,6 +97,63 @@ def layers() -> Scenario:
                 executors=(Executor("wait_set"),),
             ),
             Process("polling", "alpha", 1401, (polling,), start_ns=11 * MILLISECOND),
+        ),
+        duration_ns=3 * SECOND,
+    )  # fmt: skip
+
+
+def polling() -> Scenario:
+    """Callbacks that take messages of other topics themselves, each the newest, and publish."""
+    first = Node(
+        "first",
+        publishers=(Publisher("/first"),),
+        timers=(Timer(9 * MILLISECOND, ("/first",)),),
+    )
+    second = Node(
+        "second",
+        publishers=(Publisher("/second"),),
+        timers=(Timer(21 * MILLISECOND, ("/second",)),),
+    )
+    planner = Node(
+        "planner",
+        publishers=(Publisher("/begun"), Publisher("/half"), Publisher("/plan")),
+        subscriptions=(
+            Subscription("/first", depth=1, polled=True),
+            Subscription("/second", polled=True),
+        ),
+        timers=(
+            Timer(
+                20 * MILLISECOND,
+                ("/begun",),
+                does=(
+                    Poll("/first"), Publish("/half"), Poll("/second"), Poll("/second"),
+                    Publish("/plan"),
+                ),
+            ),
+        ),
+    )  # fmt: skip
+    control = Node(
+        "control",
+        publishers=(Publisher("/command"),),
+        subscriptions=(
+            Subscription("/plan", does=(Poll("/first"), Publish("/command"))),
+            Subscription("/first", depth=1, polled=True),
+        ),
+    )
+    sink = Node(
+        "sink",
+        subscriptions=tuple(Subscription(topic) for topic in ("/begun", "/half", "/command")),
+    )
+    return Scenario(
+        name="polling",
+        description="Callbacks that take messages of other topics themselves, and publish.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("first", "alpha", 1101, (first,)),
+            Process("second", "alpha", 1201, (second,), start_ns=3 * MILLISECOND),
+            Process("planner", "alpha", 1301, (planner,), start_ns=7 * MILLISECOND),
+            Process("control", "alpha", 1401, (control,), start_ns=11 * MILLISECOND),
+            Process("sink", "alpha", 1501, (sink,), start_ns=13 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
     )  # fmt: skip

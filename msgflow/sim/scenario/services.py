@@ -17,6 +17,56 @@ from msgflow.sim.entity import (
 from msgflow.sim.system import Executor, Group, Host, Node, Process, Scenario
 
 
+def calls() -> Scenario:
+    """What clients do with responses, and an action server, whose callbacks are not traced."""
+    asking = Node(
+        "asking",
+        publishers=(Publisher("/tick"), Publisher("/asked"), Publisher("/result")),
+        clients=(
+            Client("/accept", ("/asked",), does=(Call("/finish"),)),
+            Client("/finish", ("/result",)),
+            Client("/sum", ("/result",)),
+        ),
+        subscriptions=(Subscription("/sensor", does=(Call("/accept"),)),),
+        timers=(Timer(30 * MILLISECOND, ("/tick",), does=(Call("/sum"),)),),
+    )
+    acting = Node(
+        "acting",
+        publishers=(Publisher("/status"), Publisher("/summed")),
+        clients=(Client("/inner"),),
+        services=(
+            Service("/accept", ("/status",), is_action=True),
+            Service("/finish", ("/status",), does=(Call("/inner"),), is_action=True),
+            Service("/sum", ("/summed",)),
+            Service("/inner"),
+        ),
+    )
+    source = Node(
+        "source",
+        publishers=(Publisher("/sensor"),),
+        timers=(Timer(20 * MILLISECOND, ("/sensor",)),),
+    )
+    sink = Node(
+        "sink",
+        subscriptions=tuple(
+            Subscription(topic) for topic in ("/tick", "/asked", "/result", "/status", "/summed")
+        ),
+    )
+    return Scenario(
+        name="calls",
+        description="Clients that publish and call with a response, and an action server.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("acting", "alpha", 1101, (acting,), executors=(Executor("multi_threaded", 2),)),
+            Process("sink", "alpha", 1201, (sink,), start_ns=3 * MILLISECOND),
+            Process("asking", "alpha", 1301, (asking,), start_ns=60 * MILLISECOND),
+            Process("source", "alpha", 1401, (source,), start_ns=80 * MILLISECOND),
+        ),
+        duration_ns=2 * SECOND,
+        layout="rolling",
+    )  # fmt: skip
+
+
 def services() -> Scenario:
     """Requests between two hosts, and transitions of a managed node."""
     planner = Node(

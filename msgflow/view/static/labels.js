@@ -12,9 +12,10 @@ export const LINKS = {
   periodic_async: "periodic (cached until the timer)",
   partial_sync: "synchronised (cached until the set was complete)",
   take_adjacent: "published after the take",
+  polled: "taken in the callback, then published",
   service: "service",
 };
-export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent"];
+export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent", "polled"];
 
 const TITLES = {
   run_id: "run", roots: "flows", loss_affected: "touched by losses",

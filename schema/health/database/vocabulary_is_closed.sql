@@ -49,7 +49,7 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'link_causal.kind', kind
     FROM store.link_causal
-    WHERE kind NOT IN ('direct', 'periodic_async', 'partial_sync', 'take_adjacent')
+    WHERE kind NOT IN ('direct', 'periodic_async', 'partial_sync', 'take_adjacent', 'polled')
     UNION ALL
     SELECT DISTINCT run_id, 'undelivered.reason', reason
     FROM store.undelivered

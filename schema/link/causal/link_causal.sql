@@ -3,7 +3,7 @@
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
 --     events where a gap touches its callback instance, or its take, or its publication. In a
 --     process that is several with equal ids, the cause may be one of another process.
--- grain: one row per callback instance, or take outside of any, and publication that it led to, and
+-- grain: one row per callback instance, or take without one, and publication that it led to, and
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
@@ -20,6 +20,10 @@ WITH link AS (
     JOIN store.take AS t ON a.take_id = t.take_id
     JOIN store.publication AS b ON a.publication_id = b.publication_id
     WHERE t.run_id = only_run AND b.run_id = only_run
+    UNION ALL
+    SELECT
+        run_id, NULL, take_id, publication_id, publisher_id, 'polled', NULL, 1, is_loss_affected
+    FROM derive.link_causal_polled(only_run)
     UNION ALL
     SELECT
         x.run_id, x.callback_instance_id, i.take_id, x.publication_id, b.publisher_id, x.kind,

@@ -11,19 +11,23 @@
 --     trace does not show when a node reads its caches. So other instances are candidates, too:
 --     those that began before the publication, and ended after the instance in the cache at the cut
 --     began. A firing needs a message of every input: if there was none at the cut, the last of the
---     candidates counts, and "no message" is one more candidate. Nothing is linked across a gap in
---     the record of either thread.
+--     candidates counts, and "no message" is one more candidate. On one thread the order of events
+--     decides: what ran nested in a firing, before it published last, was used by it and by no
+--     other; and what a firing is nested in has not ended. Nothing is linked across a gap in the
+--     record of either thread.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
-WITH nesting AS (
+WITH RECURSIVE nesting AS (
     SELECT DISTINCT parent_id
     FROM store.callback_instance
     WHERE run_id = only_run AND parent_id IS NOT NULL
 ),
 -- None are periodic_async: its caches are never emptied.
 firing AS MATERIALIZED (
-    SELECT annotation_id, callback_instance_id, first_event_id, emptied_event_id, kept_event_id
+    SELECT
+        annotation_id, callback_instance_id, first_event_id, last_event_id, emptied_event_id,
+        kept_event_id
     FROM derive.partial_sync_firing(only_run)
 ),
 -- All publications of a firing use the same messages, except for those that come meanwhile, in
@@ -60,16 +64,55 @@ run AS MATERIALIZED (
         ON a.annotation_id = f.annotation_id AND r.callback_instance_id = f.callback_instance_id
     WHERE a.run_id = only_run
 ),
+-- What nested instances of inputs run in, at any depth.
+around (callback_instance_id, outer_id) AS (
+    SELECT callback_instance_id, parent_id
+    FROM store.callback_instance
+    WHERE run_id = only_run
+        AND parent_id IS NOT NULL
+        AND callback_instance_id IN (
+            SELECT callback_instance_id FROM derive.annotated_run(only_run)
+        )
+    UNION ALL
+    SELECT a.callback_instance_id, i.parent_id
+    FROM around AS a
+    JOIN store.callback_instance AS i ON a.outer_id = i.callback_instance_id
+    WHERE i.parent_id IS NOT NULL
+),
+used AS (
+    SELECT r.annotation_id, r.callback_instance_id
+    FROM run AS r
+    JOIN around AS a ON r.callback_instance_id = a.callback_instance_id
+    JOIN firing AS f
+        ON r.annotation_id = f.annotation_id AND a.outer_id = f.callback_instance_id
+    WHERE r.effective_end_event_id <= f.last_event_id
+),
+-- Candidates beside those in a cache at the cut, or nested in the firing.
+free AS MATERIALIZED (
+    SELECT
+        r.annotation_id, r.subscription_id, r.callback_instance_id, r.start_event_id,
+        r.effective_end_event_id
+    FROM run AS r
+    ANTI JOIN used AS u
+        ON r.annotation_id = u.annotation_id AND r.callback_instance_id = u.callback_instance_id
+),
+free_ended AS (
+    SELECT
+        annotation_id, subscription_id, effective_end_event_id,
+        arg_max(callback_instance_id, start_event_id) AS callback_instance_id,
+        sum(count(*)) OVER (
+            PARTITION BY annotation_id, subscription_id
+            ORDER BY effective_end_event_id ROWS UNBOUNDED PRECEDING
+        ) AS run_count
+    FROM free
+    GROUP BY annotation_id, subscription_id, effective_end_event_id
+),
 -- Instances that end at the same moment (at a gap) count once: the last to begin stands for all.
 ended AS (
     SELECT
         annotation_id, subscription_id, effective_end_event_id,
         arg_max(callback_instance_id, start_event_id) AS callback_instance_id,
-        max(start_event_id) AS start_event_id,
-        sum(count(*)) OVER (
-            PARTITION BY annotation_id, subscription_id
-            ORDER BY effective_end_event_id ROWS UNBOUNDED PRECEDING
-        ) AS run_count
+        max(start_event_id) AS start_event_id
     FROM run
     GROUP BY annotation_id, subscription_id, effective_end_event_id
 ),
@@ -152,7 +195,7 @@ begun AS (
         row_number() OVER so_far AS run_count,
         arg_max(callback_instance_id, effective_end_event_id) OVER so_far AS last_id,
         max(effective_end_event_id) OVER so_far AS last_event_id
-    FROM run
+    FROM free
     WHERE (annotation_id, subscription_id) IN (
         SELECT (annotation_id, subscription_id) FROM there WHERE NOT is_certain
     )
@@ -184,7 +227,7 @@ possible AS (
             AND t.read_event_id > b.start_event_id
         WHERE b.last_event_id > greatest(t.input_start_event_id, t.kept_event_id)
     ) AS p
-    ASOF LEFT JOIN ended AS e
+    ASOF LEFT JOIN free_ended AS e
         ON p.annotation_id = e.annotation_id
         AND p.subscription_id = e.subscription_id
         AND p.read_event_id >= e.effective_end_event_id
@@ -194,7 +237,7 @@ counted AS (
         p.annotation_id, p.publication_id, p.subscription_id, p.callback_instance_id,
         p.begun_count - coalesce(e.run_count, 0) AS run_count
     FROM possible AS p
-    ASOF LEFT JOIN ended AS e
+    ASOF LEFT JOIN free_ended AS e
         ON p.annotation_id = e.annotation_id
         AND p.subscription_id = e.subscription_id
         AND p.since_event_id >= e.effective_end_event_id
@@ -206,9 +249,16 @@ cached AS (
         coalesce(
             n.callback_instance_id,
             d.callback_instance_id,
-            CASE WHEN d.kind = 'partial_sync' THEN p.callback_instance_id END
+            CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL
+                THEN p.callback_instance_id END
         ) AS callback_instance_id,
-        coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT AS candidate_count
+        CASE
+            WHEN d.kind = 'periodic_async' THEN
+                coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT
+            WHEN n.callback_instance_id IS NOT NULL THEN
+                1 + coalesce(p.run_count, (d.callback_instance_id IS NOT NULL)::BIGINT)
+            ELSE coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT
+        END AS candidate_count
     FROM there AS d
     LEFT JOIN counted AS p
         ON d.annotation_id = p.annotation_id
@@ -218,6 +268,8 @@ cached AS (
         ON d.annotation_id = n.annotation_id
         AND d.publication_id = n.publication_id
         AND d.subscription_id = n.subscription_id
+    LEFT JOIN around AS a
+        ON d.publishing_id = a.callback_instance_id AND p.callback_instance_id = a.outer_id
 ),
 found AS MATERIALIZED (
     SELECT

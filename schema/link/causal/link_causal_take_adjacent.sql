@@ -2,7 +2,7 @@
 -- kind: macro
 -- description: Publications that a thread makes after it took a message by hand (rclpy, rclc,
 --     wait sets), until its next take, also of a request or a response. The link ends where a
---     callback is seen to begin or an executor to go on, and at a gap. What is published inside a
+--     callback is seen to begin or end or an executor to go on, and at a gap. What is published inside a
 --     callback instance is caused by that instance instead.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
@@ -25,7 +25,8 @@ busy AS (
 turn AS (
     SELECT run_id, thread_id, event_id, take_id, taken_ns FROM by_hand
     UNION ALL
-    SELECT i.run_id, i.thread_id, i.start_event_id, NULL, NULL
+    SELECT
+        i.run_id, i.thread_id, unnest([i.start_event_id, i.effective_end_event_id]), NULL, NULL
     FROM store.callback_instance AS i
     SEMI JOIN busy AS w ON i.run_id = w.run_id AND i.thread_id = w.thread_id
     WHERE i.run_id = only_run

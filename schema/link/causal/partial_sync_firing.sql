@@ -5,7 +5,8 @@
 --     caches, at some moment between the start of the instance and its first publication.
 --     `emptied_event_id`: the last publication of another firing before the first one of this; by
 --     then the caches had been emptied. `kept_event_id`: the start of the last firing that had
---     published when this one began; what came after it may have been kept.
+--     published when this one began; what came after it may have been kept. `last_event_id`: its own
+--     last publication.
 -- grain: one row per annotation and callback instance of one of its inputs that fires it
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.partial_sync_firing(only_run) AS TABLE
@@ -24,6 +25,7 @@ fired AS (
     SELECT
         annotation_id, callback_instance_id, cut_event_id,
         min(start_event_id) AS first_event_id,
+        max(start_event_id) AS last_event_id,
         arg_min_null(previous_event_id, start_event_id) AS emptied_event_id
     FROM published
     GROUP BY annotation_id, callback_instance_id, cut_event_id
@@ -37,7 +39,8 @@ earlier AS (
     FROM fired
 )
 SELECT
-    f.annotation_id, f.callback_instance_id, f.first_event_id, f.emptied_event_id, e.kept_event_id
+    f.annotation_id, f.callback_instance_id, f.first_event_id, f.last_event_id, f.emptied_event_id,
+    e.kept_event_id
 FROM fired AS f
 ASOF LEFT JOIN earlier AS e
     ON f.annotation_id = e.annotation_id AND f.cut_event_id > e.first_event_id

@@ -1,0 +1,116 @@
+-- name: derive.link_call
+-- kind: macro
+-- when: store.request, store.response
+-- description: What a thread sends after it took a request or a response for which no callback is
+--     traced: clients and action servers of rclcpp run their callbacks right behind the take. The
+--     turn ends with the next event of the executor, the next take, and where a callback begins or
+--     ends. Threads without executors and callbacks (rclpy) have no turns that a trace would show.
+--     Nothing is linked across a gap. An object that the same thread also sends with where nothing
+--     was taken may do so here as well: then "nothing" is one more candidate.
+-- grain: one row per publication, request or response sent in such a turn
+-- param: only_run BIGINT  Run to look at
+CREATE OR REPLACE MACRO derive.link_call(only_run) AS TABLE
+WITH taken AS (
+    SELECT
+        receiver_thread_id AS thread_id, taken_ns, request_id AS taken_request_id,
+        NULL::BIGINT AS taken_response_id
+    FROM store.request
+    WHERE run_id = only_run AND taken_ns IS NOT NULL AND callback_instance_id IS NULL
+    UNION ALL
+    SELECT receiver_thread_id, taken_ns, NULL, response_id
+    FROM store.response
+    WHERE run_id = only_run AND taken_ns IS NOT NULL
+),
+-- Threads that take calls, with all that shows what they turn to.
+executing AS MATERIALIZED (
+    SELECT thread_id, start_ns AS at_ns
+    FROM store.executor_state AS e
+    SEMI JOIN taken AS k ON e.thread_id = k.thread_id
+    WHERE run_id = only_run
+    UNION ALL
+    SELECT thread_id, unnest([start_ns, end_ns])
+    FROM store.callback_instance AS i
+    SEMI JOIN taken AS k ON i.thread_id = k.thread_id
+    WHERE run_id = only_run
+),
+turn AS (
+    SELECT thread_id, taken_ns AS at_ns, taken_request_id, taken_response_id
+    FROM taken AS k
+    SEMI JOIN executing AS e ON k.thread_id = e.thread_id
+    UNION ALL
+    SELECT thread_id, at_ns, NULL, NULL FROM executing WHERE at_ns IS NOT NULL
+    UNION ALL
+    SELECT thread_id, taken_ns, NULL, NULL
+    FROM store.take AS t
+    SEMI JOIN taken AS k ON t.thread_id = k.thread_id
+    WHERE run_id = only_run
+),
+-- Inside of no callback instance.
+sent AS (
+    SELECT
+        b.thread_id, b.start_ns AS sent_ns, 'publisher' AS kind, b.publisher_id AS object_id,
+        b.publication_id, NULL::BIGINT AS request_id, NULL::BIGINT AS response_id
+    FROM store.publication AS b
+    SEMI JOIN taken AS k ON b.thread_id = k.thread_id
+    ANTI JOIN (
+        SELECT publication_id FROM store.link_causal WHERE run_id = only_run AND kind = 'direct'
+    ) AS d ON b.publication_id = d.publication_id
+    WHERE b.run_id = only_run
+    UNION ALL
+    SELECT q.sender_thread_id, q.sent_ns, 'client', q.client_id, NULL, q.request_id, NULL
+    FROM store.request AS q
+    JOIN store.link_request AS l ON q.request_id = l.request_id
+    WHERE q.run_id = only_run AND l.callback_instance_id IS NULL
+    UNION ALL
+    SELECT r.sender_thread_id, r.sent_ns, 'service', r.service_id, NULL, NULL, r.response_id
+    FROM store.response AS r
+    ANTI JOIN (
+        SELECT r.response_id
+        FROM store.link_response AS l
+        JOIN store.response AS r ON l.response_id = r.response_id
+        JOIN store.callback_instance AS i
+            ON l.callback_instance_id = i.callback_instance_id
+            AND r.sender_thread_id = i.thread_id
+        WHERE r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
+    ) AS i ON r.response_id = i.response_id
+    WHERE r.run_id = only_run AND r.sent_ns IS NOT NULL
+),
+behind AS MATERIALIZED (
+    SELECT s.*, t.at_ns, t.taken_request_id, t.taken_response_id
+    FROM sent AS s
+    ASOF JOIN turn AS t ON s.thread_id = t.thread_id AND s.sent_ns > t.at_ns
+),
+-- Where something may be missing between the two, nothing is known.
+behind_gap AS (
+    SELECT b.thread_id, b.sent_ns
+    FROM behind AS b
+    JOIN store.thread AS h ON b.thread_id = h.thread_id
+    ASOF JOIN derive.process_gap(only_run) AS g
+        ON h.process_id = g.process_id AND b.sent_ns > g.start_ns
+    WHERE g.start_ns >= b.at_ns OR g.covered_until_ns > b.at_ns
+),
+known AS MATERIALIZED (
+    SELECT b.*
+    FROM behind AS b
+    ANTI JOIN behind_gap AS g ON b.thread_id = g.thread_id AND b.sent_ns = g.sent_ns
+),
+independent AS (
+    SELECT DISTINCT thread_id, kind, object_id
+    FROM known
+    WHERE taken_request_id IS NULL AND taken_response_id IS NULL
+)
+SELECT
+    only_run AS run_id,
+    l.taken_request_id,
+    l.taken_response_id,
+    l.publication_id,
+    CASE l.kind WHEN 'publisher' THEN l.object_id END AS publisher_id,
+    l.request_id,
+    l.response_id,
+    (1 + (i.thread_id IS NOT NULL)::BIGINT) AS candidate_count
+FROM known AS l
+LEFT JOIN independent AS i
+    ON l.thread_id = i.thread_id AND l.kind = i.kind AND l.object_id = i.object_id
+LEFT JOIN store.response AS r ON l.response_id = r.response_id
+-- That a request leads to its own response goes without saying.
+WHERE l.taken_response_id IS NOT NULL OR l.taken_request_id IS DISTINCT FROM r.request_id

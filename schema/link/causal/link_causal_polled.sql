@@ -1,0 +1,94 @@
+-- name: derive.link_causal_polled
+-- kind: macro
+-- description: Messages that a callback instance takes by itself (polling subscriptions), and what
+--     it publishes afterwards. Of each subscription the last message that it took before counts.
+--     An executor that spins inside of a callback takes messages there, too: each has a callback
+--     of its own, but for the copies of messages that come through intra-process buffers.
+-- grain: one row per publication inside a callback instance, and subscription it took from before
+-- param: only_run BIGINT  Run to look at
+CREATE OR REPLACE MACRO derive.link_causal_polled(only_run) AS TABLE
+WITH RECURSIVE handled AS (
+    SELECT take_id
+    FROM store.callback_instance
+    WHERE run_id = only_run AND take_id IS NOT NULL
+),
+buffered AS (
+    SELECT DISTINCT c.subscription_id
+    FROM store.callback_instance AS i
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+    WHERE i.run_id = only_run AND i.is_intra_process AND c.subscription_id IS NOT NULL
+),
+by_hand AS MATERIALIZED (
+    SELECT
+        t.take_id, t.subscription_id, t.trace_id, t.thread_id, t.taken_ns, t.start_event_id,
+        t.is_loss_affected
+    FROM store.take AS t
+    ANTI JOIN handled AS h ON t.take_id = h.take_id
+    ANTI JOIN buffered AS b ON t.subscription_id = b.subscription_id
+    WHERE t.run_id = only_run AND t.subscription_id IS NOT NULL
+),
+run AS MATERIALIZED (
+    SELECT
+        i.callback_instance_id, i.parent_id, i.thread_id, i.start_event_id,
+        i.effective_end_event_id
+    FROM store.callback_instance AS i
+    SEMI JOIN by_hand AS t ON i.thread_id = t.thread_id
+    WHERE i.run_id = only_run
+),
+-- Nested instances that were over by then, and what they were nested in.
+around (take_id, event_id, callback_instance_id, parent_id, effective_end_event_id) AS (
+    SELECT
+        t.take_id, t.start_event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
+    FROM by_hand AS t
+    ASOF JOIN run AS i ON t.thread_id = i.thread_id AND t.start_event_id > i.start_event_id
+    UNION ALL
+    SELECT
+        a.take_id, a.event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
+    FROM around AS a
+    JOIN run AS i ON a.parent_id = i.callback_instance_id
+    WHERE a.event_id >= a.effective_end_event_id
+),
+polled AS MATERIALIZED (
+    SELECT
+        a.callback_instance_id, t.take_id, t.subscription_id, t.taken_ns, t.start_event_id,
+        t.is_loss_affected
+    FROM around AS a
+    JOIN by_hand AS t ON a.take_id = t.take_id
+    WHERE a.event_id < a.effective_end_event_id
+),
+published AS (
+    SELECT
+        d.publication_id, b.publisher_id, b.trace_id, b.start_ns, b.start_event_id,
+        d.is_loss_affected, p.callback_instance_id, p.subscription_id
+    FROM derive.link_causal_direct(only_run) AS d
+    JOIN (SELECT DISTINCT callback_instance_id, subscription_id FROM polled) AS p
+        ON d.callback_instance_id = p.callback_instance_id
+    JOIN store.publication AS b ON d.publication_id = b.publication_id
+    WHERE b.run_id = only_run
+),
+linked AS (
+    SELECT
+        p.publication_id, p.publisher_id, p.trace_id, p.start_ns, t.take_id, t.taken_ns,
+        p.is_loss_affected OR t.is_loss_affected AS is_loss_affected
+    FROM published AS p
+    ASOF JOIN polled AS t
+        ON p.callback_instance_id = t.callback_instance_id
+        AND p.subscription_id = t.subscription_id
+        AND p.start_event_id > t.start_event_id
+),
+behind_gap AS (
+    SELECT l.publication_id, l.take_id
+    FROM (
+        SELECT n.publication_id, n.take_id, n.start_ns, n.taken_ns, x.recording_id
+        FROM linked AS n
+        JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
+    ) AS l
+    ASOF JOIN derive.recording_gap AS g
+        ON l.recording_id = g.recording_id AND l.start_ns > g.start_ns
+    WHERE g.start_ns >= l.taken_ns OR g.covered_until_ns > l.taken_ns
+)
+SELECT
+    only_run AS run_id, l.take_id, l.publication_id, l.publisher_id,
+    l.is_loss_affected
+FROM linked AS l
+ANTI JOIN behind_gap AS g ON l.publication_id = g.publication_id AND l.take_id = g.take_id

@@ -1,0 +1,118 @@
+"""Messages that callbacks take by themselves (polling subscriptions)."""
+
+from __future__ import annotations
+
+import pytest
+from analysis import Analyse
+from ros_system import RosSystem
+from staged_events import Thread
+
+PLANNER = Thread(200)
+LINKS = (
+    "SELECT b.source_timestamp_ns, t.source_timestamp_ns, l.kind, l.callback_instance_id "
+    "FROM link_causal AS l JOIN publication AS b USING (publication_id) "
+    "LEFT JOIN take AS t ON l.take_id = t.take_id WHERE l.kind <> 'direct' ORDER BY ALL"
+)
+
+
+@pytest.fixture
+def planner(system: RosSystem) -> RosSystem:
+    """A timer 0xC9 that polls /a and /b and publishes /plan, and a callback 0xC8 of /c."""
+    system.subscription(PLANNER, 0x20, "/a")
+    system.subscription(PLANNER, 0x21, "/b")
+    system.subscription(PLANNER, 0x22, "/c", callback=0xC8)
+    system.publisher(PLANNER, 0x11, "/plan")
+    system.timer(PLANNER, 0x30, callback=0xC9)
+    return system
+
+
+def test_the_last_of_each_topic_before_the_publication(
+    planner: RosSystem, analyse: Analyse
+) -> None:
+    planner.start(PLANNER, 0xC9)
+    planner.publish(PLANNER, 0x11, 1)
+    planner.take(PLANNER, 0x20, 11)
+    planner.publish(PLANNER, 0x11, 2)
+    planner.take(PLANNER, 0x21, 12)
+    planner.take(PLANNER, 0x20, 13)
+    planner.publish(PLANNER, 0x11, 3)
+    planner.publish(PLANNER, 0x11, 4)
+    planner.take(PLANNER, 0x20, 14)
+    planner.end(PLANNER, 0xC9)
+    planner.start(PLANNER, 0xC9)
+    planner.publish(PLANNER, 0x11, 5)
+    planner.end(PLANNER, 0xC9)
+    assert analyse(planner).rows(LINKS) == [
+        (2, 11, "polled", None),
+        (3, 12, "polled", None),
+        (3, 13, "polled", None),
+        (4, 12, "polled", None),
+        (4, 13, "polled", None),
+    ]
+
+
+def test_beside_the_message_that_the_callback_is_for(planner: RosSystem, analyse: Analyse) -> None:
+    planner.take(PLANNER, 0x22, 10)
+    planner.start(PLANNER, 0xC8)
+    planner.take(PLANNER, 0x20, 11)
+    planner.publish(PLANNER, 0x11, 1)
+    planner.end(PLANNER, 0xC8)
+    assert analyse(planner).rows(LINKS) == [(1, 11, "polled", None)]
+
+
+def test_callbacks_nested_in_it_have_their_own(planner: RosSystem, analyse: Analyse) -> None:
+    """And it has none of theirs."""
+    planner.start(PLANNER, 0xC9)
+    planner.take(PLANNER, 0x20, 11)
+    planner.take(PLANNER, 0x22, 12)
+    planner.start(PLANNER, 0xC8)
+    planner.take(PLANNER, 0x21, 13)
+    planner.publish(PLANNER, 0x11, 1)
+    planner.end(PLANNER, 0xC8)
+    planner.publish(PLANNER, 0x11, 2)
+    planner.take(PLANNER, 0x21, 14)
+    planner.publish(PLANNER, 0x11, 3)
+    planner.end(PLANNER, 0xC9)
+    assert analyse(planner).rows(LINKS) == [
+        (1, 13, "polled", None),
+        (2, 11, "polled", None),
+        (3, 11, "polled", None),
+        (3, 14, "polled", None),
+    ]
+
+
+def test_not_on_another_thread_nor_behind_the_callback(
+    planner: RosSystem, analyse: Analyse
+) -> None:
+    planner.start(PLANNER, 0xC9)
+    planner.take(PLANNER, 0x20, 11)
+    planner.publish(Thread(200, 201), 0x11, 1)
+    planner.end(PLANNER, 0xC9)
+    planner.publish(PLANNER, 0x11, 2)
+    assert analyse(planner).rows(LINKS) == []
+
+
+def test_not_across_a_gap(planner: RosSystem, analyse: Analyse) -> None:
+    """On a CPU that the thread may have visited."""
+    planner.start(PLANNER, 0xC9)
+    taken = planner.take(PLANNER, 0x20, 11)
+    published = planner.publish(PLANNER, 0x11, 2)
+    planner.end(PLANNER, 0xC9)
+    planner.add_packet(0, 10_000, cpu=0)
+    planner.add_packet(0, published - 1, last_event=taken - 100, discarded=3, cpu=1)
+    assert analyse(planner).rows(LINKS) == []
+
+
+def test_a_copy_of_an_intra_process_message_is_not_polled(
+    planner: RosSystem, analyse: Analyse
+) -> None:
+    """An executor that spins in a callback takes it, and has a callback for the original only."""
+    planner.subscription(PLANNER, 0x23, "/d", callback=0xC7)
+    planner.start(PLANNER, 0xC9)
+    planner.start(PLANNER, 0xC7, intra=True)
+    planner.end(PLANNER, 0xC7)
+    planner.take(PLANNER, 0x23, 11)
+    planner.take(PLANNER, 0x20, 12)
+    planner.publish(PLANNER, 0x11, 1)
+    planner.end(PLANNER, 0xC9)
+    assert analyse(planner).rows(LINKS) == [(1, 12, "polled", None)]
