@@ -129,7 +129,9 @@ def test_a_thread_on_two_cpus_at_one_moment_is_of_several_processes(
     system.wait(MILLISECOND)
     system.add("ros2:callback_start", Thread(7), callback=0x30, is_intra_process=0)
     begin = system.publish(Thread(7), 0x10, 1)
-    system.add("ros2:rmw_take", Thread(9), rmw_subscription_handle=0x1020, source_timestamp=1, taken=1)
+    system.add(
+        "ros2:rmw_take", Thread(9), rmw_subscription_handle=0x1020, source_timestamp=1, taken=1
+    )
     system.add("ros2:callback_end", Thread(7, cpu=1), ts=begin + 100, callback=0x30)
     begin = system.now - 80
     system.add("ros2:rclcpp_executor_wait_for_work", Thread(7), ts=begin + return_ns, timeout=-1)
@@ -140,9 +142,10 @@ def test_a_thread_on_two_cpus_at_one_moment_is_of_several_processes(
     ]
     for view in ("link_transport", "link_causal"):
         assert model.column(f"SELECT candidate_count FROM {view}") == [1 + is_ambiguous], view
-    assert model.rows(
-        "SELECT count, detail FROM store.finding WHERE name = 'mixed_processes'"
-    ) == [(1, "processes that are several with equal ids: main 7 on alpha")] * is_ambiguous
+    assert (
+        model.rows("SELECT count, detail FROM store.finding WHERE name = 'mixed_processes'")
+        == [(1, "processes that are several with equal ids: main 7 on alpha")] * is_ambiguous
+    )
 
 
 def test_a_pid_used_again(system: RosSystem, analyse: Analyse) -> None:

@@ -35,9 +35,7 @@ def test_links_of_processes_that_cannot_be_told_apart_are_marked(tmp_path: Path)
     """Programs of one name: nothing in the trace says which of them an event is of."""
     scenario = scenarios()["containers_one_daemon"]
     processes = tuple(replace(process, name="component") for process in scenario.processes)
-    simulation = simulate(
-        replace(scenario, processes=processes), tmp_path / "trace", factor=0.1
-    )
+    simulation = simulate(replace(scenario, processes=processes), tmp_path / "trace", factor=0.1)
     report = ingest([simulation.directory], tmp_path / "run.duckdb")
     (mixed,) = (finding for finding in report.findings if finding.name == "mixed_processes")
     assert mixed.severity == "error"

@@ -118,7 +118,10 @@ def checker(shared_traces: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", few(TRUE_TRACES, "sync_1_1", "services", "containers_one_daemon", "containers_same_name"))
+@pytest.mark.parametrize(
+    "name",
+    few(TRUE_TRACES, "sync_1_1", "services", "containers_one_daemon", "containers_same_name"),
+)
 def test_scores(
     recordings: Callable[[str], Ingested],
     shared_traces: Path,

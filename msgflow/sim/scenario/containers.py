@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from msgflow.sim.entity import MICROSECOND, MILLISECOND, SECOND, Publisher, Subscription, Timer, Work
+from msgflow.sim.entity import (
+    MICROSECOND,
+    MILLISECOND,
+    SECOND,
+    Publisher,
+    Subscription,
+    Timer,
+    Work,
+)
 from msgflow.sim.system import Executor, Group, Host, Node, Process, Scenario
 
 # What runs first in a container: its ids 1 to 6 are those of the shell and of `ros2 launch`.
@@ -58,7 +66,7 @@ def containers_one_daemon() -> Scenario:
 
 
 def containers_one_name() -> Scenario:
-    """Two containers with one hostname, a session daemon each: equal ids and names in two traces."""
+    """Two containers with one hostname, a session daemon each: equal ids in two traces."""
     hosts = tuple(Host(name, boot="robot", recorded_as="robot") for name in ("robot_1", "robot_2"))
     sink = Node("sink", subscriptions=(Subscription("/c"), Subscription("/f")))
     return Scenario(
