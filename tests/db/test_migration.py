@@ -165,9 +165,7 @@ def older(path: Path) -> dict[int, str]:
         con.execute("DROP TABLE store.link_call")
         con.execute("ALTER TABLE store.flow_call DROP COLUMN taken_request_id")
         con.execute("ALTER TABLE store.flow_call DROP COLUMN taken_response_id")
-        con.execute(
-            "ALTER TABLE store.flow_call ALTER COLUMN callback_instance_id SET NOT NULL"
-        )
+        con.execute("ALTER TABLE store.flow_call ALTER COLUMN callback_instance_id SET NOT NULL")
         con.execute("UPDATE store.alembic_version SET version_num = '0001'")
         con.execute("DELETE FROM store.run WHERE run_id > 2")
         con.execute(

@@ -216,9 +216,7 @@ def test_flows_and_paths_go_on_from_a_response(system: RosSystem, analyse: Analy
         "callback", "request_to_take", "service", "response_to_take",
         "callback", "publish_to_take", "take_to_callback", "callback",
     ]  # fmt: skip
-    assert analysis.rows(
-        "SELECT sum(duration_ns) FROM end_to_end_part([1])"
-    ) == [(ended - begun,)]
+    assert analysis.rows("SELECT sum(duration_ns) FROM end_to_end_part([1])") == [(ended - begun,)]
 
 
 def test_a_path_through_a_service_that_is_not_traced(system: RosSystem, analyse: Analyse) -> None:

@@ -100,9 +100,7 @@ def test_nested_deeper(merge: RosSystem, analyse: Analyse) -> None:
     assert analyse(merge).rows(LINKS) == [(11, 13, 1), (21, 23, 1)]
 
 
-def test_a_message_that_was_there_before_may_be_the_one(
-    merge: RosSystem, analyse: Analyse
-) -> None:
+def test_a_message_that_was_there_before_may_be_the_one(merge: RosSystem, analyse: Analyse) -> None:
     begin(merge, B, 9)
     merge.end(NODE, B)
     begin(merge, A, 10)

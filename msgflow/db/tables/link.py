@@ -121,7 +121,11 @@ Table(
     ),
     reference("subscription_id", "Subscription of that message", to="subscription.subscription_id"),
     reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
-    text("kind", "'direct', 'periodic_async', 'partial_sync', 'take_adjacent' or 'polled'", required=True),
+    text(
+        "kind",
+        "'direct', 'periodic_async', 'partial_sync', 'take_adjacent' or 'polled'",
+        required=True,
+    ),
     reference(
         "annotation_id",
         "Annotation that declares it; NULL for direct links",
