@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
+from msgflow.sim.callback_instance import CallbackInstance
 from msgflow.sim.entity import Call, Poll, Publish, Spin, Transition
 from msgflow.sim.publication import publish
 from msgflow.sim.services import ClientObject, call
@@ -14,7 +15,6 @@ from msgflow.sim.take import take
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from msgflow.sim.callback_instance import CallbackInstance
     from msgflow.sim.entity import Action
     from msgflow.sim.executor import Executor
     from msgflow.sim.executor_thread import ExecutorThread
@@ -106,7 +106,9 @@ def _poll(
     if taken is not None:
         taken.write(thread, subscription, None)
         if instance is not None:
-            instance.polled[action.topic] = taken
+            instance.polled[action.topic] = CallbackInstance(
+                None, None, taken.message.origins, taken.take_id, taken.rmw_ns, thread.tid
+            )
     return time + 500
     yield  # It takes no step, but is called as one that does.
 

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from msgflow.sim.take import Taken
 
 
 @dataclass(slots=True)
@@ -51,7 +47,7 @@ class CallbackInstance:
     causes: tuple[Cause, ...] = ()
     request_id: int | None = None
     is_response: bool = False
-    polled: dict[str, Taken] = field(default_factory=dict)
+    polled: dict[str, CallbackInstance] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +67,7 @@ def origins_on(instance: CallbackInstance, topic: str) -> tuple[Origin, ...]:
     if not instance.causes and not instance.polled:
         return tuple((root, (*path, topic)) for root, path in instance.origins)
     inputs = [cause.instance.origins for cause in instance.causes]
-    inputs += [taken.message.origins for taken in instance.polled.values()]
+    inputs += [polled.origins for polled in instance.polled.values()]
     if instance.take_id is not None:
         inputs.insert(0, instance.origins)
     origins = {

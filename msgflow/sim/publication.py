@@ -86,10 +86,10 @@ def write_publication(
         instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
         message.rcl_ns, message.rmw_ns, is_internal, False,
     )  # fmt: skip
-    for taken in instance.polled.values():
+    for polled in instance.polled.values():
         truth.causal.add(
-            None, message.publication_id, hostname, pid, tid, "polled", None, taken.take_id,
-            taken.rmw_ns, topic, message.rcl_ns, message.rmw_ns, is_internal, False,
+            None, message.publication_id, hostname, pid, tid, "polled", None, polled.take_id,
+            polled.take_rmw_ns, topic, message.rcl_ns, message.rmw_ns, is_internal, False,
         )  # fmt: skip
     for cause in instance.causes:
         used = cause.instance

@@ -5,8 +5,8 @@
 --     traced: clients and action servers of rclcpp run their callbacks right behind the take. The
 --     turn ends with the next event of the executor, the next take, and where a callback begins or
 --     ends. Threads without executors and callbacks (rclpy) have no turns that a trace would show.
---     Nothing is linked across a gap. An object that the same thread also sends with where nothing
---     was taken may do so here as well: then "nothing" is one more candidate.
+--     Nothing is linked across a gap of the host. An object that the same thread also sends with
+--     where nothing was taken may do so here as well: then "nothing" is one more candidate.
 -- grain: one row per publication, request or response sent in such a turn
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_call(only_run) AS TABLE
@@ -81,12 +81,20 @@ behind AS MATERIALIZED (
     ASOF JOIN turn AS t ON s.thread_id = t.thread_id AND s.sent_ns > t.at_ns
 ),
 -- Where something may be missing between the two, nothing is known.
+host_gap AS (
+    SELECT
+        x.host_id, l.start_ns,
+        max(l.end_ns) OVER (PARTITION BY x.host_id ORDER BY l.start_ns) AS covered_until_ns
+    FROM store.gap AS l
+    JOIN store.trace AS x ON l.trace_id = x.trace_id
+    WHERE l.run_id = only_run AND x.domain IS DISTINCT FROM 'kernel'
+),
 behind_gap AS (
     SELECT b.thread_id, b.sent_ns
     FROM behind AS b
     JOIN store.thread AS h ON b.thread_id = h.thread_id
-    ASOF JOIN derive.process_gap(only_run) AS g
-        ON h.process_id = g.process_id AND b.sent_ns > g.start_ns
+    JOIN store.process AS p ON h.process_id = p.process_id
+    ASOF JOIN host_gap AS g ON p.host_id = g.host_id AND b.sent_ns > g.start_ns
     WHERE g.start_ns >= b.at_ns OR g.covered_until_ns > b.at_ns
 ),
 known AS MATERIALIZED (

@@ -2,8 +2,8 @@
 -- kind: macro
 -- description: Publications that a thread makes after it took a message by hand (rclpy, rclc,
 --     wait sets), until its next take, also of a request or a response. The link ends where a
---     callback is seen to begin or end or an executor to go on, and at a gap. What is published inside a
---     callback instance is caused by that instance instead.
+--     callback is seen to begin or end or an executor to go on, and at a gap. What is published
+--     inside a callback instance is caused by that instance instead.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE

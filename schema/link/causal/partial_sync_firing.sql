@@ -5,8 +5,8 @@
 --     caches, at some moment between the start of the instance and its first publication.
 --     `emptied_event_id`: the last publication of another firing before the first one of this; by
 --     then the caches had been emptied. `kept_event_id`: the start of the last firing that had
---     published when this one began; what came after it may have been kept. `last_event_id`: its own
---     last publication.
+--     published when this one began; what came after it may have been kept. `last_event_id`: its
+--     own last publication.
 -- grain: one row per annotation and callback instance of one of its inputs that fires it
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.partial_sync_firing(only_run) AS TABLE
