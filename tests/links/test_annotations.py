@@ -290,7 +290,7 @@ def slam(tmp_path_factory: pytest.TempPathFactory) -> Path:
     simulation = simulate(silent, directory / "trace", factor=0.1)
     path = directory / "silent.duckdb"
     ingest_one(simulation.directory, path).connection.close()
-    assert rows(path, KINDS) == [("direct", 109)]
+    assert rows(path, KINDS) == [("direct", 105)]
     return path
 
 
