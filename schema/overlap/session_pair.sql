@@ -39,7 +39,7 @@ compared AS (
     SELECT
         l.left_session, l.right_session, l.thread, l.tracepoint,
         count(*) AS left_count,
-        count(*) FILTER (l.ts_ns - r.ts_ns <= 2 * $twin_ns) AS twin_count
+        count(*) FILTER (l.ts_ns - r.ts_ns <= $twin_ns) AS twin_count
     FROM (FROM event WHERE session = left_session) AS l
     ASOF LEFT JOIN (FROM event WHERE session = right_session) AS r
         ON l.left_session = r.left_session

@@ -300,7 +300,9 @@ def test_few_events_have_one_by_chance(system: RosSystem, analyse: Analyse) -> N
     assert counts(model)[:3] == (14, 14, 14)
 
 
-@pytest.mark.parametrize(("late_ns", "is_same"), [(9_000, True), (11_000, False)])
+@pytest.mark.parametrize(
+    ("late_ns", "is_same"), [(10_000, True), (10_001, False), (-10_000, True), (-10_001, False)]
+)
 def test_a_twin_follows_at_once(
     system: RosSystem, analyse: Analyse, late_ns: int, is_same: bool
 ) -> None:
