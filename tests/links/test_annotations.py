@@ -303,7 +303,7 @@ def slam(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_messages_that_another_node_of_the_process_keeps(slam: Path, listener: str) -> None:
     with Database(slam) as opened:
         opened.apply_links(write(slam, LISTENER.format(listener)))
-    assert rows(slam, KINDS) == [("direct", 109), ("periodic_async", 16)]
+    assert rows(slam, KINDS) == [("direct", 105), ("periodic_async", 16)]
     assert rows(slam, KEPT) == [("/transform_listener_impl_5566a1b0", "/mapGraph")]
 
 
