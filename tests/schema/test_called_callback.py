@@ -12,7 +12,7 @@ STAGE = """
 CREATE SCHEMA staging;
 CREATE TABLE staging.service_event AS
     SELECT 10 AS event_id, true AS is_request, 1 AS service_event_id;
-CREATE TABLE staging.callback_run AS
+CREATE TABLE staging.callback_pair AS
     SELECT 20 AS start_event_id, 10 AS previous_event_id,
         NULL::INTEGER AS previous_executor_event_id,
         false AS is_intra_process;
@@ -32,10 +32,10 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
 @pytest.mark.parametrize(
     ("change", "is_called"),
     [
-        ("callback_run SET previous_executor_event_id = 9", True),
-        ("callback_run SET previous_executor_event_id = 11", False),
-        ("callback_run SET previous_event_id = 11", False),
-        ("callback_run SET is_intra_process = true", False),
+        ("callback_pair SET previous_executor_event_id = 9", True),
+        ("callback_pair SET previous_executor_event_id = 11", False),
+        ("callback_pair SET previous_event_id = 11", False),
+        ("callback_pair SET is_intra_process = true", False),
         ("callback_binding SET kind = 'unknown'", True),
         ("callback_binding SET kind = NULL", True),
         ("callback_binding SET kind = 'timer'", False),

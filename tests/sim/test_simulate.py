@@ -29,7 +29,8 @@ def test_same_seed_gives_the_same_bytes(tmp_path, name):
     one, two, three = (_digest(tmp_path / folder) for folder in ("one", "two", "three"))
     assert one == two
     assert one.keys() == three.keys()
-    # What a perfect recording declares and lacks does not depend on chance, nor do numbers of calls.
+    # What a perfect recording declares and lacks does not depend on chance, nor do numbers of
+    # calls.
     alike = {
         f"truth/{table}.parquet"
         for table in ("trace", "declared", "unrecorded", "dds_event", "link_call")
