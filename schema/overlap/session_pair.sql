@@ -60,7 +60,7 @@ SELECT
     l.left_session,
     l.right_session,
     -- Where one of them lost events, those of the other have no twins.
-    2 * sum(least(l.twin_count, r.right_count)) >= sum(least(l.left_count, r.right_count))
+    2 * sum(l.twin_count) >= sum(least(l.left_count, r.right_count))
         AS is_same
 FROM compared AS l
 JOIN right_counted AS r

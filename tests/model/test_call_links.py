@@ -105,6 +105,15 @@ def test_no_turns_without_an_executor(calls: RosSystem, analyse: Analyse) -> Non
     assert analyse(calls).rows(LINKS) == []
 
 
+def test_another_process_may_have_sent_it(calls: RosSystem, analyse: Analyse) -> None:
+    """One with the same ids: the thread is on two CPUs at one moment."""
+    calls.ready(Thread(100, cpu=1))
+    calls.ready(CLIENT)
+    taken = respond(calls)
+    calls.publish(CLIENT, 0x11, 1)
+    assert analyse(calls).rows(LINKS) == [(1, taken, True, 2)]
+
+
 def test_what_is_also_sent_otherwise_is_doubtful(calls: RosSystem, analyse: Analyse) -> None:
     """A loop that spins once and then publishes; what it published before it spun tells nothing."""
     calls.publish(CLIENT, 0x11, 1)

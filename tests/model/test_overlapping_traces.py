@@ -282,6 +282,18 @@ def test_most_events_have_a_twin_where_sessions_record_one_thread(
     assert counts(model)[2] >= 10
 
 
+def test_what_only_one_session_recorded_has_no_twin(system: RosSystem, analyse: Analyse) -> None:
+    """One goes on for a moment when the next one has started."""
+    threads = session(0), session(1)
+    sessions(system, "alpha", "alpha")
+    create(system, threads[0])
+    for number in range(20):
+        cycle(system, number, *(threads[:1], threads, threads[1:])[(number > 8) + (number > 10)])
+    model = analyse(system)
+    assert namespaces(model) == [None]
+    assert counts(model) == (20, 20, 20, 20)
+
+
 def test_few_events_have_one_by_chance(system: RosSystem, analyse: Analyse) -> None:
     threads = session(0), session(1)
     sessions(system, "alpha", "alpha")

@@ -140,9 +140,13 @@ def recordings(bt2: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dic
     return Recordings()
 
 
-@pytest.fixture(params=few(scenarios(), *SHOWN))
+# Of containers with equal ids nobody can say by ids which process an event is of.
+_KNOWN_BY_IDS = [name for name in scenarios() if not name.startswith("containers_")]
+
+
+@pytest.fixture(params=few(_KNOWN_BY_IDS, *SHOWN))
 def recording(request: pytest.FixtureRequest, recordings: dict[str, Recording]) -> Recording:
-    """Each built-in scenario in turn."""
+    """Each built-in scenario in turn whose processes have ids of their own."""
     return recordings[request.param]
 
 

@@ -172,7 +172,7 @@ Table(
     reference("response_id", "Effect: a response", to="response.response_id"),
     number(
         "candidate_count",
-        "1; 2 where the thread sends such messages by itself, too",
+        "1; 2 where the thread sends such messages by itself, too, or its process is ambiguous",
         required=True,
     ),
     comment=(

@@ -6,7 +6,8 @@
 --     turn ends with the next event of the executor, the next take, and where a callback begins or
 --     ends. Threads without executors and callbacks (rclpy) have no turns that a trace would show.
 --     Nothing is linked across a gap of the host. An object that the same thread also sends with
---     where nothing was taken may do so here as well: then "nothing" is one more candidate.
+--     where nothing was taken may do so here as well: then "nothing" is one more candidate. So is
+--     another process, where several with equal ids cannot be told apart.
 -- grain: one row per publication, request or response sent in such a turn
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_call(only_run) AS TABLE
@@ -115,10 +116,12 @@ SELECT
     CASE l.kind WHEN 'publisher' THEN l.object_id END AS publisher_id,
     l.request_id,
     l.response_id,
-    (1 + (i.thread_id IS NOT NULL)::BIGINT) AS candidate_count
+    1 + (i.thread_id IS NOT NULL OR coalesce(p.is_ambiguous, false))::BIGINT AS candidate_count
 FROM known AS l
 LEFT JOIN independent AS i
     ON l.thread_id = i.thread_id AND l.kind = i.kind AND l.object_id = i.object_id
 LEFT JOIN store.response AS r ON l.response_id = r.response_id
+JOIN store.thread AS h ON l.thread_id = h.thread_id
+JOIN store.process AS p ON h.process_id = p.process_id
 -- That a request leads to its own response goes without saying.
 WHERE l.taken_response_id IS NOT NULL OR l.taken_request_id IS DISTINCT FROM r.request_id
