@@ -250,7 +250,7 @@ class Creator:
             self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
         return ServiceObject(
             self._network, self._process, executor, group, node.description.full_name, name,
-            handle, rmw_handle, callback, memory.on_stack(), code,
+            handle, rmw_handle, callback, memory.on_stack(), code, description.is_deferred,
         )  # fmt: skip
 
     def _add_service_callback(self, handle: int, callback: int, symbol: str) -> None:

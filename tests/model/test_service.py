@@ -405,5 +405,55 @@ def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: A
     managed_node(system, 0x1000, "one", 0xA0, lost=1)
     rows = analyse(system).rows(SERVICES_OF_CALLBACKS)[1:]
     assert rows == [
-        ("/one", "/one/parameters", 0xA0), *[(None, None, 0xA0 + number) for number in range(1, 5)]
+        ("/one", "/one/parameters", 0xA0),
+        *[(None, None, 0xA0 + number) for number in range(1, 5)],
     ]
+
+
+RUNS = (
+    "SELECT start_ns, end_ns, is_end_inferred FROM callback_instance ORDER BY callback_instance_id"
+)
+
+
+def serve(system: RosSystem, callback: int, *, ends: bool = False) -> int:
+    """A callback of a service, called by an executor; its start."""
+    system.ready(SERVER)
+    start = system.start(SERVER, callback)
+    if ends:
+        system.end(SERVER, callback)
+    return start
+
+
+def test_a_response_that_comes_later(system: RosSystem, analyse: Analyse) -> None:
+    """rclcpp records no end of the callback: the executor goes on when it is over."""
+    hosts(system)
+    system.timer(SERVER, 0x60, 0xC2)
+    starts = [serve(system, 0xC1)]
+    ends = [system.ready(SERVER)]
+    start = system.start(SERVER, 0xC2)
+    starts += [start, serve(system, 0xC1)]
+    analysis = analyse(system)
+    assert analysis.rows(RUNS) == [
+        (starts[0], ends[0], True),
+        (start, None, False),
+        (starts[2], None, False),
+    ]
+
+
+def test_a_service_callback_that_throws(system: RosSystem, analyse: Analyse) -> None:
+    """Others of the service have an end."""
+    hosts(system)
+    first = serve(system, 0xC1)
+    system.ready(SERVER)
+    second = serve(system, 0xC1, ends=True)
+    assert [row[::2] for row in analyse(system).rows(RUNS)] == [(first, False), (second, False)]
+    assert analyse(system).rows(RUNS)[0][1] is None
+
+
+def test_a_response_that_comes_later_and_a_gap(system: RosSystem, analyse: Analyse) -> None:
+    """What the executor did last may be lost, and so may the end."""
+    hosts(system)
+    start = serve(system, 0xC1)
+    system.lose(trace=1)
+    system.ready(SERVER)
+    assert analyse(system).rows(RUNS) == [(start, None, False)]
