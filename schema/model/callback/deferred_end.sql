@@ -1,8 +1,8 @@
 -- name: staging.deferred_end
 -- description: When callbacks of services were over that answer later. Before Kilted, rclcpp
---     records no end of such a callback: none of its instances has one. Then the thread's next
---     executor event is the end, at the latest: a thread of a multi-threaded executor may be blocked
---     before. No gap lies between.
+--     records no end of such a callback: none of its instances has one. Then the next executor
+--     event of the thread is the end, at the latest: a thread of a multi-threaded executor may be
+--     blocked before. No gap lies between.
 -- grain: one row per callback instance of such a service that an executor event closes
 -- when: staging.callback_open
 -- column: start_event_id BIGINT  callback_start
