@@ -12,7 +12,23 @@ SELECT name, subject, count, detail FROM finding WHERE severity <> 'info' ORDER 
 """
 # Recordings, and the start of each sentence of msgflow check.
 EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
+    "real_cache": [],
+    "real_container": [],
+    "real_events": [
+        ("executor_without_events", "back 14325 on vm", 532),
+        ("executor_without_events", "front 14327 on vm", 1029),
+    ],
+    "real_jazzy_services": [("missing_layer", "requests", 129)],
     "real_lifecycle": [],
+    "real_pipeline": [],
+    "real_py_mixed": [("process_without_rclcpp", "python3.11 20878 on vm", 137)],
+    "real_py_timer": [
+        ("process_without_rclcpp", "python3.11 19960 on vm", 25),
+        ("process_without_rclcpp", "python3.11 19963 on vm", 437),
+        ("process_without_rclcpp", "python3.11 19964 on vm", 142),
+    ],
+    "real_reference": [],
+    "real_services": [],
 }
 
 
@@ -50,3 +66,13 @@ def test_deferred_responses_before_kilted(recordings: Callable[[str], Ingested])
         "FROM callback_instance AS i JOIN callback AS c USING (callback_id) "
         "JOIN service AS s USING (service_id) GROUP BY ALL ORDER BY ALL"
     ) == [("/inner", False, 73, False), ("/outer", True, 56, True)]
+
+
+def test_a_join_that_the_other_input_triggers(recordings: Callable[[str], Ingested]) -> None:
+    """After the first twelve, /rear_tf is always last: roots at /front are lost, not cut."""
+    recording = recordings("real_reference/ust")
+    counts = recording.rows(
+        "SELECT e.status, count(*) FROM end_to_end([1], '/front', '/ground') AS e "
+        "WHERE e.is_first GROUP BY ALL ORDER BY ALL"
+    )
+    assert counts == [("cut_by_recording", 1), ("lost", 46), ("reached", 12)]
