@@ -13,7 +13,7 @@ SELECT name, subject, count, detail FROM finding WHERE severity <> 'info' ORDER 
 # Recordings, and the start of each sentence of msgflow check.
 EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
     "real_cache": [],
-    "real_container": [],
+    "real_container": [("busy_waiting", "component_conta 7031 on vm", 22_700)],
     "real_events": [
         ("executor_without_events", "back 14325 on vm", 532),
         ("executor_without_events", "front 14327 on vm", 1029),
@@ -27,7 +27,7 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
         ("process_without_rclcpp", "python3.11 19963 on vm", 437),
         ("process_without_rclcpp", "python3.11 19964 on vm", 142),
     ],
-    "real_reference": [],
+    "real_reference": [("busy_waiting", "perception 18109 on vm", 38_747)],
     "real_services": [],
 }
 
