@@ -98,8 +98,10 @@ SELECT
         END,
         false
     ) AS is_cut,
-    CASE WHEN s.publisher_id IS NULL OR s.publication_id IS NULL THEN p.last_seen_ns END
-        AS recorded_until_ns
+    CASE
+        WHEN s.publisher_id IS NULL OR s.publication_id IS NULL THEN
+            derive.corrected_ns(p.last_seen_ns, k.offset_ns, k.drift_ppb, k.reference_ns)
+    END AS recorded_until_ns
 FROM stuck AS s
 LEFT JOIN store.publication AS b ON s.publication_id = b.publication_id
 LEFT JOIN delivered AS d
@@ -108,7 +110,8 @@ LEFT JOIN finished AS f ON s.path_id = f.path_id
 LEFT JOIN store.undelivered AS u
     ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
 LEFT JOIN store.take AS t ON s.take_id = t.take_id
-LEFT JOIN main.process AS p ON t.process_id = p.process_id
+LEFT JOIN store.process AS p ON t.process_id = p.process_id
+LEFT JOIN derive.process_clock AS k ON t.process_id = k.process_id
 LEFT JOIN continued AS c
     ON t.subscription_id = c.subscription_id
     AND s.publisher_id = c.publisher_id
