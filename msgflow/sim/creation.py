@@ -219,7 +219,8 @@ class Creator:
     def service(self, node: NodeContext, description: entity.Service, symbol: str) -> ServiceObject:
         """A service; it answers once it has been given to `spin_service`."""
         service = self.rcl_service(node, description)
-        self._add_service_callback(service.handle, service.callback, symbol)
+        if not description.is_action:
+            self._add_service_callback(service.handle, service.callback, symbol)
         return service
 
     def copied_service(self, service: ServiceObject, symbol: str) -> None:
@@ -245,9 +246,6 @@ class Creator:
         code = self._code(node, description, executor)
         if description.is_action:
             code = replace(code, is_callback=False)
-        else:
-            self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
-            self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
         return ServiceObject(
             self._network, self._process, executor, group, node.description.full_name, name,
             handle, rmw_handle, callback, memory.on_stack(), code, description.is_deferred,
