@@ -13,8 +13,10 @@
 -- column: executor_kind VARCHAR     Kind of executor
 -- column: seen_ns BIGINT [ns]       Time for which the thread was seen in the time window
 -- column: wait_ns BIGINT [ns]       Waiting for work
--- column: process_ns BIGINT [ns]    Looking for what is ready
--- column: execute_ns BIGINT [ns]    Executing, including taking messages
+-- column: process_ns BIGINT [ns]    Looking for what is ready; where a loop polls the executor
+--     (spin_some; finding polled_executor), also what the loop does between two polls
+-- column: execute_ns BIGINT [ns]    Executing, including taking messages; in a multi-threaded
+--     executor also blocked behind a callback until it may look for work again
 -- column: callback_ns BIGINT [ns]   In callbacks with an end; nested time counts once
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1

@@ -56,18 +56,6 @@ input AS (
     LEFT JOIN caused AS c ON r.callback_instance_id = c.callback_instance_id
     GROUP BY r.node_id, r.subscription_id, r.topic_name
 ),
--- A timer publishes, and messages lead nowhere.
-dead_end AS (
-    SELECT
-        node_id,
-        list(DISTINCT topic_name ORDER BY topic_name) AS inputs,
-        string_agg(
-            printf('%d messages on %s', run_count, topic_name), ' and ' ORDER BY topic_name
-        ) AS evidence
-    FROM input
-    WHERE leading_count = 0
-    GROUP BY node_id
-),
 timer_publication AS (
     SELECT t.timer_id, t.node_id, t.period_ns, c.topic_name, count(*) AS publication_count
     FROM main.timer AS t
@@ -76,6 +64,19 @@ timer_publication AS (
     JOIN caused AS c ON i.callback_instance_id = c.callback_instance_id AND c.kind = 'direct'
     WHERE t.node_id = c.node_id
     GROUP BY t.timer_id, t.node_id, t.period_ns, c.topic_name
+),
+-- A timer publishes, and messages lead nowhere. What it publishes itself is no input of it.
+dead_end AS (
+    SELECT
+        node_id,
+        list(DISTINCT topic_name ORDER BY topic_name) AS inputs,
+        string_agg(
+            printf('%d messages on %s', run_count, topic_name), ' and ' ORDER BY topic_name
+        ) AS evidence
+    FROM input AS i
+    ANTI JOIN timer_publication AS t ON i.node_id = t.node_id AND i.topic_name = t.topic_name
+    WHERE i.leading_count = 0
+    GROUP BY node_id
 ),
 publishing_timer AS (
     SELECT
@@ -106,8 +107,7 @@ periodic AS (
             any_value(d.evidence)
         ) AS evidence,
         CASE
-            WHEN count(*) > 1 AND len(any_value(d.inputs)) > 1
-                THEN 'each of its timers may use only some of the inputs'
+            WHEN count(*) > 1 THEN 'each of its timers may use only some of the inputs, or none'
         END AS doubt
     FROM publishing_timer AS t
     JOIN dead_end AS d ON t.node_id = d.node_id

@@ -1,7 +1,8 @@
 -- name: objects
 -- title: ROS objects
 -- description: Every publisher, subscription, timer, service and client with its node and process.
--- grain: one row per object
+--     Timers with neither node nor callback are counted: rclpy makes one whenever it waits.
+-- grain: one row per object; one per process for all its timers with neither node nor callback
 -- param: kind VARCHAR {publisher|subscription|timer|service|client} = NULL  Kind of object
 --     (default: all)
 -- column: run_id BIGINT             Run
@@ -10,15 +11,21 @@
 -- column: pid INTEGER               Process id
 -- column: node VARCHAR [node]  Full name of the node; empty: not known
 -- column: kind VARCHAR              Kind of object
--- column: name VARCHAR [topic]  Topic, service, or period of the timer
+-- column: name VARCHAR [topic]  Topic, service, or period of the timer; number of those timers
 -- column: queue_depth BIGINT        History depth asked for
 -- column: created_ns BIGINT [epoch ns]  First initialisation event
 -- column: symbols VARCHAR           Functions registered for its callbacks
--- column: object_id BIGINT          Identity within its kind
+-- column: object_id BIGINT          Identity within its kind; of those timers, the first one's
 -- column: is_inferred BOOLEAN       Its initialisation was not recorded
 -- column: is_internal BOOLEAN       Infrastructure of ROS
 -- brief: kind, name, node, process, pid, host, queue_depth, created_ns, symbols
-WITH object AS (
+WITH nameless_timer AS (
+    SELECT t.run_id, t.process_id, t.timer_id, t.created_ns
+    FROM main.timer AS t
+    ANTI JOIN main.callback AS c ON t.timer_id = c.timer_id
+    WHERE t.node_id IS NULL
+),
+object AS (
     SELECT
         run_id, process_id, node_id, 'publisher' AS kind, topic_name AS name, queue_depth,
         created_ns, publisher_id AS object_id, is_inferred, is_internal
@@ -33,6 +40,13 @@ WITH object AS (
         run_id, process_id, node_id, 'timer', printf('%.10g ms', period_ns / 1e6), NULL,
         created_ns, timer_id, is_inferred, false
     FROM main.timer
+    ANTI JOIN nameless_timer USING (timer_id)
+    UNION ALL
+    SELECT
+        run_id, process_id, NULL, 'timer', printf('%d without node and callback', count(*)), NULL,
+        min(created_ns), min(timer_id), count(created_ns) = 0, false
+    FROM nameless_timer
+    GROUP BY run_id, process_id
     UNION ALL
     SELECT
         run_id, process_id, node_id, 'service', service_name, NULL, created_ns, service_id,

@@ -27,6 +27,9 @@
 -- column: lateness_p95_ns BIGINT [ns]  95 % of the calls were at most this late
 -- column: lateness_p99_ns BIGINT [ns]  99 % of the calls were at most this late
 -- column: lateness_max_ns BIGINT [ns]  Greatest lateness
+-- column: off_grid VARCHAR          Why jitter and lateness say little of it: 'reset', since it
+--     runs a constant time after the instants that its creation suggests while the executor is
+--     idle; 'clock', since it runs more often than its period allows (simulated time)
 -- column: busy_share DOUBLE [share] Share of all lateness for which the executor was busy with
 --     callbacks, 0 to 1
 -- column: meanwhile VARCHAR         What ran in that time: the three with the largest share, with
@@ -38,8 +41,8 @@
 -- column: timer_id BIGINT           Identity of the timer
 -- column: callback_id BIGINT        Identity of the callback
 -- column: is_internal BOOLEAN       Infrastructure of ROS
--- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, jitter_p99_ns, meanwhile,
---     lateness_median_ns, busy_share, rate_hz, bunched
+-- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
+--     meanwhile, lateness_median_ns, busy_share, rate_hz, bunched
 WITH asked AS (
     SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns
     FROM main.callback AS c
@@ -108,6 +111,7 @@ counted AS (
         callback_id,
         count(*) AS count,
         (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
+        max(start_ns) - min(start_ns) AS span_ns,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected
     FROM instance
     GROUP BY callback_id
@@ -117,6 +121,7 @@ delayed AS (
         l.callback_id,
         count(*) AS known,
         quantile_disc(l.lateness_ns, [0.5, 0.95, 0.99, 1]) AS lateness,
+        quantile_disc(l.lateness_ns, [0.25, 0.75]) AS usual_lateness,
         sum(l.lateness_ns // nullif(a.period_ns, 0))::BIGINT AS missed,
         sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share
     FROM late AS l
@@ -177,6 +182,20 @@ SELECT
     d.lateness[2] AS lateness_p95_ns,
     d.lateness[3] AS lateness_p99_ns,
     d.lateness[4] AS lateness_max_ns,
+    CASE
+        -- On its grid a timer takes count - 2 periods for that many calls at the least; one more for
+        -- how long starting takes.
+        WHEN c.span_ns < (c.count - 3) * a.period_ns THEN 'clock'
+        -- What a busy executor adds is not that constant, and calls of fast timers are late by more
+        -- than a hundredth of their period for the time that waking takes. Fewer than ten may be
+        -- equally late by chance.
+        WHEN
+            d.known >= 10
+            AND d.usual_lateness[2] - d.usual_lateness[1] <= a.period_ns // 100
+            AND d.usual_lateness[1] > a.period_ns // 10
+            AND d.busy_share < 0.5
+            THEN 'reset'
+    END AS off_grid,
     d.busy_share,
     m.shares AS meanwhile,
     coalesce(c.count - c.loss_affected - coalesce(d.known, 0), 0) AS unknown,

@@ -36,7 +36,7 @@ instance AS (
     UNION ALL
     SELECT 'callback_end', callback_instance_id, thread_id, end_ns
     FROM analysed.store.callback_instance
-    WHERE end_ns IS NOT NULL
+    WHERE end_event_id IS NOT NULL
     UNION ALL
     SELECT 'state_start', start_event_id, thread_id, start_ns
     FROM analysed.store.executor_state

@@ -193,7 +193,7 @@ class _Painter:
         elif node["kind"] == "callback_instance":
             details.append(f"ran {format_duration(node['end_ns'] - node['start_ns'])}")
         elif node["kind"] == "publication" and node["end_ns"] is not None:
-            details.append(f"in {format_duration(node['end_ns'] - node['start_ns'])}")
+            details.append(_publishing(node))
         for vertex in (item.take, node):
             if vertex is not None and vertex["missing"] == "copy":
                 details.append("copy of a message within the process")
@@ -216,6 +216,14 @@ def _bound(detail: str, room: int) -> str:
     if cell_len(detail) <= room:
         return detail.replace(" ", _BOUND)
     return " ".join(word.replace(" ", _BOUND) for word in words(detail))
+
+
+def _publishing(node: Row) -> str:
+    """How long publish() took: the message is written after its last event."""
+    least = format_duration(node["end_ns"] - node["start_ns"])
+    if node["until_ns"] is None:
+        return f"in {least} or more"
+    return f"in {least} to {format_duration(node['until_ns'] - node['start_ns'])}"
 
 
 def _waits(edge: Row) -> str:

@@ -30,6 +30,7 @@ _NODE = (
     "host",
     "busy_min_ns",
     "busy_max_ns",
+    "until_ns",
 )
 _STATE = ("missing", "reason", "cut_count", "internal_count")
 NOT_TAKEN = "not_taken"
@@ -46,7 +47,8 @@ class FlowVertices:
         limit: most vertices.
         run: its run.
         table: the rows of `main.flow_step`, nearest to the start first, with the bounds of
-            `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns).
+            `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns), and
+            when the thread of a publication went on at the latest (until_ns).
         notes: what the rows do not say, a sentence each.
     """
 

@@ -30,8 +30,8 @@ take — one row per message that was handed over to a subscription:
     and DDS is taken twice; the second one has no callback.
 callback_instance — one row per run of a callback that is traced:
     callback_instance_id, host, pid, tid, node, kind ('timer', 'subscription', 'service'),
-    callback_handle, start_ns, end_ns (NULL: it never ended), take_id (NULL but for
-    subscriptions), is_intra_process, parent_id (the callback that it runs nested in)
+    callback_handle, start_ns, end_ns (NULL: it never ended, or nothing records it), take_id
+    (NULL but for subscriptions), is_intra_process, parent_id (the callback that it runs nested in)
 transport — one row per take with its publication:
     publication_id, take_id, topic_name, publication_{host,pid,tid,rclcpp_ns,rcl_ns,rmw_ns},
     source_timestamp_ns, take_{host,pid,tid,rmw_ns,rcl_ns,rclcpp_ns}, latency_ns (rmw_publish to

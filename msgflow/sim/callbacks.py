@@ -95,8 +95,9 @@ def run_callback(
     subscription: SubscriptionObject | None = None,
     is_intra: int = 0,
     instance_id: int | None = None,
+    has_end: bool = True,
 ) -> Run:
-    """Run a callback from `start` on; returns the time of callback_end."""
+    """Run a callback from `start` on; returns the time of callback_end, recorded if `has_end`."""
     scheduler, machine = thread.scheduler, thread.machine
     if instance_id is None:
         instance_id = next(scheduler.callback_instance_ids)
@@ -115,11 +116,15 @@ def run_callback(
     thread.emit(machine.tracepoints.callback_start, start, thread.context, callback, is_intra)
     outcome = execute(thread, middleware, code, start, instance)
     if not isinstance(outcome, int):
-        return _in_steps(outcome, thread, facts, taken, subscription, is_intra, code, instance)
-    thread.emit(machine.tracepoints.callback_end, outcome, thread.context, callback)
+        return _in_steps(
+            outcome, thread, facts, taken, subscription, is_intra, code, instance, has_end
+        )
+    if has_end:
+        thread.emit(machine.tracepoints.callback_end, outcome, thread.context, callback)
     if code.links is not None:
         code.links.end(outcome, instance)
-    _write(thread, facts, outcome, taken, subscription, is_intra, None)
+    end = outcome if has_end else None
+    _write(thread, facts, end, taken, subscription, is_intra, None)
     return outcome
 
 
@@ -132,6 +137,7 @@ def _in_steps(
     is_intra: int,
     code: UserCode,
     instance: CallbackInstance,
+    has_end: bool,
 ) -> Steps:
     """Go through a callback that others can act between, or that may be cut short."""
     instance_id, callback = facts[0], facts[6]
@@ -140,12 +146,14 @@ def _in_steps(
     end: int | None = None
     try:
         end = yield from steps
-        thread.emit(thread.machine.tracepoints.callback_end, end, thread.context, callback)
+        if has_end:
+            thread.emit(thread.machine.tracepoints.callback_end, end, thread.context, callback)
         if code.links is not None:
             code.links.end(end, instance)
     finally:
         thread.running.pop()
-        _write(thread, facts, end, taken, subscription, is_intra, parent_id)
+        recorded = end if has_end else None
+        _write(thread, facts, recorded, taken, subscription, is_intra, parent_id)
     return end
 
 

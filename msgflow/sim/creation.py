@@ -218,6 +218,19 @@ class Creator:
 
     def service(self, node: NodeContext, description: entity.Service, symbol: str) -> ServiceObject:
         """A service; it answers once it has been given to `spin_service`."""
+        service = self.rcl_service(node, description)
+        if not description.is_action:
+            self._add_service_callback(service.handle, service.callback, symbol)
+        return service
+
+    def copied_service(self, service: ServiceObject, symbol: str) -> None:
+        """A copy of a service of rcl, at another address, gets the callback: what a managed node
+        does with the services of its lifecycle.
+        """
+        self._add_service_callback(self._memory.allocate(), service.callback, symbol)
+
+    def rcl_service(self, node: NodeContext, description: entity.Service) -> ServiceObject:
+        """A service of rcl, which has no callback yet."""
         self.work(250 * MICROSECOND)
         self.announce()
         memory, name = self._memory, description.name
@@ -233,13 +246,14 @@ class Creator:
         code = self._code(node, description, executor)
         if description.is_action:
             code = replace(code, is_callback=False)
-        else:
-            self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
-            self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
         return ServiceObject(
             self._network, self._process, executor, group, node.description.full_name, name,
-            handle, rmw_handle, callback, memory.on_stack(), code,
+            handle, rmw_handle, callback, memory.on_stack(), code, description.is_deferred,
         )  # fmt: skip
+
+    def _add_service_callback(self, handle: int, callback: int, symbol: str) -> None:
+        self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
+        self._emit_of_rclcpp("rclcpp_callback_register", callback, symbol)
 
     def spin_service(self, service: ServiceObject) -> None:
         """Let the executor answer requests."""

@@ -199,6 +199,7 @@ class Service:
 
     Attributes:
         is_action: it is of an action server, whose callbacks are not traced.
+        is_deferred: the callback does not return the response, which is sent on its own.
     """
 
     name: str
@@ -208,6 +209,7 @@ class Service:
     does: tuple[Action, ...] = ()
     group: str = ""
     is_action: bool = False
+    is_deferred: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,6 +44,7 @@ class Layout:
         is_rosout_first: a node's publisher of /rosout is created before rcl_node_init.
         is_stamped_early: DDS makes the stamp when write is entered (Cyclone DDS); else once the
             message is serialised (Fast DDS).
+        has_end_of_deferred: callback_end is recorded for a service that answers later.
         dds_write: the `dds:*` events of a publication, in order.
         packet_bytes: size of a sub-buffer, hence of a packet.
         tracer_minor: of LTTng 2.x.
@@ -55,6 +56,7 @@ class Layout:
     is_stamped_by_rmw: bool = False
     is_rosout_first: bool = True
     is_stamped_early: bool = False
+    has_end_of_deferred: bool = False
     dds_write: tuple[str, ...] = ()
     packet_bytes: int = _LARGE_PACKET
     tracer_minor: int = 13
@@ -188,6 +190,7 @@ _KILTED = replace(
             rmw_subscription_init="rmw_subscription_handle pointer, gid bytes 16",
         )
     ),
+    has_end_of_deferred=True,
 )
 
 _ROLLING = replace(

@@ -63,6 +63,7 @@ class ServiceObject:
     callback: int
     message: int
     code: UserCode
+    is_deferred: bool = False
     requests: deque[Request] = field(default_factory=deque)
 
     def is_ready(self, time: int) -> bool:
@@ -175,6 +176,7 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
             run_callback(
                 thread, middleware, service.code, start, service.callback, service.node, "service",
                 instance_id=request.callback_instance_id,
+                has_end=not service.is_deferred or machine.layout.has_end_of_deferred,
             )
         )  # fmt: skip
     else:

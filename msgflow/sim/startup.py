@@ -165,8 +165,7 @@ class Startup:
     def _create_objects(self, node: NodeContext) -> Iterator[bool]:
         creator, description = self._creator, node.description
         if description.is_managed:
-            creator.lifecycle(node)
-            yield True
+            yield from self._create_lifecycle(node)
         for publisher in description.publishers:
             node.publishers[publisher.topic] = creator.publisher(node, publisher)
             yield True
@@ -182,6 +181,8 @@ class Startup:
                 yield True
             self._user_thread.plan(node, subscription, symbol, created)
         for service in description.services:
+            if _is_of_lifecycle(node, service):
+                continue
             symbol = symbols.service_callback(description.name)
             creator.spin_service(creator.service(node, service, symbol))
             yield True
@@ -192,8 +193,28 @@ class Startup:
             creator.links(node, self._created)
             yield True
 
+    def _create_lifecycle(self, node: NodeContext) -> Iterator[bool]:
+        """The state machine of a managed node, behind its services and before their callbacks."""
+        creator, services = self._creator, []
+        described = {service.name: service for service in node.description.services}
+        for name in symbols.LIFECYCLE_SERVICES:
+            full_name = f"{node.description.full_name}/{name}"
+            service = described.get(full_name, entity.Service(full_name))
+            services.append(creator.rcl_service(node, service))
+            yield True
+        creator.lifecycle(node)
+        for created in services:
+            creator.copied_service(created, symbols.service_callback("lifecycle_node"))
+            creator.spin_service(created)
+        yield True
+
     def _publish(self, publisher: PublisherObject) -> None:
         self._creator.work(8 * MICROSECOND)
         self._creator.time = publish(
             self.thread, self._middleware, publisher, self._creator.time, None
         )
+
+
+def _is_of_lifecycle(node: NodeContext, service: entity.Service) -> bool:
+    names = {f"{node.description.full_name}/{name}" for name in symbols.LIFECYCLE_SERVICES}
+    return node.description.is_managed and service.name in names

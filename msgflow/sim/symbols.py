@@ -29,6 +29,15 @@ PARAMETER_EVENTS = (
     "#1}"
 )
 
+# Services of a managed node, in the order of creation.
+LIFECYCLE_SERVICES = (
+    "change_state",
+    "get_state",
+    "get_available_states",
+    "get_available_transitions",
+    "get_transition_graph",
+)
+
 
 def parameter_services() -> Iterator[tuple[str, str]]:
     """Name and callback symbol of each parameter service, in the order of creation."""

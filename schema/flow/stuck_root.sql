@@ -1,8 +1,10 @@
 -- name: derive.stuck_root
 -- kind: macro
 -- description: Why roots of paths did not arrive: the reason at the step at which they got stuck,
---     and whether the recording may have cut them, since no message passed that step earlier, or
---     none later.
+--     and whether the recording may have cut them. It may where no message passed that step later,
+--     or, of messages that were published and not taken, none earlier (their readers were not there
+--     yet). What became of a message that was taken is recorded until its process ends:
+--     `recorded_until_ns`.
 -- grain: one row per path and root that did not arrive
 -- param: missing VARCHAR  Name of rows of path_id, root_key, publication_id: the root's last one
 -- param: lineages VARCHAR  Name of rows of path_id, prefix_id, depth: paths, with their beginnings
@@ -65,16 +67,14 @@ delivered AS (
 ),
 continued AS (
     SELECT
-        c.subscription_id, c.publisher_id, c.route,
-        min(t.taken_ns) AS first_ns,
-        max(t.taken_ns) AS last_ns
+        c.subscription_id, c.publisher_id, c.route, max(t.taken_ns) AS last_ns
     FROM derive.flow_continuation AS c
     JOIN store.take AS t ON c.take_id = t.take_id
     WHERE list_contains(runs, c.run_id) AND c.publisher_id IN (SELECT publisher_id FROM stuck)
     GROUP BY c.subscription_id, c.publisher_id, c.route
 ),
 finished AS (
-    SELECT a.path_id, min(t.taken_ns) AS first_ns, max(t.taken_ns) AS last_ns
+    SELECT a.path_id, max(t.taken_ns) AS last_ns
     FROM query_table(arrived) AS a
     JOIN store.take AS t ON a.take_id = t.take_id
     WHERE a.path_id IN (SELECT path_id FROM stuck WHERE publisher_id IS NULL)
@@ -91,13 +91,17 @@ SELECT
     s.publication_id IS NULL AND s.is_cached AS is_cached,
     coalesce(
         CASE
-            WHEN s.publisher_id IS NULL THEN s.taken_ns < f.first_ns OR s.taken_ns > f.last_ns
+            WHEN s.publisher_id IS NULL THEN s.taken_ns > f.last_ns
             WHEN s.publication_id IS NOT NULL THEN
                 b.start_ns < d.first_ns OR b.start_ns > d.last_ns
-            ELSE s.taken_ns < c.first_ns OR s.taken_ns > c.last_ns
+            ELSE s.taken_ns > c.last_ns
         END,
         false
-    ) AS is_cut
+    ) AS is_cut,
+    CASE
+        WHEN s.publisher_id IS NULL OR s.publication_id IS NULL THEN
+            derive.corrected_ns(p.last_seen_ns, k.offset_ns, k.drift_ppb, k.reference_ns)
+    END AS recorded_until_ns
 FROM stuck AS s
 LEFT JOIN store.publication AS b ON s.publication_id = b.publication_id
 LEFT JOIN delivered AS d
@@ -106,6 +110,8 @@ LEFT JOIN finished AS f ON s.path_id = f.path_id
 LEFT JOIN store.undelivered AS u
     ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
 LEFT JOIN store.take AS t ON s.take_id = t.take_id
+LEFT JOIN store.process AS p ON t.process_id = p.process_id
+LEFT JOIN derive.process_clock AS k ON t.process_id = k.process_id
 LEFT JOIN continued AS c
     ON t.subscription_id = c.subscription_id
     AND s.publisher_id = c.publisher_id

@@ -3,8 +3,9 @@
 -- description: What became of every root of every path. A root that reached the sink has one row
 --     per take there; a root that did not has a single row with the reason. Roots are callback
 --     instances of timers that published, or publications (always with from_event 'publish'). The
---     time window applies to roots. A message that stopped a root is lost if earlier and later ones
---     passed the same step, else it is cut by the recording.
+--     time window applies to roots. A message that stopped a root is lost if others passed the same
+--     step later, and earlier too if nobody took it; else it is cut by the recording. One that was
+--     taken is lost as well if its process was recorded for longer than any flow of the path took.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
 -- param: runs BIGINT[]  Runs to look at
 -- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
@@ -172,9 +173,6 @@ missing AS MATERIALIZED (
     FROM expected AS e
     ANTI JOIN pair AS a ON e.path_id = a.path_id AND e.root_key = a.root_key
 ),
-explained AS (
-    FROM derive.stuck_root('missing', 'lineage', 'path', 'reached', 'pair', runs)
-),
 -- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
     SELECT a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns
@@ -187,6 +185,15 @@ longest AS (
     SELECT path_id, max(sink_ns - root_ns) AS longest_ns
     FROM outcome
     GROUP BY path_id
+),
+-- With time enough for the longest flow it is not the recording that cut a root.
+explained AS (
+    SELECT
+        s.path_id, s.root_key, s.reason, s.is_cached,
+        s.is_cut AND coalesce(m.root_ns + l.longest_ns >= s.recorded_until_ns, true) AS is_cut
+    FROM derive.stuck_root('missing', 'lineage', 'path', 'reached', 'pair', runs) AS s
+    JOIN missing AS m ON s.path_id = m.path_id AND s.root_key = m.root_key
+    JOIN longest AS l ON s.path_id = l.path_id
 ),
 gap AS (
     SELECT

@@ -94,7 +94,7 @@ def test_errors_make_it_1_and_come_first(msgflow: Msgflow, database: Path) -> No
         "1. error: The tracer discarded events (discarded_events)",
         "2. warning: Tracing was paused (tracing_paused)",
     ]
-    assert "--subbuf-size=1M" in result.stdout
+    assert "--subbuf-size=128K" in result.stdout
     assert result.stderr == "1 error, 1 warning\n"
 
 

@@ -21,7 +21,7 @@ def test_the_tree_goes_to_stdout_and_words_to_stderr(
     with Database(small_database) as database:
         assert result.stdout == f"{database.flow('/chatter', at='0.1s')}\n"
     assert result.stdout.splitlines()[1:] == [
-        "+0 ns  /talker  publishes /chatter  in 100 ns  thread thread 1  ◀"
+        "+0 ns  /talker  publishes /chatter  in 100 ns or more  thread thread 1  ◀"
     ]
     assert result.stderr == "run: noon (2)\n"
 

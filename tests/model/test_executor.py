@@ -137,3 +137,15 @@ def test_an_executor_that_waits_only_afterwards_was_not_idle(
         "SELECT p.pid, w.idle_ns FROM executor_wait AS w JOIN thread AS t USING (thread_id) "
         "JOIN process AS p USING (process_id) ORDER BY 1"
     ) == [(100, 0), (300, None)]
+
+
+def test_threads_that_poll(system: RosSystem, analyse: Analyse) -> None:
+    """Most of their waits have a timeout of 0."""
+    timeouts = {101: [0, 0, -1], 102: [0, -1], 103: [0], 104: [0, 0, -1, -1], 105: [5, 5]}
+    for tid, each in timeouts.items():
+        for timeout in each:
+            system.add("ros2:rclcpp_executor_wait_for_work", Thread(100, tid), timeout=timeout)
+    assert analyse(system).rows(
+        "SELECT t.tid, p.polls, p.waits FROM staging.executor_polled AS p "
+        "JOIN staging.thread AS t USING (thread_id)"
+    ) == [(101, 2, 3)]

@@ -353,3 +353,107 @@ def test_a_service_without_callbacks(system: RosSystem, analyse: Analyse) -> Non
             *analysis.rows("SELECT q.taken_ns, r.sent_ns FROM request AS q, response AS r")[0],
         )
     ]
+
+
+LIFECYCLE = ("change_state", "get_state", "states", "transitions", "graph")
+
+
+def managed_node(system: RosSystem, node: int, name: str, callback: int, *, lost: int = 0) -> None:
+    """A node with a service of its own, and the services of its lifecycle, without some events."""
+    system.node(SERVER, node, name)
+    system.service(SERVER, node + 0x100, f"/{name}/parameters", node=node, callback=callback)
+    for number, service in enumerate(LIFECYCLE[lost:], start=1):
+        system.service(
+            SERVER, node + 0x100 + number, f"/{name}/{service}", callback=None, node=node
+        )
+    system.add(
+        "ros2:rcl_lifecycle_state_machine_init", SERVER, node_handle=node, state_machine=node + 5
+    )
+    for number in range(1, 6 - lost):
+        system.add(
+            "ros2:rclcpp_service_callback_added",
+            SERVER,
+            service_handle=node + 0x200 + number,
+            callback=callback + number,
+        )
+
+
+SERVICES_OF_CALLBACKS = (
+    "SELECT n.full_name, s.service_name, c.callback_handle FROM callback AS c "
+    "LEFT JOIN service AS s USING (service_id) LEFT JOIN node AS n ON c.node_id = n.node_id "
+    "ORDER BY c.callback_id"
+)
+
+
+def test_services_of_managed_nodes(system: RosSystem, analyse: Analyse) -> None:
+    """rclcpp has copies of them; an address of one may be that of a service gone by."""
+    hosts(system)
+    for node, name, callback in ((0x1000, "one", 0xA0), (0xF00, "two", 0xB0)):
+        managed_node(system, node, name, callback)
+    analysis = analyse(system)
+    assert analysis.rows(SERVICES_OF_CALLBACKS)[1:] == [
+        (f"/{node}", f"/{node}/{service}", callback + number)
+        for node, callback in (("one", 0xA0), ("two", 0xB0))
+        for number, service in enumerate(("parameters", *LIFECYCLE))
+    ]
+    assert analysis.rows("SELECT count(*) FROM service WHERE is_inferred") == [(0,)]
+
+
+def test_services_of_a_managed_node_that_were_lost(system: RosSystem, analyse: Analyse) -> None:
+    """The order of what is left tells nothing."""
+    hosts(system)
+    managed_node(system, 0x1000, "one", 0xA0, lost=1)
+    rows = analyse(system).rows(SERVICES_OF_CALLBACKS)[1:]
+    assert rows == [
+        ("/one", "/one/parameters", 0xA0),
+        *[(None, None, 0xA0 + number) for number in range(1, 5)],
+    ]
+
+
+RUNS = (
+    "SELECT start_ns, end_ns, is_end_inferred FROM callback_instance ORDER BY callback_instance_id"
+)
+
+
+def serve(system: RosSystem, callback: int, *, ends: bool = False) -> int:
+    """A callback of a service, called by an executor; its start."""
+    system.ready(SERVER)
+    start = system.start(SERVER, callback)
+    if ends:
+        system.end(SERVER, callback)
+    return start
+
+
+def test_a_response_that_comes_later(system: RosSystem, analyse: Analyse) -> None:
+    """rclcpp records no end of the callback: the executor goes on when it is over."""
+    hosts(system)
+    system.timer(SERVER, 0x60, 0xC2)
+    starts = [serve(system, 0xC1)]
+    ends = [system.ready(SERVER)]
+    start = system.start(SERVER, 0xC2)
+    starts += [start, serve(system, 0xC1)]
+    analysis = analyse(system)
+    assert analysis.rows(RUNS) == [
+        (starts[0], ends[0], True),
+        (start, None, False),
+        (starts[2], None, False),
+    ]
+
+
+def test_a_service_callback_that_throws(system: RosSystem, analyse: Analyse) -> None:
+    """Others of the service have an end."""
+    hosts(system)
+    first = serve(system, 0xC1)
+    system.ready(SERVER)
+    second = serve(system, 0xC1, ends=True)
+    assert [row[::2] for row in analyse(system).rows(RUNS)] == [(first, False), (second, False)]
+    assert analyse(system).rows(RUNS)[0][1] is None
+
+
+def test_a_response_that_comes_later_and_a_gap(system: RosSystem, analyse: Analyse) -> None:
+    """What the executor did last may be lost, and so may the end."""
+    hosts(system)
+    start = serve(system, 0xC1)
+    system.lose(trace=1)
+    system.ready(SERVER)
+    assert analyse(system).rows(RUNS) == [(start, None, False)]

@@ -58,6 +58,16 @@ def merges() -> Scenario:
                 MessageLink("periodic_async", ("/c", "/d"), ("/kept/1",)),
             ),
         ),
+        # A driver: it obeys commands, and publishes its sensors.
+        Node(
+            "driver",
+            publishers=(Publisher("/imu"), Publisher("/camera")),
+            subscriptions=(Subscription("/a"),),
+            timers=(
+                Timer(13 * MILLISECOND, ("/imu",)),
+                Timer(29 * MILLISECOND, ("/camera",)),
+            ),
+        ),
     )
     sources = tuple(
         Node(

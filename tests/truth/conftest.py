@@ -82,13 +82,13 @@ def complete(request: pytest.FixtureRequest, simulations: Callable[[str], Ingest
 def recordings(
     shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Ingested]]:
-    """Ingests one of the recorded traces."""
+    """Ingests one of the recorded traces, by its path in the folder of all."""
     directory = tmp_path_factory.mktemp("recorded")
     with ExitStack() as opened:
 
         @cache
         def get(name: str) -> Ingested:
-            path = directory / f"{name}.duckdb"
+            path = directory / f"{name.replace('/', '_')}.duckdb"
             ingested = ingest_one(shared_traces / name, path)
             opened.callback(ingested.connection.close)
             return ingested

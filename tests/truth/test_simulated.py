@@ -52,7 +52,7 @@ CASES = {
         """,
         """
         SELECT p.hostname, p.pid, p.tid, n.full_name, c.kind, c.callback_handle, i.start_ns,
-            i.end_ns, t.taken_ns
+            CASE WHEN NOT i.is_end_inferred THEN i.end_ns END, t.taken_ns
         FROM callback_instance AS i
         JOIN place AS p USING (thread_id)
         JOIN callback AS c USING (callback_id)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from sqlalchemy import INTEGER, Column, Table
+from sqlalchemy import BOOLEAN, INTEGER, Column, Table
 
 from msgflow.db.tables.column import (
     STORE,
+    column,
     event_order,
     flag,
     handle,
@@ -19,6 +20,14 @@ from msgflow.db.tables.column import (
     text,
     thread_id,
     trace_id,
+)
+
+_IS_END_INFERRED = column(
+    "is_end_inferred",
+    BOOLEAN,
+    "No callback_end: a service callback that answers later (before Kilted), which was over at "
+    "the next executor event of its thread at the latest",
+    sql="self.end_ns IS NOT NULL AND self.end_event_id IS NULL",
 )
 
 Table(
@@ -83,7 +92,11 @@ Table(
     process_id(),
     thread_id(),
     moment("start_ns", "callback_start", required=True, clock="process_id"),
-    moment("end_ns", "callback_end; NULL: never seen to end", clock="process_id"),
+    moment(
+        "end_ns",
+        "callback_end, else what is_end_inferred says; NULL: never seen to end",
+        clock="process_id",
+    ),
     reference("take_id", "Message it was called with", to="take.take_id"),
     reference("request_id", "Request it was called with", to="request.request_id"),
     flag("is_intra_process", "Called with an intra-process message"),
@@ -103,5 +116,5 @@ Table(
         "A gap inside or beside it on its thread may hide its end or what it did",
     ),
     comment="One row per callback instance",
-    info={"view": "Callback instances."},
+    info={"view": "Callback instances.", "computed": (_IS_END_INFERRED,)},
 )

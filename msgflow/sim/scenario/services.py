@@ -89,7 +89,7 @@ def services() -> Scenario:
         publishers=(Publisher("/plan_made"),),
         services=(
             Service("/plan", ("/plan_made",), Work(2 * MILLISECOND, MILLISECOND), logs=True),
-            Service("/map/get"),
+            Service("/map/get", is_deferred=True),
         ),
     )
     driver = Node(

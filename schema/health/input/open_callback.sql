@@ -13,5 +13,6 @@ SELECT
     || 'events were lost' AS detail
 FROM staging.callback_pair
 SEMI JOIN staging.callback_number USING (start_event_id)
+ANTI JOIN staging.deferred_end USING (start_event_id)
 WHERE end_ns IS NULL
 GROUP BY trace_index

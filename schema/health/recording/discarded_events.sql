@@ -35,23 +35,36 @@ fullest AS (
         trace_id, max(event_count) AS events, bool_or(discarded_event_count IS NULL) AS is_uncounted
     FROM store.packet
     GROUP BY trace_id
+),
+sized AS (
+    SELECT
+        l.*,
+        f.is_uncounted,
+        -- About 100 bytes for an event, the next power of two that holds the packet and the burst.
+        (2 ** ceil(log2((l.largest::DOUBLE + f.events) * 100 / 1024)))::BIGINT AS kibibytes
+    FROM loss AS l
+    JOIN fullest AS f ON l.trace_id = f.trace_id
 )
 SELECT
     l.run_id,
     l.trace_id,
     coalesce(l.events, l.places) AS count,
     printf(
-        '%s%s in %s, %.3f s in all; --subbuf-size=%dM would have held the largest '
-        || 'burst',
-        CASE WHEN l.events IS NOT NULL AND f.is_uncounted THEN 'at least ' ELSE '' END,
+        '%s%s in %s, %.3f s in all; ',
+        CASE WHEN l.events IS NOT NULL AND l.is_uncounted THEN 'at least ' ELSE '' END,
         CASE WHEN l.events = 1 THEN '1 event'
             ELSE coalesce(format('{:,}', l.events), 'unknown') || ' events' END,
         derive.counted(l.places, 'place'),
-        l.length_ns / 1e9,
-        -- About 100 bytes for an event, the next power of two that holds them, at least 1 MiB.
-        (2 ** greatest(
-            ceil(log2((coalesce(l.largest, 0)::DOUBLE + f.events) * 100 / 1048576)), 0
-        ))::BIGINT
-    ) AS detail
-FROM loss AS l
-JOIN fullest AS f ON l.trace_id = f.trace_id
+        l.length_ns / 1e9
+    )
+    || CASE
+        WHEN l.kibibytes IS NULL
+            THEN 'which sub-buffers would have held the largest burst is not known'
+        ELSE printf(
+            '--subbuf-size=%s would have held the largest burst%s',
+            CASE WHEN l.kibibytes < 1024 THEN l.kibibytes || 'K'
+                ELSE l.kibibytes // 1024 || 'M' END,
+            CASE WHEN l.is_uncounted THEN ' that was counted' ELSE '' END
+        )
+    END AS detail
+FROM sized AS l

@@ -3,7 +3,8 @@
 -- description: The traces lack a kind of event that the other events of the run call for. So a
 --     whole part of the answers is empty.
 -- cause: The event was not enabled in the session; or the installed ROS 2 or middleware does not
---     have it, even if the metadata of the trace lists it.
+--     have it, even if the metadata of the trace lists it: those of requests came with Kilted, and
+--     rclpy has none of callbacks and executors.
 -- cure: Enable all events of ROS: lttng enable-event --userspace 'ros2:*' (ros2 trace does), and
 --     use a tracetools and a middleware that have them.
 -- grain: one row per run and kind
@@ -14,7 +15,15 @@ WITH seen AS MATERIALIZED (
         EXISTS (FROM store.publication WHERE run_id = $run_id) AS has_publications,
         EXISTS (FROM store.take WHERE run_id = $run_id AND method <> 'callback_only') AS has_takes,
         EXISTS (FROM store.callback_instance WHERE run_id = $run_id) AS has_callbacks,
-        EXISTS (FROM store.executor_state WHERE run_id = $run_id) AS has_states
+        EXISTS (FROM store.executor_state WHERE run_id = $run_id) AS has_states,
+        EXISTS (FROM store.request WHERE run_id = $run_id) AS has_requests,
+        -- Those were enabled, and some client library or executor has none.
+        EXISTS (
+            FROM store.finding WHERE run_id = $run_id AND name = 'process_without_rclcpp'
+        ) AS is_without_rclcpp,
+        EXISTS (
+            FROM store.finding WHERE run_id = $run_id AND name = 'executor_without_events'
+        ) AS is_without_executor
     FROM store.run
     WHERE run_id = $run_id
 )
@@ -36,9 +45,19 @@ UNION ALL
 SELECT $run_id, 'callbacks', 1,
     'no callback ran as far as traced (callback_start, callback_end): no causes, no durations'
 FROM seen
-WHERE NOT has_callbacks AND (has_publications OR has_takes)
+WHERE NOT (has_callbacks OR is_without_rclcpp) AND (has_publications OR has_takes)
 UNION ALL
 SELECT $run_id, 'executors', 1,
     'no event of an executor (rclcpp_executor_wait_for_work and others): no executor states'
 FROM seen
-WHERE NOT has_states AND has_callbacks
+WHERE NOT (has_states OR is_without_executor) AND has_callbacks
+UNION ALL
+SELECT $run_id, 'requests', count(*),
+    'callbacks of services ran ' || derive.counted(count(*), 'time')
+    || ', and no request was seen (rmw_take_request and others, since Kilted): no calls, no flows '
+    || 'through services'
+FROM store.callback_instance AS i
+JOIN store.callback AS c ON i.callback_id = c.callback_id
+JOIN seen ON NOT has_requests
+WHERE i.run_id = $run_id AND c.kind = 'service'
+HAVING count(*) > 0

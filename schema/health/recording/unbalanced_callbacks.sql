@@ -4,7 +4,8 @@
 --     record of the thread explains it. Their durations are not known. What they published is still
 --     linked.
 -- cause: The callback threw an exception that was caught further up, or the event callback_end is
---     not enabled.
+--     not enabled; or it is of a service that answers later, before Kilted, in an executor that has
+--     no events.
 -- cure: Enable ros2:callback_end; look at the callbacks (msgflow query callback-duration) for
 --     exceptions.
 -- grain: one row per process

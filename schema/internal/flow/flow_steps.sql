@@ -1,7 +1,9 @@
 -- name: internal.flow_steps
 -- title: Steps of a flow
 -- description: The steps of `main.flow_step`, with how long the executor was busy before the
---     callbacks of takes and requests.
+--     callbacks of takes and requests, and when the thread went on after a publication
+--     (until_ns): writing the message comes after the last event of the call, so that it took until
+--     then at most.
 -- grain: one row per vertex and link that leads to it
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
@@ -12,21 +14,56 @@
 --     requests and responses
 -- param: internal BOOLEAN = false  Follow effects on topics and services of ROS itself too
 -- param: run_id BIGINT  Its run
+WITH step AS MATERIALIZED (
+    FROM main.flow_step(
+        $kind, $id,
+        direction := $direction,
+        -- A message is three steps; no flow within the limit has more than it has vertices.
+        max_depth := least($depth::BIGINT * 3, 10000)::INTEGER,
+        max_vertices := $limit,
+        internal := $internal
+    )
+),
+sent AS (
+    SELECT publication_id, process_id, thread_id, end_event_id
+    FROM store.publication
+    WHERE publication_id IN (SELECT id FROM step WHERE kind = 'publication')
+),
+next AS (
+    SELECT thread_id, start_event_id AS event_id, start_ns AS at_ns FROM store.publication
+    UNION ALL
+    SELECT thread_id, start_event_id, taken_ns FROM store.take WHERE start_event_id IS NOT NULL
+    UNION ALL
+    SELECT thread_id, start_event_id, start_ns FROM store.callback_instance
+    UNION ALL
+    SELECT thread_id, end_event_id, end_ns
+    FROM store.callback_instance
+    WHERE end_event_id IS NOT NULL
+    UNION ALL
+    SELECT thread_id, start_event_id, start_ns FROM store.executor_state
+),
+went_on AS (
+    SELECT
+        s.publication_id,
+        derive.corrected_ns(n.at_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS until_ns
+    FROM sent AS s
+    ASOF JOIN (SELECT * FROM next WHERE thread_id IN (SELECT thread_id FROM sent)) AS n
+        ON s.thread_id = n.thread_id AND s.end_event_id < n.event_id
+    ASOF LEFT JOIN store.thread_break AS b
+        ON s.thread_id = b.thread_id AND s.end_event_id < b.resumed_event_id
+    JOIN derive.process_clock AS c ON s.process_id = c.process_id
+    -- In a gap between the two the thread may have gone on.
+    WHERE coalesce(b.resumed_event_id > n.event_id, true)
+)
 SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
     s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
     s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
-    w.busy_min_ns, w.busy_max_ns
-FROM main.flow_step(
-    $kind, $id,
-    direction := $direction,
-    -- A message is three steps; no flow within the limit has more than it has vertices.
-    max_depth := least($depth::BIGINT * 3, 10000)::INTEGER,
-    max_vertices := $limit,
-    internal := $internal
-) AS s
+    w.busy_min_ns, w.busy_max_ns, u.until_ns
+FROM step AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns
     FROM main.executor_wait
     WHERE run_id = $run_id AND since IN ('publication', 'request')
 ) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
+LEFT JOIN went_on AS u ON s.kind = 'publication' AND s.id = u.publication_id
 ORDER BY abs(s.depth), s.depth, s.start_ns, s.kind, s.id, s.from_kind, s.from_id, s.link_kind

@@ -10,7 +10,7 @@ SELECT
     r.process_id,
     r.thread_id,
     r.start_ns,
-    r.end_ns,
+    coalesce(r.end_ns, d.end_ns) AS end_ns,
     n.take_id,
     q.request_id,
     r.is_intra_process,
@@ -23,5 +23,6 @@ SELECT
 FROM staging.callback_run AS r
 JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
 LEFT JOIN staging.callback_parent AS p ON r.start_event_id = p.start_event_id
+LEFT JOIN staging.deferred_end AS d ON r.start_event_id = d.start_event_id
 LEFT JOIN staging.callback_loss AS g ON r.start_event_id = g.start_event_id
 LEFT JOIN staging.request_origin AS q ON r.start_event_id = q.callback_start_event_id

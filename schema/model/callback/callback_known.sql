@@ -17,9 +17,10 @@ WITH added AS (
     JOIN staging.timer_use AS u ON a.event_id = u.event_id
     UNION ALL
     SELECT
-        a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL, s.event_id,
-        a.service_handle
+        a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL,
+        coalesce(l.service_event_id, s.event_id), a.service_handle
     FROM staging.located('ros2_rclcpp_service_callback_added') AS a
+    LEFT JOIN staging.lifecycle_service AS l ON a.event_id = l.event_id
     ASOF LEFT JOIN staging.service_known AS s
         ON a.process_id = s.process_id
         AND a.service_handle = s.service_handle

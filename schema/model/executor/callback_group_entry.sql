@@ -21,6 +21,12 @@ object AS (
     UNION ALL
     SELECT event_id, process_id, 'service', service_handle, service_id
     FROM staging.service
+    UNION ALL
+    -- Copies of services of managed nodes.
+    SELECT k.event_id, k.process_id, 'service', k.service_handle, s.service_id
+    FROM staging.lifecycle_service AS l
+    JOIN staging.callback_known AS k ON l.event_id = k.event_id
+    JOIN staging.service AS s ON l.service_event_id = s.event_id
 ),
 filled AS (
     SELECT

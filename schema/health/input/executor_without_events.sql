@@ -1,0 +1,44 @@
+-- name: finding.executor_without_events
+-- title: An executor that records no events
+-- description: Threads ran callbacks one after the other, and no event of an executor, although
+--     these events were enabled. What the threads did between callbacks is not known: they have no
+--     executor states, and how long a message waited for them is bounded by callbacks only. Links
+--     are not affected.
+-- cause: The process uses an EventsExecutor, a StaticSingleThreadedExecutor, or a loop of its own
+--     that calls callbacks (wait sets). rclcpp has no tracepoints in these.
+-- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.
+-- grain: one row per process with such threads
+-- severity: warning
+WITH enabled AS (
+    SELECT trace_index
+    FROM staging.declared
+    WHERE name = 'ros2:rclcpp_executor_get_next_ready'
+),
+running AS (
+    SELECT process_id, thread_id, trace_index, count(*) AS number
+    FROM staging.callback_pair
+    GROUP BY process_id, thread_id, trace_index
+),
+silent AS (
+    SELECT r.process_id, r.thread_id, r.number
+    FROM running AS r
+    SEMI JOIN enabled AS e ON r.trace_index = e.trace_index
+    ANTI JOIN staging.executor_first AS x ON r.thread_id = x.thread_id
+    ANTI JOIN staging.thread_break AS b ON r.thread_id = b.thread_id
+    -- An executor chose the first one before the recording began, perhaps. It would have said so
+    -- before the next.
+    WHERE r.number > 1
+)
+SELECT
+    l.label AS subject,
+    sum(s.number)::BIGINT AS count,
+    printf(
+        '%d callbacks on %d of %d threads, and no event of an executor',
+        sum(s.number)::BIGINT, count(*), any_value(t.threads)
+    ) AS detail
+FROM silent AS s
+JOIN (
+    SELECT process_id, count(DISTINCT thread_id) AS threads FROM running GROUP BY process_id
+) AS t ON s.process_id = t.process_id
+JOIN process_label AS l ON s.process_id = l.process_id
+GROUP BY s.process_id, l.label

@@ -1,0 +1,18 @@
+-- name: finding.polled_executor
+-- title: An executor that a loop polls
+-- description: Threads ask their executor for work at times of their own. What such a thread does
+--     between two polls looks like 'process', the state of looking for what is ready, though it may
+--     sleep. What is ready meanwhile waits for the next poll: that time is in no part of a wait.
+-- cause: A loop in the program calls spin_some, or spin_once with a timeout of 0.
+-- cure: None needed. Where messages wait for the loop, let the executor spin.
+-- grain: one row per process
+-- severity: warning
+SELECT
+    l.label AS subject,
+    sum(p.polls)::BIGINT AS count,
+    printf(
+        'polled %d times, of %d waits in all', sum(p.polls)::BIGINT, sum(p.waits)::BIGINT
+    ) AS detail
+FROM staging.executor_polled AS p
+JOIN process_label AS l ON p.process_id = l.process_id
+GROUP BY p.process_id, l.label

@@ -1,0 +1,45 @@
+-- name: finding.process_without_rclcpp
+-- title: A process that does not use rclcpp
+-- description: The process was seen to create nodes and to publish through rcl, and has no event
+--     of rclcpp, although these were enabled. So there are no callbacks, durations or executor
+--     states of it. A message is taken to have caused what its thread sent before the next take:
+--     what a timer of the process sent in that time cannot be told from that.
+-- cause: It is written in Python (rclpy) or uses another client library. These have no tracepoints
+--     of their own.
+-- cure: None for this recording. Measure callbacks of such nodes in the nodes themselves.
+-- grain: one row per process
+-- severity: warning
+WITH enabled AS (
+    SELECT trace_index FROM staging.declared WHERE name = 'ros2:callback_start'
+),
+sent AS (
+    SELECT
+        process_id,
+        bool_and(trace_index IN (SELECT trace_index FROM enabled)) AS is_enabled,
+        bool_or(rclcpp_ns IS NOT NULL OR intra_ns IS NOT NULL) AS has_rclcpp,
+        count(*) AS number
+    FROM staging.publication_call
+    GROUP BY process_id
+),
+timed AS (
+    SELECT process_id, count(*) AS number FROM staging.timer GROUP BY process_id
+),
+rclcpp AS (
+    SELECT process_id FROM staging.callback
+    UNION
+    SELECT t.process_id
+    FROM staging.thread AS t
+    SEMI JOIN staging.executor_first AS x ON t.thread_id = x.thread_id
+)
+SELECT
+    l.label AS subject,
+    s.number AS count,
+    printf('%d publications and %d timers, and no callback', s.number, coalesce(t.number, 0))
+        AS detail
+FROM sent AS s
+-- One of rclcpp that was there before the recording may only have logged.
+SEMI JOIN (FROM staging.node WHERE NOT is_inferred) AS n ON s.process_id = n.process_id
+ANTI JOIN rclcpp AS r ON s.process_id = r.process_id
+LEFT JOIN timed AS t ON s.process_id = t.process_id
+JOIN process_label AS l ON s.process_id = l.process_id
+WHERE s.is_enabled AND NOT s.has_rclcpp

@@ -1,0 +1,43 @@
+-- name: finding.busy_waiting
+-- title: An executor that waits busily
+-- description: The threads of an executor looked for work many times as often as they found some.
+--     That costs CPU time, which callbacks may lack, and most of the events of the trace are about
+--     it. Nothing is wrong with the recording.
+-- cause: While a callback of a mutually exclusive group runs, other callbacks of the group that are
+--     ready wake the MultiThreadedExecutor of rclcpp again and again, and it may not run them.
+-- cure: Give callbacks that may run at once groups of their own or a reentrant group, or the nodes
+--     single-threaded executors. Leave out the two events of looking for work
+--     (rclcpp_executor_wait_for_work, rclcpp_executor_get_next_ready) where they fill the buffers.
+-- grain: one row per executor
+-- severity: warning
+WITH waited AS (
+    SELECT
+        run_id, executor_id, count(*) AS number, count(DISTINCT thread_id) AS threads
+    FROM store.executor_state
+    -- Over within a millisecond: something was ready.
+    WHERE state = 'wait' AND end_ns - start_ns < 1_000_000
+    GROUP BY run_id, executor_id
+),
+ran AS (
+    SELECT x.executor_id, count(*) AS number
+    FROM store.callback_instance AS i
+    JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
+    GROUP BY x.executor_id
+)
+SELECT
+    w.run_id,
+    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    w.number AS count,
+    printf(
+        '%d short waits for %s on %s: %d for each',
+        w.number, derive.counted(r.number, 'callback'), derive.counted(w.threads, 'thread'),
+        w.number // r.number
+    ) AS detail
+FROM waited AS w
+JOIN ran AS r ON w.executor_id = r.executor_id
+JOIN main.executor AS e ON w.executor_id = e.executor_id
+JOIN main.process AS p ON e.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+-- One that sleeps until a callback is due waits once for it, or a few times: it is woken for what
+-- it does for itself, too. One that is busy waits twenty times and more.
+WHERE e.kind LIKE 'multi_threaded%' AND w.number > 10 * r.number
