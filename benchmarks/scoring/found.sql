@@ -126,11 +126,14 @@ link AS (
         'link_call', CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END,
         CASE WHEN taken_request_id IS NULL THEN 'response_taken' ELSE 'request_taken' END,
         coalesce(taken_request_id, taken_response_id),
-        CASE WHEN publication_id IS NULL THEN 'request_sent' ELSE 'publication' END,
-        coalesce(publication_id, request_id),
+        CASE
+            WHEN publication_id IS NOT NULL THEN 'publication'
+            WHEN request_id IS NOT NULL THEN 'request_sent'
+            ELSE 'response_sent'
+        END,
+        coalesce(publication_id, request_id, response_id),
         candidate_count > 1
     FROM analysed.store.link_call
-    WHERE response_id IS NULL
     UNION ALL
     SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id, false
     FROM analysed.store.request

@@ -125,6 +125,13 @@ link AS (
     JOIN traced AS t ON s.pid = t.pid
     WHERE c.kind <> 'client'
     UNION ALL
+    SELECT
+        'link_call', 'response_taken', s.callback,
+        CASE s.k WHEN 'publication' THEN s.k ELSE s.k || '_sent' END, s.sent
+    FROM truth_sent AS s
+    JOIN truth_callback AS c ON s.callback = c.callback
+    WHERE c.kind = 'client'
+    UNION ALL
     SELECT 'take_adjacent', 'take', s.callback, 'publication', s.sent
     FROM truth_sent AS s
     JOIN truth_callback AS c ON s.callback = c.callback
