@@ -1,10 +1,11 @@
 -- name: indirect-links
--- title: Declared indirect links
--- description: Every declared indirect link (annotation) and what it explains: publications, those
---     with a message of every input, links, and how long messages waited in their caches.
+-- title: Declared links
+-- description: Every declared link (annotation) and what it explains: publications, those with a
+--     message of every input, links, and how long messages waited in their caches. Entries of kind
+--     direct and independent explain no indirect links.
 -- grain: one row per annotation
 -- column: run_id BIGINT             Run
--- column: kind VARCHAR              'periodic_async' or 'partial_sync'
+-- column: kind VARCHAR              'periodic_async', 'partial_sync', 'direct' or 'independent'
 -- column: source VARCHAR            'trace' or 'file'
 -- column: node VARCHAR [node]  Node that declares it
 -- column: inputs VARCHAR [topic]  Topics of its inputs

@@ -1,14 +1,16 @@
 -- name: link-suggestions
--- title: Indirect links that the data suggest
+-- title: Links that the data suggest
 -- description: Where messages seem to be kept for later: a timer publishes while messages that its
 --     node receives lead nowhere (periodic_async), or callbacks of a node's subscriptions publish
---     only once each of several inputs has had a message (partial_sync). Only the author of the
---     node knows whether that is so: review the candidates before you apply any.
+--     only once each of several inputs has had a message (partial_sync). And where a node without
+--     traced callbacks seems to publish by itself, not because of the message before
+--     (independent). Only the author of the node knows whether that is so: review the candidates
+--     before you apply any.
 -- grain: one row per candidate
 -- param: min_share DOUBLE = 0.95    Minimum share of publications that had a new message of a
 --     topic, for it to count as an input of a partial_sync candidate
 -- column: run_id BIGINT             Run
--- column: kind VARCHAR              'periodic_async' or 'partial_sync'
+-- column: kind VARCHAR              'periodic_async', 'partial_sync' or 'independent'
 -- column: node VARCHAR [node]  Node
 -- column: inputs VARCHAR[] [topic]  Topics of the inputs
 -- column: outputs VARCHAR[] [topic]  Topics of the outputs
@@ -203,6 +205,43 @@ partial AS (
     FROM synchronous
     GROUP BY node_id, inputs
 ),
+-- What may have been published by a timer that shows no event.
+doubtful AS (
+    SELECT
+        p.node_id, p.publisher_id, s.topic_name AS input_topic, p.topic_name AS output_topic,
+        count(*) AS link_count,
+        quantile_disc(l.wait_ns, [0.1, 0.9]) AS waits
+    FROM main.link_causal AS l
+    JOIN main.take AS t ON l.take_id = t.take_id
+    JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE list_contains($runs, l.run_id)
+        AND l.kind = 'take_adjacent' AND l.candidate_count > 1
+        AND NOT p.is_internal AND NOT s.is_internal AND s.node_id = p.node_id
+    GROUP BY ALL
+),
+independent AS (
+    SELECT
+        node_id,
+        'independent' AS kind,
+        list(DISTINCT input_topic ORDER BY input_topic) AS inputs,
+        [output_topic] AS outputs,
+        string_agg(
+            printf(
+                '%d of %d messages on %s came %.3g to %.3g ms after one on %s', d.link_count,
+                b.publication_count, d.output_topic, d.waits[1] / 1e6, d.waits[2] / 1e6,
+                d.input_topic
+            ),
+            ', ' ORDER BY d.input_topic, d.publisher_id
+        ) AS evidence,
+        'if it does answer these messages, write direct instead' AS doubt
+    FROM doubtful AS d
+    JOIN (
+        SELECT publisher_id, count(*) AS publication_count FROM main.publication GROUP BY ALL
+    ) AS b ON d.publisher_id = b.publisher_id
+    GROUP BY d.node_id, d.output_topic
+),
 received AS (
     SELECT node_id, list(DISTINCT topic_name ORDER BY topic_name) AS topics
     FROM input
@@ -212,6 +251,8 @@ candidate AS (
     SELECT node_id, kind, inputs, outputs, evidence, doubt FROM periodic
     UNION ALL
     SELECT node_id, kind, inputs, outputs, evidence, doubt FROM partial
+    UNION ALL
+    SELECT node_id, kind, inputs, outputs, evidence, doubt FROM independent
 )
 SELECT
     n.run_id,
@@ -225,11 +266,14 @@ SELECT
             '; ',
             c.doubt,
             CASE
-                WHEN count(*) OVER (PARTITION BY c.node_id) > 1 THEN
+                WHEN c.kind <> 'independent'
+                    AND count(*) OVER (
+                        PARTITION BY c.node_id, c.kind = 'independent'
+                    ) > 1 THEN
                     'the node has several candidates, which may share inputs, or be one'
             END,
             CASE
-                WHEN NOT list_has_all(c.inputs, r.topics) THEN
+                WHEN c.kind <> 'independent' AND NOT list_has_all(c.inputs, r.topics) THEN
                     printf(
                         'the node also receives %s, which may be inputs as well',
                         array_to_string(
@@ -249,5 +293,5 @@ SELECT
     n.is_name_repeated
 FROM candidate AS c
 JOIN named_node AS n ON c.node_id = n.node_id
-JOIN received AS r ON c.node_id = r.node_id
+LEFT JOIN received AS r ON c.node_id = r.node_id
 ORDER BY n.run_id, node, n.host, n.pid, c.kind, c.outputs, c.inputs, c.evidence, c.node_id

@@ -105,7 +105,8 @@ link AS (
     FROM analysed.store.link_causal
     WHERE callback_instance_id IS NOT NULL
     UNION ALL
-    SELECT kind, kind, 'take', take_id, 'publication', publication_id, false
+    -- What a timer may have published is marked.
+    SELECT kind, kind, 'take', take_id, 'publication', publication_id, candidate_count > 1
     FROM analysed.store.link_causal
     WHERE callback_instance_id IS NULL
     UNION ALL

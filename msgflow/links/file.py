@@ -1,10 +1,14 @@
-"""File of indirect links, which a user declares or reviews: YAML; errors name the line.
+"""File of links, which a user declares or reviews: YAML; errors name the line.
 
 links:
   - kind: periodic_async
     node: /fusion
     inputs: [/lidar, /camera]
     outputs: [/objects]
+  - kind: independent
+    node: /filter
+    inputs: [/scan]
+    outputs: [/tick]
 """
 
 from __future__ import annotations
@@ -20,16 +24,19 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import NoReturn
 
-KINDS = ("periodic_async", "partial_sync")
+# Links to what a node publishes later, from messages that it keeps.
+INDIRECT_KINDS = ("periodic_async", "partial_sync")
+# Whether the publications that come after a message are its effects.
+KINDS = (*INDIRECT_KINDS, "direct", "independent")
 _REQUIRED = ("kind", "node", "inputs", "outputs")
 _OPTIONAL = ("inputs_of", "process", "host")
 _EXAMPLE = "links: [{kind: periodic_async, node: /fusion, inputs: [/lidar], outputs: [/objects]}]"
 _QUOTING = "quote patterns that begin with *, as in '*_raw'"
 _HEAD = (
-    "Candidates for indirect links, found in what was traced. Only the author of a node knows what"
-    " it does with messages that it keeps: review every entry, delete what is wrong, then run the"
-    " command below. Not everything is found: messages that also lead elsewhere, such as those"
-    " that two links of a node share, may be missing."
+    "Candidates for links, found in what was traced. Only the author of a node knows what it does"
+    " with messages: review every entry, delete what is wrong, then run the command below. Not"
+    " everything is found: messages that also lead elsewhere, such as those that two links of a"
+    " node share, may be missing."
 )
 # With the indent of an entry, no comment is wider than a terminal of 80 columns.
 _WIDTH = 76
@@ -40,7 +47,8 @@ class DeclaredLink:
     """One entry of the file.
 
     Attributes:
-        kind: 'periodic_async' or 'partial_sync'.
+        kind: 'periodic_async' or 'partial_sync'; 'direct': the node publishes on the outputs
+            because of the message before; 'independent': not because of messages of the inputs.
         node: full name of a node, or a pattern.
         inputs: topics that the node receives, or patterns.
         inputs_of: name or pattern of another node of its process that receives the inputs for it.

@@ -8,6 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
 
+from msgflow.links.file import INDIRECT_KINDS
 from msgflow.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class MatchedLink:
     """A declared link of one node, with its subscriptions and publishers.
 
     Attributes:
-        kind: 'periodic_async' or 'partial_sync'.
+        kind: 'periodic_async', 'partial_sync', 'direct' or 'independent'.
         process_id: process of the node.
         inputs: subscriptions, in order of their ids.
         outputs: publishers, likewise.
@@ -137,7 +138,7 @@ def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterat
     _refuse_repeated(file, link, [node for node, _, _ in fitting])
     for node, inputs, outputs in fitting:
         both = {e.topic for e in inputs} & {e.topic for e in outputs}
-        if both:
+        if both and link.kind in INDIRECT_KINDS:
             file.fail(
                 link.line,
                 f"a topic is input and output of the same link — {sorted(both)[0]}",
@@ -274,6 +275,7 @@ def _fail_on_unknown_topic(
 
 def _refuse_cycles(file: LinksFile, links: Sequence[MatchedLink]) -> None:
     """Raise if messages would lead back to themselves through declared links."""
+    links = [link for link in links if link.kind in INDIRECT_KINDS]
     before: dict[str, set[str]] = {}
     for link in links:
         for output in link.outputs:

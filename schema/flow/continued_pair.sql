@@ -4,7 +4,7 @@
 -- grain: one row per subscription and publisher that a message of it led to
 WITH pair AS (
     SELECT DISTINCT run_id, subscription_id, publisher_id
-    FROM store.link_causal
+    FROM derive.certain_cause
     WHERE take_id IS NOT NULL
     UNION
     SELECT run_id, subscription_id, publisher_id

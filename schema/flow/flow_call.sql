@@ -25,7 +25,7 @@ published AS (
         l.run_id, derive.vertex_key('callback_instance', l.callback_instance_id) AS called_key,
         l.callback_instance_id, NULL::BIGINT AS taken_request_id,
         NULL::BIGINT AS taken_response_id, l.publication_id, l.publisher_id, l.kind
-    FROM store.link_causal AS l
+    FROM derive.certain_cause AS l
     SEMI JOIN (
         SELECT callback_instance_id
         FROM store.callback_instance

@@ -6,7 +6,7 @@
 SELECT
     l.run_id, l.take_id, l.subscription_id, l.publication_id, l.publisher_id, l.kind,
     []::BIGINT[] AS route
-FROM store.link_causal AS l
+FROM derive.certain_cause AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 WHERE l.take_id IS NOT NULL AND NOT p.is_internal
 UNION ALL

@@ -29,7 +29,7 @@ cause AS (
     SELECT
         l.run_id, l.publication_id, l.publisher_id, l.take_id IS NOT NULL,
         CASE WHEN l.take_id IS NULL THEN l.callback_instance_id END
-    FROM store.link_causal AS l
+    FROM derive.certain_cause AS l
     WHERE l.run_id = only_run
         -- Not a join either: DuckDB would keep the links for it, which are far more.
         AND (

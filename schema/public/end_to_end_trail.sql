@@ -44,7 +44,7 @@ way AS MATERIALIZED (
 -- What led to each publication, by way of a callback of the node or of a service that it called.
 continuation AS NOT MATERIALIZED (
     SELECT publication_id, take_id, subscription_id, []::BIGINT[] AS route
-    FROM store.link_causal
+    FROM derive.certain_cause
     WHERE list_contains(runs, run_id)
     UNION ALL
     SELECT publication_id, take_id, subscription_id, route

@@ -67,7 +67,7 @@ aside AS MATERIALIZED (
         CASE WHEN l.callback_instance_id IS NULL THEN derive.vertex_key('take', l.take_id)
             ELSE derive.vertex_key('callback_instance', l.callback_instance_id) END AS from_key,
         derive.vertex_key('publication', l.publication_id) AS key
-    FROM store.link_causal AS l
+    FROM derive.certain_cause AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     WHERE p.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
     UNION ALL

@@ -60,7 +60,7 @@ LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN derive.flow_end AS x ON x.kind = 'take' AND t.take_id = x.id
 LEFT JOIN store.callback_instance AS i ON t.take_id = i.take_id
 LEFT JOIN (
-    SELECT DISTINCT take_id FROM store.link_causal WHERE kind IN ('take_adjacent', 'polled')
+    SELECT DISTINCT take_id FROM derive.certain_cause WHERE kind IN ('take_adjacent', 'polled')
 ) AS y
     ON t.take_id = y.take_id
 LEFT JOIN (

@@ -41,4 +41,4 @@ LEFT JOIN store.annotation_input AS i
     ON a.annotation_id = i.annotation_id AND d.subscription_id = i.subscription_id
 LEFT JOIN linked AS l
     ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
-WHERE a.kind = 'periodic_async' OR i.annotation_id IS NOT NULL
+WHERE a.kind = 'periodic_async' OR (a.kind = 'partial_sync' AND i.annotation_id IS NOT NULL)

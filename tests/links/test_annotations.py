@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from analysis import Analysis
 from each import each
 from ingested import contents, ingest_one, rows
+from ros_system import RosSystem
+from staged_events import Thread
 from thorough import few
 
 from msgflow import Database
@@ -316,3 +319,77 @@ def test_it_is_of_the_same_process(listener: str, slam: Path) -> None:
     assert wanted in caught.value.message
     assert "/transform_listener_impl_5566a1b0" in (caught.value.hint or "")
     assert contents(slam) == before
+
+
+@pytest.fixture
+def answering(empty_database: Path, tmp_path: Path) -> Path:
+    """A node of rclpy: after each message on /in, and late after every third, /out; and a relay."""
+    system = RosSystem()
+    python, relay = Thread(100, name="python3"), Thread(200, name="relay")
+    for thread, name, callback in ((python, "filter", None), (relay, "relay", 0xC1)):
+        system.node(thread, 0x1, name)
+        system.subscription(thread, 0x11, "/in", callback=callback)
+        system.publisher(thread, 0x21, "/out")
+    for number in range(1, 10):
+        system.take(python, 0x11, number, layers="rmw rcl")
+        for _ in range(1 if number % 3 else 2):
+            system.publish(python, 0x21, 100 + number, layers="rcl rmw")
+            system.wait(1_000)
+        system.take(relay, 0x11, number)
+        system.start(relay, 0xC1)
+        system.publish(relay, 0x21, 200 + number)
+        system.end(relay, 0xC1)
+    analysis = Analysis(empty_database, tmp_path)
+    analysis.build(system)
+    analysis.close()
+    return tmp_path / "analysis.duckdb"
+
+
+ANSWERS = "links: [{kind: direct, node: /filter, inputs: /in, outputs: /out}]"
+COUNTED = "SELECT kind, candidate_count, count(*) FROM link_causal GROUP BY ALL ORDER BY kind, 2"
+
+
+def test_a_file_settles_what_is_doubtful(answering: Path) -> None:
+    direct, doubtful = ("direct", 1, 9), ("take_adjacent", 2, 12)
+    assert rows(answering, COUNTED) == [direct, doubtful]
+    with Database(answering) as opened:
+        (applied,) = opened.apply_links(write(answering, ANSWERS))
+        assert (applied.annotation_count, applied.link_count) == (1, 0)
+        assert opened.check() == []
+        assert rows(answering, COUNTED) == [direct, ("take_adjacent", 1, 12)]
+        opened.apply_links(write(answering, ANSWERS.replace("direct", "independent")))
+        assert rows(answering, COUNTED) == [direct]
+        opened.apply_links(write(answering, "links: []"))
+    assert rows(answering, COUNTED) == [direct, doubtful]
+
+
+def test_a_file_forbids_what_callbacks_published(answering: Path) -> None:
+    text = ANSWERS.replace("direct", "independent").replace("/filter", "/relay")
+    with Database(answering) as opened:
+        opened.apply_links(write(answering, text))
+    assert rows(answering, COUNTED) == [("take_adjacent", 2, 12)]
+
+
+def test_independent_counts_where_both_are_declared(answering: Path) -> None:
+    both = ANSWERS.replace("]", f", {ANSWERS[8:-1].replace('direct', 'independent')}]")
+    with Database(answering) as opened:
+        opened.apply_links(write(answering, both))
+        (found,) = opened.query(
+            "info-findings", where="name = 'contradictory_annotations'"
+        ).to_arrow().to_pylist()  # fmt: skip
+    assert found["detail"].endswith("/in → /out (direct and independent)")
+    assert rows(answering, COUNTED) == [("direct", 1, 9)]
+
+
+def test_links_that_are_none_may_go_round(database: Path) -> None:
+    """And name a topic on both sides."""
+    text = """
+links:
+  - {kind: independent, node: /relay, inputs: /c, outputs: [/a, /c]}
+  - {kind: direct, node: /fusion, inputs: /a, outputs: /c}
+"""
+    with Database(database) as opened:
+        (applied,) = opened.apply_links(write(database, text))
+    assert applied.annotation_count == 2
+    assert rows(database, KINDS) == [("direct", 4)]
+    assert rows(database, "SELECT count(*) FROM annotation_firing") == [(0,)]

@@ -20,7 +20,7 @@ links:
 MACROS = [
     header
     for header in objects.load("link")
-    if header.params and header.params[0].name == "only_run"
+    if [param.name for param in header.params] == ["only_run"]
 ]
 FILLED = {
     "derive.annotated_publication",

@@ -21,11 +21,11 @@ Table(
     STORE,
     key("annotation_id", "Identity of the annotation"),
     run_id(),
-    text("kind", "'periodic_async' or 'partial_sync'", required=True),
+    text("kind", "'periodic_async', 'partial_sync', 'direct' or 'independent'", required=True),
     text("source", "'trace' or 'file'", required=True),
     process_id(),
-    comment="One row per declared indirect link",
-    info={"view": "Declared indirect links."},
+    comment="One row per declared link",
+    info={"view": "Declared links: indirect ones, and whether publications answer messages."},
 )
 
 Table(
@@ -128,13 +128,14 @@ Table(
     ),
     reference(
         "annotation_id",
-        "Annotation that declares it; NULL for direct links",
+        "Annotation that declares it; NULL for direct links and take_adjacent",
         to="annotation.annotation_id",
     ),
     number(
         "candidate_count",
-        "Callback instances that it could have been; one more if it is the input of an "
-        "indirect link and had no message when the publishing callback began",
+        "Callback instances that it could have been; one more if the message may have led to "
+        "nothing: an input of an indirect link that had no message when the publishing callback "
+        "began, or a publication after a take without a callback that a timer may have made",
     ),
     flag("is_loss_affected", "A gap of the trace may hide a better partner"),
     comment="One row per callback instance, or take without one, and publication that it led to",

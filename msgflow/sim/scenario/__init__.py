@@ -65,6 +65,7 @@ def scenarios() -> Mapping[str, Scenario]:
         bursts.bursts(),
         bursts.bursts_two_hosts(),
         layers.python(),
+        layers.python_timers(),
         layers.layers(),
         layers.polling(),
         annotated.periodic_async(),

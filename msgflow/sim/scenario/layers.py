@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from msgflow.sim.entity import (
+    MICROSECOND,
     MILLISECOND,
     SECOND,
     Poll,
@@ -10,8 +11,9 @@ from msgflow.sim.entity import (
     Publisher,
     Subscription,
     Timer,
+    Work,
 )
-from msgflow.sim.system import Executor, Host, Node, Process, Scenario
+from msgflow.sim.system import Executor, Group, Host, Node, Process, Scenario
 
 
 def python() -> Scenario:
@@ -44,6 +46,91 @@ def python() -> Scenario:
             Process("listener", "alpha", 1401, (listener,), start_ns=11 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
+    )  # fmt: skip
+
+
+def python_timers() -> Scenario:
+    """Nodes of rclpy that answer messages, and publish by timers, whose callbacks have no events.
+
+    The periods of messages and timers are far from each other, near, and equal.
+    """
+    source = Node(
+        "source",
+        publishers=(Publisher("/fast"), Publisher("/slow"), Publisher("/rare")),
+        timers=(
+            Timer(16 * MILLISECOND, ("/fast",)),
+            Timer(50 * MILLISECOND, ("/slow",), Work(20 * MICROSECOND, 2 * MILLISECOND)),
+            Timer(310 * MILLISECOND, ("/rare",)),
+        ),
+    )
+    beside = Node(
+        "beside",
+        publishers=tuple(Publisher(f"/beside/{name}") for name in ("answer", "tick")),
+        subscriptions=(
+            Subscription("/fast", ("/beside/answer",), Work(MILLISECOND, 6 * MILLISECOND)),
+        ),
+        timers=(Timer(23 * MILLISECOND, ("/beside/tick",)),),
+    )
+    # The timer has almost the period of the messages, or the same.
+    near = Node(
+        "near",
+        publishers=tuple(Publisher(f"/near/{name}") for name in ("answer", "tick", "tock")),
+        subscriptions=(
+            Subscription("/slow", ("/near/answer",) * 2, Work(MILLISECOND, MILLISECOND)),
+        ),
+        timers=(
+            Timer(49 * MILLISECOND, ("/near/tick",)),
+            Timer(50 * MILLISECOND, ("/near/tock",)),
+        ),
+    )
+    # One publisher answers two subscriptions, and another publishes by itself.
+    several = Node(
+        "several",
+        publishers=tuple(Publisher(f"/several/{name}") for name in ("answer", "tick")),
+        subscriptions=(
+            Subscription("/fast", ("/several/answer",)),
+            Subscription("/slow", ("/several/answer",), Work(2 * MILLISECOND, 3 * MILLISECOND)),
+            Subscription("/rare"),
+        ),
+        timers=(Timer(100 * MILLISECOND, ("/several/tick",)),),
+    )
+    threads = Node(
+        "threads",
+        publishers=tuple(Publisher(f"/threads/{name}") for name in ("answer", "tick")),
+        subscriptions=(
+            Subscription(
+                "/fast", ("/threads/answer",), Work(MILLISECOND, 6 * MILLISECOND), group="all"
+            ),
+        ),
+        timers=(Timer(23 * MILLISECOND, ("/threads/tick",), group="all"),),
+        groups=(Group("all", is_reentrant=True),),
+    )
+    nodes = (beside, near, several, threads)
+    sink = Node(
+        "sink",
+        subscriptions=tuple(
+            Subscription(publisher.topic) for node in nodes for publisher in node.publishers
+        ),
+    )
+    return Scenario(
+        name="python_timers",
+        description="Python: nodes that answer messages, and timers beside, which have no events.",
+        hosts=(Host("alpha", cpu_count=8),),
+        processes=(
+            Process("source", "alpha", 1101, (source,)),
+            *(
+                Process(
+                    "python3", "alpha", 1201 + 100 * number, (node,),
+                    start_ns=(3 + 4 * number) * MILLISECOND, client_library="rclpy",
+                    executors=(
+                        Executor("multi_threaded", 4) if node is threads else Executor(),
+                    ),
+                )
+                for number, node in enumerate(nodes)
+            ),
+            Process("sink", "alpha", 1701, (sink,), start_ns=29 * MILLISECOND),
+        ),
+        duration_ns=8 * SECOND,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 -- title: Arrows of the timeline
 -- description: Links that overlap a window: messages from the end of their publication to the take,
 --     publications in the callback instance they came from, and indirect links from the end of the
---     callback instance with the input to the publication.
+--     callback instance with the input to the publication. Doubtful effects of a take are left out.
 -- grain: one row per link
 -- param: run BIGINT  Run
 -- param: origin_ns BIGINT  What times count from, epoch ns
@@ -57,6 +57,9 @@ cause AS (
     LEFT JOIN main.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN main.take AS t ON l.take_id = t.take_id
     WHERE l.run_id = $run AND l.publication_id >= $first_publication
+        AND (
+            l.kind IN ('periodic_async', 'partial_sync') OR coalesce(l.candidate_count, 1) = 1
+        )
         AND CASE WHEN l.kind = 'direct' THEN l.publication_id <= $last_publication
             WHEN l.callback_instance_id IS NULL THEN l.take_id <= $last_take
             ELSE l.callback_instance_id <= $last_instance END

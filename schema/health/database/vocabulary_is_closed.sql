@@ -25,7 +25,7 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'annotation.kind', kind
     FROM store.annotation
-    WHERE kind NOT IN ('periodic_async', 'partial_sync')
+    WHERE kind NOT IN ('periodic_async', 'partial_sync', 'direct', 'independent')
     UNION ALL
     SELECT DISTINCT run_id, 'annotation.source', source
     FROM store.annotation

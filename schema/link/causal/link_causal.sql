@@ -2,21 +2,43 @@
 -- kind: macro
 -- description: What led to each publication, by every kind of link. A link may be spoilt by lost
 --     events where a gap touches its callback instance, or its take, or its publication. In a
---     process that is several with equal ids, the cause may be one of another process.
+--     process that is several with equal ids, the cause may be one of another process. What may be
+--     no answer to the message before it has one candidate more: nothing. Files of links may
+--     declare that a publisher answers a subscription (`direct`), or that it does not
+--     (`independent`): then there is no doubt, or no link.
 -- grain: one row per callback instance, or take without one, and publication that it led to, and
 --     annotation of an indirect link
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
-WITH link AS (
+WITH declared AS MATERIALIZED (
+    SELECT a.kind, i.subscription_id, o.publisher_id
+    FROM store.annotation AS a
+    JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
+    JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
+    WHERE a.run_id = only_run AND a.kind IN ('direct', 'independent')
+),
+adjacent AS MATERIALIZED (
+    FROM derive.link_causal_take_adjacent(only_run)
+),
+doubtful AS (
+    SELECT l.publication_id
+    FROM derive.answer_doubtful(only_run, 'adjacent') AS l
+    JOIN adjacent AS a ON l.publication_id = a.publication_id
+    ANTI JOIN (SELECT subscription_id, publisher_id FROM declared WHERE kind = 'direct') AS d
+        ON a.subscription_id = d.subscription_id AND a.publisher_id = d.publisher_id
+),
+link AS (
     SELECT
         run_id, callback_instance_id, take_id, publication_id, publisher_id, 'direct' AS kind,
         NULL::BIGINT AS annotation_id, 1::BIGINT AS candidate_count, is_loss_affected
     FROM derive.link_causal_direct(only_run)
     UNION ALL
     SELECT
-        a.run_id, NULL, a.take_id, a.publication_id, b.publisher_id, 'take_adjacent', NULL, 1,
+        a.run_id, NULL, a.take_id, a.publication_id, a.publisher_id, 'take_adjacent', NULL,
+        CASE WHEN d.publication_id IS NULL THEN 1 ELSE 2 END,
         t.is_loss_affected OR b.is_loss_affected
-    FROM derive.link_causal_take_adjacent(only_run) AS a
+    FROM adjacent AS a
+    LEFT JOIN doubtful AS d ON a.publication_id = d.publication_id
     JOIN store.take AS t ON a.take_id = t.take_id
     JOIN store.publication AS b ON a.publication_id = b.publication_id
     WHERE t.run_id = only_run AND b.run_id = only_run
@@ -56,3 +78,7 @@ SELECT
 FROM link AS l
 LEFT JOIN store.take AS t ON l.take_id = t.take_id AND t.run_id = only_run
 LEFT JOIN mixed AS m ON l.publication_id = m.publication_id
+ANTI JOIN (SELECT subscription_id, publisher_id FROM declared WHERE kind = 'independent') AS d
+    ON l.kind IN ('direct', 'take_adjacent')
+    AND t.subscription_id = d.subscription_id
+    AND l.publisher_id = d.publisher_id

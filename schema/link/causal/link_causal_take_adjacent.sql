@@ -3,7 +3,9 @@
 -- description: Publications that a thread makes after it took a message by hand (rclpy, rclc,
 --     wait sets), until its next take, also of a request or a response. The link ends where a
 --     callback is seen to begin or end or an executor to go on, and at a gap. What is published
---     inside a callback instance is caused by that instance instead.
+--     inside a callback instance is caused by that instance instead, and what the middleware
+--     publishes by itself (without a publisher, and nothing was lost) by nothing. Timers of rclpy
+--     do not show: what they publish is among the rows, and derive.answer_doubtful tells it apart.
 -- grain: one row per publication made after a take without a callback
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
@@ -13,7 +15,9 @@ WITH handled AS (
     WHERE run_id = only_run AND take_id IS NOT NULL
 ),
 by_hand AS (
-    SELECT t.run_id, t.thread_id, t.start_event_id AS event_id, t.take_id, t.taken_ns
+    SELECT
+        t.run_id, t.thread_id, t.start_event_id AS event_id, t.take_id, t.subscription_id,
+        t.taken_ns
     FROM store.take AS t
     ANTI JOIN handled AS h ON t.take_id = h.take_id
     WHERE t.run_id = only_run
@@ -23,29 +27,33 @@ busy AS (
 ),
 -- What a thread turns to: a message of its own, or something else.
 turn AS (
-    SELECT run_id, thread_id, event_id, take_id, taken_ns FROM by_hand
+    SELECT run_id, thread_id, event_id, take_id, subscription_id, taken_ns FROM by_hand
     UNION ALL
     SELECT
-        i.run_id, i.thread_id, unnest([i.start_event_id, i.effective_end_event_id]), NULL, NULL
+        i.run_id, i.thread_id, unnest([i.start_event_id, i.effective_end_event_id]), NULL, NULL,
+        NULL
     FROM store.callback_instance AS i
     SEMI JOIN busy AS w ON i.run_id = w.run_id AND i.thread_id = w.thread_id
     WHERE i.run_id = only_run
     UNION ALL
-    SELECT e.run_id, e.thread_id, e.start_event_id, NULL, NULL
+    SELECT e.run_id, e.thread_id, e.start_event_id, NULL, NULL, NULL
     FROM store.executor_state AS e
     SEMI JOIN busy AS w ON e.run_id = w.run_id AND e.thread_id = w.thread_id
     WHERE e.run_id = only_run
 ),
 alone AS (
-    SELECT b.run_id, b.thread_id, b.trace_id, b.publication_id, b.start_event_id, b.start_ns
+    SELECT
+        b.run_id, b.thread_id, b.trace_id, b.publication_id, b.publisher_id, b.start_event_id,
+        b.start_ns
     FROM store.publication AS b
     SEMI JOIN busy AS w ON b.run_id = w.run_id AND b.thread_id = w.thread_id
     ANTI JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
-    WHERE b.run_id = only_run
+    WHERE b.run_id = only_run AND (b.publisher_id IS NOT NULL OR b.is_loss_affected)
 ),
 adjacent AS (
     SELECT
-        a.run_id, a.thread_id, t.take_id, a.publication_id, a.trace_id, a.start_ns, t.taken_ns
+        a.run_id, a.thread_id, t.take_id, t.subscription_id, t.taken_ns, a.publication_id,
+        a.publisher_id, a.trace_id, a.start_event_id, a.start_ns
     FROM alone AS a
     ASOF JOIN turn AS t
         ON a.run_id = t.run_id
@@ -83,7 +91,9 @@ behind_call AS (
         ON a.run_id = c.run_id AND a.thread_id = c.thread_id AND a.start_ns >= c.taken_ns
     WHERE c.taken_ns >= a.taken_ns
 )
-SELECT a.run_id, a.take_id, a.publication_id
+SELECT
+    a.run_id, a.thread_id, a.take_id, a.subscription_id, a.taken_ns, a.publication_id,
+    a.publisher_id, a.start_event_id, a.start_ns
 FROM adjacent AS a
 ANTI JOIN behind_gap AS g ON a.publication_id = g.publication_id
 ANTI JOIN behind_call AS c ON a.publication_id = c.publication_id

@@ -1,0 +1,37 @@
+-- name: finding.doubtful_answer
+-- title: A node may publish by a timer what seems to answer messages
+-- description: A node without traced callbacks (rclpy, wait sets) publishes after messages, but not
+--     as answers come: at the times of a timer, at intervals steadier than the delay after the
+--     messages, in varying numbers per message, or too rarely to tell. Such links are marked by
+--     candidate_count 2 in link_causal, and flows, paths and latencies do not follow them.
+-- cause: Timers of rclpy emit no event when they fire, so that what they publish follows some
+--     message. Or callbacks are so long that the trace cannot tell.
+-- cure: Say which it is in a file of links, kind independent or direct (docs/causes.md), and apply
+--     it with msgflow links apply FILE; msgflow links suggest prints the entries.
+-- grain: one row per node
+-- severity: warning
+WITH pair AS (
+    SELECT
+        l.run_id, p.node_id, p.process_id, s.topic_name AS input, p.topic_name AS output,
+        count(*) AS link_count
+    FROM store.link_causal AS l
+    JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    LEFT JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
+    WHERE l.kind = 'take_adjacent' AND l.candidate_count > 1 AND NOT p.is_internal
+    GROUP BY ALL
+)
+SELECT
+    a.run_id,
+    derive.node_label(n.full_name, o.name, o.pid) AS subject,
+    sum(a.link_count)::BIGINT AS count,
+    string_agg(
+        printf(
+            '%s after %s (%s)', coalesce(a.output, '?'), coalesce(a.input, '?'),
+            derive.counted(a.link_count, 'publication')
+        ),
+        ', ' ORDER BY a.output, a.input, a.link_count
+    ) AS detail
+FROM pair AS a
+JOIN store.process AS o ON a.process_id = o.process_id
+LEFT JOIN store.node AS n ON a.node_id = n.node_id
+GROUP BY a.run_id, a.node_id, n.full_name, o.name, o.pid

@@ -1,0 +1,111 @@
+-- name: derive.answer_doubtful
+-- kind: macro
+-- description: Publications after takes without a callback that may have another cause than the
+--     message. In rclpy a timer shows no event, and what it publishes follows some message, too. An
+--     answer comes once per message, and soon. So whether a publisher answers the messages of a
+--     subscription is doubtful if a timer explains the publisher (derive.timed_publisher), if its
+--     own intervals are steadier than its delay after the takes, or if the number of publications
+--     per message differs. Messages that are too few to tell are doubtful if the publisher or the
+--     subscription is older than the recording: then timers may be, too. If the publisher answers,
+--     what it publishes beyond the usual number per message is doubtful.
+-- grain: one row per publication that is not surely an answer
+-- param: only_run BIGINT  Run to look at
+-- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
+
+-- Waits and long callbacks disturb some publications: only the middle four fifths count. With less
+-- than five messages, these would be all.
+CREATE OR REPLACE MACRO derive.answer_doubtful(only_run, links) AS TABLE
+WITH own AS MATERIALIZED (
+    SELECT
+        b.publication_id, b.publisher_id,
+        b.start_ns - lag(b.start_ns) OVER (
+            PARTITION BY b.publisher_id ORDER BY b.start_event_id
+        ) AS interval_ns
+    FROM store.publication AS b
+    SEMI JOIN query_table(links) AS l ON b.publisher_id = l.publisher_id
+    WHERE b.run_id = only_run
+),
+rhythm AS MATERIALIZED (
+    SELECT
+        publisher_id,
+        avg(interval_ns) AS mean_ns,
+        quantile_disc(interval_ns, 0.9) - quantile_disc(interval_ns, 0.1) AS spread_ns
+    FROM own
+    GROUP BY publisher_id
+),
+next_take AS (
+    SELECT t.thread_id, t.start_event_id, t.taken_ns
+    FROM store.take AS t
+    SEMI JOIN query_table(links) AS l ON t.thread_id = l.thread_id
+    WHERE t.run_id = only_run
+),
+-- What a callback publishes in a burst counts once: each within a tenth of the usual interval.
+follower AS MATERIALIZED (
+    SELECT
+        l.subscription_id, l.publisher_id, l.take_id, l.publication_id, l.start_event_id,
+        l.start_ns,
+        l.start_ns - l.taken_ns AS delay_ns,
+        n.taken_ns - l.start_ns AS rest_ns,
+        CASE WHEN o.interval_ns < least(l.start_ns - l.taken_ns, r.mean_ns / 10) THEN 0 ELSE 1 END
+            AS number
+    FROM query_table(links) AS l
+    JOIN own AS o ON l.publication_id = o.publication_id
+    JOIN rhythm AS r ON l.publisher_id = r.publisher_id
+    ASOF LEFT JOIN next_take AS n
+        ON l.thread_id = n.thread_id AND l.start_event_id < n.start_event_id
+),
+answered AS MATERIALIZED (
+    SELECT
+        subscription_id, publisher_id, take_id,
+        min(delay_ns) AS delay_ns,
+        sum(number) AS number
+    FROM follower
+    GROUP BY subscription_id, publisher_id, take_id
+),
+pair AS (
+    SELECT
+        subscription_id, publisher_id,
+        count(*) AS take_count,
+        quantile_disc(delay_ns, 0.9) - quantile_disc(delay_ns, 0.1) AS spread_ns,
+        quantile_disc(number, 0.1) AS least_number,
+        quantile_disc(number, 0.5) AS usual_number,
+        quantile_disc(number, 0.9) AS most_number
+    FROM answered
+    GROUP BY subscription_id, publisher_id
+),
+judged AS MATERIALIZED (
+    SELECT
+        a.subscription_id, a.publisher_id, a.usual_number,
+        t.publisher_id IS NOT NULL
+        OR CASE
+            WHEN a.take_count < 5 THEN p.created_ns IS NULL OR s.created_ns IS NULL
+            ELSE r.spread_ns < 0.8 * a.spread_ns OR a.least_number < a.most_number
+        END AS is_doubtful
+    FROM pair AS a
+    JOIN rhythm AS r ON a.publisher_id = r.publisher_id
+    JOIN store.publisher AS p ON a.publisher_id = p.publisher_id
+    LEFT JOIN store.subscription AS s ON a.subscription_id = s.subscription_id
+    LEFT JOIN derive.timed_publisher(only_run, 'follower') AS t ON a.publisher_id = t.publisher_id
+),
+excess AS (
+    SELECT
+        f.publication_id,
+        sum(f.number) OVER (
+            PARTITION BY f.take_id, f.publisher_id
+            ORDER BY f.start_event_id ROWS UNBOUNDED PRECEDING
+        ) > j.usual_number AS is_excess
+    FROM follower AS f
+    JOIN answered AS a ON f.take_id = a.take_id AND f.publisher_id = a.publisher_id
+    JOIN judged AS j
+        ON a.subscription_id IS NOT DISTINCT FROM j.subscription_id
+        AND a.publisher_id = j.publisher_id
+    WHERE a.number > j.usual_number AND NOT j.is_doubtful
+)
+SELECT f.publication_id
+FROM follower AS f
+JOIN judged AS j
+    ON f.subscription_id IS NOT DISTINCT FROM j.subscription_id
+    AND f.publisher_id = j.publisher_id
+WHERE j.is_doubtful
+UNION ALL
+SELECT publication_id FROM excess WHERE is_excess

@@ -1,0 +1,54 @@
+-- name: derive.timed_publisher
+-- kind: macro
+-- description: Publishers that a timer explains, among those that seem to answer takes without a
+--     callback. What a timer publishes comes when it is due, or as soon as the callback ends that
+--     kept it waiting. So at least half comes after a moment, since the take, when the timer was
+--     due, and within a tenth of its period. Or nearly all comes after such a moment, and within a
+--     period before the thread takes its next message: else the timer would have published again.
+--     A timer is due at its initialisation plus whole periods. Executors of rclpy initialise a
+--     timer for every wait that may time out: the first of each period stands for all.
+-- grain: one row per publisher that a timer of its process explains
+-- param: only_run BIGINT  Run to look at
+-- param: followers VARCHAR  Name of rows of publisher_id, start_ns, delay_ns (since the take),
+--     rest_ns (until the next take; NULL: none)
+CREATE OR REPLACE MACRO derive.timed_publisher(only_run, followers) AS TABLE
+WITH timer AS (
+    SELECT process_id, period_ns, min(created_ns) AS created_ns
+    FROM store.timer
+    WHERE run_id = only_run AND period_ns > 0 AND created_ns IS NOT NULL
+    GROUP BY process_id, period_ns
+),
+publisher AS (
+    SELECT p.publisher_id, p.process_id, min(f.start_ns) AS first_ns
+    FROM query_table(followers) AS f
+    JOIN store.publisher AS p ON f.publisher_id = p.publisher_id
+    WHERE p.run_id = only_run
+    GROUP BY p.publisher_id, p.process_id
+),
+possible AS (
+    SELECT p.publisher_id, t.period_ns, t.created_ns
+    FROM publisher AS p
+    JOIN timer AS t ON p.process_id = t.process_id
+    WHERE t.created_ns < p.first_ns
+),
+late AS (
+    SELECT
+        f.publisher_id, f.delay_ns, f.rest_ns, t.period_ns,
+        (f.start_ns - t.created_ns) % t.period_ns AS late_ns
+    FROM query_table(followers) AS f
+    JOIN possible AS t ON f.publisher_id = t.publisher_id
+),
+explained AS (
+    SELECT
+        publisher_id,
+        count(*) AS publication_count,
+        count(CASE WHEN late_ns <= least(delay_ns, period_ns / 10) THEN 1 END) AS prompt_count,
+        count(
+            CASE WHEN late_ns <= delay_ns AND coalesce(rest_ns <= period_ns, true) THEN 1 END
+        ) AS due_count
+    FROM late
+    GROUP BY publisher_id, period_ns
+)
+SELECT DISTINCT publisher_id
+FROM explained
+WHERE prompt_count >= 0.5 * publication_count OR due_count >= 0.8 * publication_count

@@ -1,0 +1,362 @@
+"""Whether publications answer the messages before them: threads of rclpy with known causes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from random import Random
+
+import pyarrow as pa
+import pytest
+from rules import derived
+
+STAGE = """
+CREATE SCHEMA derive;
+CREATE SCHEMA store;
+CREATE TABLE store.publisher (run_id BIGINT DEFAULT 1, publisher_id BIGINT,
+    process_id BIGINT DEFAULT 1, created_ns BIGINT);
+CREATE TABLE store.subscription (run_id BIGINT DEFAULT 1, subscription_id BIGINT,
+    created_ns BIGINT);
+CREATE TABLE store.timer (run_id BIGINT DEFAULT 1, process_id BIGINT, period_ns BIGINT,
+    created_ns BIGINT);
+CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT, subscription_id BIGINT,
+    thread_id BIGINT, start_event_id BIGINT, taken_ns BIGINT);
+CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
+    publisher_id BIGINT, thread_id BIGINT, start_event_id BIGINT, start_ns BIGINT);
+CREATE VIEW link AS
+SELECT
+    b.run_id, b.thread_id, t.take_id, t.subscription_id, t.taken_ns, b.publication_id,
+    b.publisher_id, b.start_event_id, b.start_ns
+FROM store.publication AS b
+ASOF JOIN store.take AS t
+    ON b.thread_id = t.thread_id AND b.start_event_id > t.start_event_id
+"""
+NAMES = ("timed_publisher", "answer_doubtful")
+FAR = 3_600_000
+ANSWER, TICK, TOCK = 1, 2, 3
+
+
+@dataclass
+class Process:
+    """What the threads of a process did; times in milliseconds.
+
+    Attributes:
+        takes: (time, subscription, thread).
+        publications: (time, publisher, thread).
+        timers: (period, time of initialisation, process).
+        is_new: it began after the recording.
+    """
+
+    takes: list[tuple[float, int, int]] = field(default_factory=list)
+    publications: list[tuple[float, int, int]] = field(default_factory=list)
+    timers: list[tuple[float, float, int]] = field(default_factory=list)
+    is_new: bool = True
+
+    def doubtful(self) -> list[tuple[int, float]]:
+        """Publisher and time of each doubtful publication, in order."""
+        # At one moment, takes come first.
+        events = sorted(
+            [(*take, False) for take in self.takes]
+            + [(*publication, True) for publication in self.publications],
+            key=lambda event: (event[0], event[3]),
+        )
+        created = 0 if self.is_new else None
+        with derived(STAGE, NAMES) as con:
+            con.executemany(
+                "INSERT INTO store.publisher (publisher_id, created_ns) VALUES (?, ?)",
+                [(publisher, created) for publisher in (ANSWER, TICK, TOCK)],
+            )
+            con.executemany(
+                "INSERT INTO store.subscription (subscription_id, created_ns) VALUES (?, ?)",
+                [(subscription, created) for subscription in (1, 2, 3)],
+            )
+            for period, start, process in self.timers:
+                con.execute(
+                    "INSERT INTO store.timer (process_id, period_ns, created_ns) VALUES (?, ?, ?)",
+                    [process, round(period * 1e6), round(start * 1e6)],
+                )
+            for table, is_publication in (("take", False), ("publication", True)):
+                rows = [
+                    (1, number, of, thread, number, round(at * 1e6))
+                    for number, (at, of, thread, kind) in enumerate(events, start=1)
+                    if kind == is_publication
+                ]
+                columns = [list(column) for column in zip(*rows, strict=True)]
+                con.register("event", pa.table(columns, names=list("abcdef")))
+                con.execute(f"INSERT INTO store.{table} FROM event")
+            found = con.execute(
+                "SELECT b.publisher_id, b.start_ns / 1e6 "
+                "FROM derive.answer_doubtful(1, 'link') AS d "
+                "JOIN store.publication AS b USING (publication_id) ORDER BY b.start_event_id"
+            ).fetchall()
+        assert len(found) == len(set(found))
+        return [(publisher, round(at, 6)) for publisher, at in found]
+
+    def doubtful_publishers(self) -> dict[int, float]:
+        """The share of its linked publications that is doubtful, by publisher."""
+        first = {thread: min(t for t, _, of in self.takes if of == thread) for _, _, thread in
+                 self.takes}  # fmt: skip
+        linked = [p for at, p, thread in self.publications if at >= first.get(thread, FAR)]
+        found = [publisher for publisher, _ in self.doubtful()]
+        return {p: found.count(p) / linked.count(p) for p in sorted(set(linked))}
+
+
+@dataclass(frozen=True)
+class Subscription:
+    """Messages of a subscription: period, jitter, how long callbacks last, what they publish."""
+
+    period: float
+    jitter: float = 0.1
+    lasts: tuple[float, float] = (0.2, 0.4)
+    publisher: int | None = ANSWER
+    counts: Sequence[int] = (1,)
+    gap: float = 0.1
+
+
+@dataclass(frozen=True)
+class Timer:
+    """A timer that publishes: period, moment of its initialisation, publisher."""
+
+    period: float
+    start: float = 0.0
+    publisher: int = TICK
+    is_traced: bool = True
+
+
+def run(
+    subscriptions: Iterable[Subscription],
+    timers: Sequence[Timer] = (),
+    *,
+    threads: int = 1,
+    length: float = 4_000,
+    seed: int = 1,
+    is_new: bool = True,
+) -> Process:
+    """Execute timers that are due, then messages that are there, as the executors of rclpy do."""
+    chance = Random(seed)
+    process = Process(is_new=is_new)
+    process.timers = [(each.period, each.start, 1) for each in timers if each.is_traced]
+    arrivals = sorted(
+        (
+            (
+                chance.uniform(0, 5) + number * each.period + chance.uniform(0, each.jitter),
+                place,
+                each,
+            )
+            for place, each in enumerate(subscriptions, start=1)
+            for number in range(int(length / each.period))
+        ),
+        key=lambda arrival: arrival[0],
+    )
+    due = [each.start + each.period for each in timers]
+    free = [0.0] * threads
+    while arrivals:
+        now = max(min(free), min([arrivals[0][0], *due]))
+        idle = [thread for thread in range(threads) if free[thread] <= now]
+        thread = chance.choice(idle)
+        at = now + chance.uniform(0.02, 0.06)
+        ready = [number for number, moment in enumerate(due) if moment <= now]
+        if ready:
+            timer = timers[ready[0]]
+            process.publications.append((at, timer.publisher, thread))
+            while due[ready[0]] <= now:
+                due[ready[0]] += timer.period
+            free[thread] = at + 0.1
+            continue
+        _, place, subscription = arrivals.pop(0)
+        process.takes.append((at, place, thread))
+        lasts = chance.uniform(*subscription.lasts)
+        if subscription.publisher is not None:
+            for number in range(chance.choice(subscription.counts)):
+                process.publications.append(
+                    (at + lasts + number * subscription.gap, subscription.publisher, thread)
+                )
+                free[thread] = at + lasts + number * subscription.gap
+        free[thread] = max(free[thread], at + lasts) + 0.05
+    return process
+
+
+NOISY = Subscription(16, 0.5, (1, 7))
+
+
+@pytest.mark.parametrize(
+    "subscriptions",
+    [
+        [Subscription(50)],
+        [NOISY],
+        [Subscription(50, 30, (1, 20))],
+        # Steadily, or for as long as a message takes to come, or longer.
+        [Subscription(50, 0.02, (30, 30.1))],
+        [Subscription(10, 0.1, (8, 14))],
+        # To some messages only, in bursts, with another publication later on.
+        [Subscription(20, 0.1, (1, 2), counts=(0, 0, 1))],
+        [Subscription(20, 0.1, (1, 2), counts=(3,))],
+        [Subscription(20, 0.1, (1, 2), counts=(0, 1, 2, 3))],
+        [Subscription(50, 0.1, (1, 2), counts=(2,), gap=25)],
+        # One publisher for several subscriptions.
+        [Subscription(50, 0.1, (3, 4)), Subscription(170, 0.1, (20, 30))],
+        [Subscription(50), Subscription(33, publisher=None)],
+    ],
+)
+@pytest.mark.parametrize("is_new", [True, False])
+def test_answers_are_certain(subscriptions: list[Subscription], is_new: bool) -> None:
+    assert run(subscriptions, is_new=is_new).doubtful() == []
+
+
+@pytest.mark.parametrize("period", [5, 20, 23, 49.9, 50, 51, 100, 700])
+@pytest.mark.parametrize("subscription", [Subscription(50), NOISY])
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_timer_beside_answers(subscription: Subscription, period: float, threads: int) -> None:
+    process = run([subscription], [Timer(period, 17)], threads=threads)
+    assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
+
+
+def test_a_timer_of_the_period_of_noisy_messages() -> None:
+    process = run([NOISY], [Timer(16, 1.5)])
+    assert process.doubtful_publishers()[TICK] == 1
+
+
+@pytest.mark.parametrize("period", [5, 20, 23, 70, 100])
+@pytest.mark.parametrize("subscription", [Subscription(50), NOISY])
+def test_a_timer_that_is_older_than_the_recording(
+    subscription: Subscription, period: float
+) -> None:
+    """Its intervals are steadier than its delays, or messages have different numbers of them."""
+    process = run([subscription], [Timer(period, 17, is_traced=False)], is_new=False)
+    assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
+
+
+@pytest.mark.parametrize("period", [30, 50, 60])
+def test_a_timer_that_waits_for_long_callbacks(period: float) -> None:
+    process = run([Subscription(50, 0.1, (40, 48))], [Timer(period, 17)])
+    assert process.doubtful_publishers()[TICK] == 1
+
+
+def test_two_timers_and_two_subscriptions() -> None:
+    process = run(
+        [Subscription(50), Subscription(31, 1, (2, 5), publisher=None)],
+        [Timer(20, 3), Timer(90, 6, TOCK)],
+    )
+    assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1, TOCK: 1}
+
+
+def test_answers_and_a_timer_on_one_publisher() -> None:
+    """What comes beyond the answer is doubtful."""
+    process = run([Subscription(50)], [Timer(700, 17, ANSWER)])
+    ticks = [(ANSWER, round(at, 6)) for at, _, _ in process.publications if (at - 17) % 700 < 1]
+    assert len(ticks) == 5
+    assert process.doubtful() == ticks
+
+
+def test_answers_to_a_timer_of_the_same_process() -> None:
+    """The timer is due before each take, never between the take and the publication."""
+    process = run([Subscription(50)])
+    first = min(at for at, _, _ in process.takes)
+    process.timers = [(50, first - 50 - 0.5, 1)]
+    shift = [at - first for at, _, _ in process.takes]
+    assert max(each % 50 for each in shift if each % 50 < 25) < 6
+    assert process.doubtful() == []
+
+
+def steady(period: float, moments: Sequence[float], count: int = 20) -> Process:
+    """A message every so often, and publications at equal moments after each."""
+    process = Process()
+    for number in range(1, count + 1):
+        process.takes.append((number * period, 1, 1))
+        process.publications += [(number * period + each, TICK, 1) for each in moments]
+    return process
+
+
+@pytest.mark.parametrize(
+    ("late", "is_doubtful"),
+    [
+        ((10, 10, 10), True),
+        ((10.001, 10.001, 10.001), False),
+        ((10, 10, 50), True),
+        ((10, 50, 50), False),
+        ((10, 50), True),
+        ((10, 10, 50, 50, 50), False),
+    ],
+)
+def test_half_is_as_late_as_a_tenth_of_the_period(late: Sequence[float], is_doubtful: bool) -> None:
+    moments = [5 + 100 * number + each for number, each in enumerate(late)]
+    process = steady(100 * len(late), moments)
+    process.timers = [(100, -95, 1)]
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+    # Another process, one whose initialisation comes later, other periods.
+    for other in ((100, -95, 2), (100, 3_905, 1), (101, -95, 1)):
+        process.timers = [other]
+        assert process.doubtful() == []
+
+
+def test_the_first_timer_of_a_period_counts() -> None:
+    """The others are those of waits that may time out."""
+    process = steady(200, [15, 155])
+    process.timers = [(100, -95, 1), *((100, number * 7.3, 1) for number in range(-9, 9))]
+    assert process.doubtful_publishers() == {TICK: 1}
+    process.timers = [(100, -130, 1), (100, -95, 1)]
+    assert process.doubtful() == []
+
+
+@pytest.mark.parametrize(("others", "is_doubtful"), [(4, True), (3, False)])
+def test_most_wait_for_a_callback(others: int, is_doubtful: bool) -> None:
+    """The timer was due since the take, but for one message out of five, or of four."""
+    process = Process(timers=[(100, 0, 1)])
+    for number in range(1, 101):
+        shift = 5 * (number % 2)
+        last = 2 if number % (others + 1) == 0 else -10
+        process.takes.append((number * 100 + shift + last, 1, 1))
+        process.publications.append((number * 100 + shift + 50, TICK, 1))
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+
+
+@pytest.mark.parametrize(("period", "is_doubtful"), [(40, True), (39.9, False)])
+def test_a_timer_would_publish_again_before_the_next_take(period: float, is_doubtful: bool) -> None:
+    """If that is a period away."""
+    process = steady(200, [160])
+    process.timers = [(period, 360 - 10.5 * period, 1)]
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+
+
+@pytest.mark.parametrize(("spread", "is_doubtful"), [(10, False), (13, True)])
+def test_own_intervals_are_steadier_by_a_fifth(spread: float, is_doubtful: bool) -> None:
+    """Of both, only the middle four fifths count."""
+    process = Process()
+    for number in range(1, 101):
+        at = number * 100 + (0, 5, 0, 5, 5)[number % 5]
+        process.publications.append((at + (30 if number % 20 == 7 else 0), TICK, 1))
+        delay = 40 if number % 2 else 40 - spread
+        process.takes.append((at - delay - (20 if number % 20 == 9 else 0), 1, 1))
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+
+
+@pytest.mark.parametrize(("more", "is_doubtful"), [(10, False), (11, True)])
+def test_another_number_per_message(more: int, is_doubtful: bool) -> None:
+    """After more than a tenth of the messages; if it is less, only what comes beyond."""
+    process = steady(100, [2], 100)
+    beyond = [(number * 100 + 30, TICK, 1) for number in range(1, more + 1)]
+    process.publications += beyond
+    expected = process.publications if is_doubtful else beyond
+    assert process.doubtful() == sorted((TICK, round(at, 6)) for at, _, _ in expected)
+
+
+@pytest.mark.parametrize(("gap", "is_doubtful"), [(5.4, False), (7.5, True)])
+def test_a_burst_is_closer_than_a_tenth_of_the_interval(gap: float, is_doubtful: bool) -> None:
+    process = steady(100, [2], 100)
+    process.publications += [(number * 100 + 2 + gap, TICK, 1) for number in range(1, 50)]
+    assert process.doubtful_publishers() == {TICK: float(is_doubtful)}
+
+
+@pytest.mark.parametrize("count", [1, 4, 5])
+def test_too_few_to_tell(count: int) -> None:
+    """They are answers if no timer may be there that is not traced."""
+    process = steady(50, [3], count)
+    assert process.doubtful() == []
+    process.is_new = False
+    assert process.doubtful_publishers() == {TICK: float(count < 5)}
+
+
+def test_few_messages_of_another_subscription() -> None:
+    """A timer explains the publisher, whatever the message before."""
+    process = run([Subscription(50), Subscription(1_500, publisher=None)], [Timer(20, 17)])
+    assert process.doubtful_publishers() == {ANSWER: 0, TICK: 1}
