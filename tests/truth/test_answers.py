@@ -1,0 +1,116 @@
+"""Code without callback events: answers to messages are told from what timers publish."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from ingested import Ingested, ingest_one
+
+PLACE = """
+CREATE TEMP VIEW IF NOT EXISTS place AS
+SELECT t.thread_id, h.hostname, p.pid, t.tid
+FROM thread AS t
+JOIN process AS p ON t.process_id = p.process_id
+JOIN host AS h ON p.host_id = h.host_id
+"""
+TRUE = """
+SELECT host, pid, tid, take_rmw_ns, topic_name, publication_rmw_ns
+FROM truth_causal
+WHERE kind = 'take_adjacent'
+"""
+FOUND = """
+SELECT p.hostname, p.pid, p.tid, t.taken_ns, u.topic_name, b.rmw_ns
+FROM link_causal AS l
+JOIN take AS t ON l.take_id = t.take_id
+JOIN place AS p USING (thread_id)
+JOIN publication AS b USING (publication_id)
+JOIN publisher AS u USING (publisher_id)
+WHERE l.kind = 'take_adjacent' AND l.candidate_count
+"""
+PAIRS = """
+SELECT s.topic_name, u.topic_name, l.candidate_count, count(*)
+FROM link_causal AS l
+JOIN take AS t ON l.take_id = t.take_id
+JOIN subscription AS s ON t.subscription_id = s.subscription_id
+LEFT JOIN publication AS b USING (publication_id)
+LEFT JOIN publisher AS u USING (publisher_id)
+WHERE l.kind = 'take_adjacent'
+GROUP BY ALL
+ORDER BY ALL
+"""
+PATHS = """
+SELECT array_to_string(h.topics, ' '), count(*)
+FROM end_to_end([1], NULL, NULL, 'callback_start', 'take', 0, 9223372036854775807) AS e
+JOIN flow_path([1], NULL, NULL) AS h USING (path_id)
+WHERE e.status = 'reached'
+GROUP BY ALL
+ORDER BY ALL
+"""
+# Publications by topics of input and output, and the number of candidates; messages by path.
+RECORDED = {
+    "real_py_timer/ust": (
+        [("/scan", "/filtered", 1, 117), ("/scan", "/tick", 2, 288)],
+        {"/scan /filtered", "/tick"},
+    ),
+    "real_py_mixed/ust": ([("/scan", "/filtered", 1, 112)], {"/scan /filtered"}),
+    "rclpy_timer": (
+        [
+            ("/topic_a", "/pm_periodic", 2, 258),
+            ("/topic_a", "/pm_relay", 1, 373),
+            ("/topic_a", "/po_relay", 1, 372),
+            ("/topic_a", "/py_periodic", 2, 259),
+            ("/topic_a", "/py_relay", 1, 373),
+        ],
+        {
+            "/pm_periodic",
+            "/py_periodic",
+            "/topic_a /pm_relay",
+            "/topic_a /po_relay",
+            "/topic_a /py_relay",
+        },
+    ),
+}
+
+
+@pytest.fixture
+def recorded(
+    request: pytest.FixtureRequest, shared_traces: Path, tmp_path: Path
+) -> Iterator[tuple[str, Ingested]]:
+    """A recording and what msgflow makes of it."""
+    ingested = ingest_one(shared_traces / request.param, tmp_path / "recorded.duckdb")
+    yield request.param, ingested
+    ingested.connection.close()
+
+
+@pytest.mark.parametrize("recorded", RECORDED, indirect=True)
+def test_recorded_timers_are_doubtful_and_no_path_follows_them(
+    recorded: tuple[str, Ingested],
+) -> None:
+    name, ingested = recorded
+    pairs, paths = RECORDED[name]
+    assert ingested.rows(PAIRS) == pairs
+    reached = dict(ingested.rows(PATHS))
+    assert set(reached) == paths
+    assert min(reached.values()) > 100
+    subjects = ingested.rows(
+        "SELECT detail FROM finding WHERE name = 'doubtful_answer' ORDER BY detail"
+    )
+    assert [detail for (detail,) in subjects] == sorted(
+        f"{output} after {source} ({count} publications)"
+        for source, output, candidates, count in pairs
+        if candidates == 2
+    )
+
+
+@pytest.mark.parametrize("name", ["python", "python_timers"])
+def test_simulated_answers_are_certain_and_all_else_is_marked(
+    simulations: Callable[[str], Ingested], name: str
+) -> None:
+    simulated = simulations(name)
+    simulated.connection.execute(PLACE)
+    assert simulated.differences(TRUE, f"{FOUND} = 1") == ([], [])
+    assert simulated.rows(f"{TRUE} INTERSECT ({FOUND} = 2)") == []
+    marked = len(simulated.rows(f"{FOUND} = 2"))
+    assert (marked > 50) == (name == "python_timers")
