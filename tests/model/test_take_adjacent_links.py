@@ -126,3 +126,13 @@ def test_until_the_next_take_of_a_request_or_response(relay: RosSystem, analyse:
     relay.take_response(PYTHON, 0x50, 1)
     relay.publish(PYTHON, 0x11, 6, layers="rcl rmw")
     assert [row[:2] for row in analyse(relay).rows(LINKS)] == [(1, 11), (2, 11), (3, 11), (5, 12)]
+
+
+def test_the_middleware_answers_nothing(relay: RosSystem, analyse: Analyse) -> None:
+    """Discovery publishes without a publisher of rcl, and no event of it was lost."""
+    relay.take(PYTHON, 0x20, 11, layers="rmw rcl")
+    relay.publish(PYTHON, 0x99, 1, layers="rmw")
+    relay.publish(PYTHON, 0x11, 2, layers="rcl rmw")
+    model = analyse(relay)
+    assert model.rows("SELECT count(*) FROM publication WHERE publisher_id IS NULL") == [(1,)]
+    assert [row[:2] for row in model.rows(LINKS)] == [(2, 11)]
