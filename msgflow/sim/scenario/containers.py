@@ -65,12 +65,12 @@ def containers_one_daemon() -> Scenario:
     )  # fmt: skip
 
 
-def containers_one_name() -> Scenario:
+def containers_one_hostname() -> Scenario:
     """Two containers with one hostname, a session daemon each: equal ids in two traces."""
     hosts = tuple(Host(name, boot="robot", recorded_as="robot") for name in ("robot_1", "robot_2"))
     sink = Node("sink", subscriptions=(Subscription("/c"), Subscription("/f")))
     return Scenario(
-        name="containers_one_name",
+        name="containers_one_hostname",
         description="Containers with one hostname and a session daemon each: equal ids and names.",
         hosts=hosts,
         processes=(
