@@ -148,7 +148,7 @@ TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # messages, take one to be known.
 WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services")
 # The truth names hosts as their traces do: holes of one would be looked for in the other.
-ONE_NAME = {"containers_one_name"}
+ONE_NAME = {"containers_one_hostname"}
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
 
 

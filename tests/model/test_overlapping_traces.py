@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from analysis import Analyse, Analysis
 from ros_system import RosSystem
@@ -19,7 +21,7 @@ FOUND = (
 )
 
 
-def session(trace: int, pid: int = 100, **more: int) -> Thread:
+def session(trace: int, pid: int = 100, **more: Any) -> Thread:
     return Thread(pid, trace=trace, **more)
 
 
@@ -380,3 +382,26 @@ def test_a_namespace_is_not_that_of_another_container(system: RosSystem, analyse
     model = analyse(system)
     assert namespaces(model) == [7, -2]
     assert counts(model) == (8, 8, 8, 8)
+
+
+def test_nor_is_one_of_the_second_container_that_of_the_first(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    containers(system, session(0), session(1, pid_ns=9))
+    model = analyse(system)
+    assert namespaces(model) == [None, 9]
+    assert counts(model) == (8, 8, 8, 8)
+
+
+def test_a_thread_with_a_namespace_that_renames_itself_is_one(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Also where another session lacks the namespace."""
+    sessions(system, "alpha", "alpha")
+    create(system, session(0, name="front"))
+    for number in range(2):
+        cycle(system, 2 * number, session(1, name="front", pid_ns=7))
+        cycle(system, 2 * number + 1, session(1, name="rear", pid_ns=7))
+    model = analyse(system)
+    assert namespaces(model) == [7]
+    assert counts(model) == (4, 4, 4, 4)

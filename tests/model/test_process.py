@@ -126,6 +126,10 @@ def test_a_thread_on_two_cpus_at_one_moment_is_of_several_processes(
     system.publisher(Thread(7), 0x10, "/a")
     system.subscription(Thread(7), 0x20, "/a", callback=0x30)
     system.subscription(Thread(9), 0x20, "/a")
+    system.publisher(Thread(9), 0x40, "/b")
+    system.subscription(Thread(7), 0x50, "/b")
+    system.publish(Thread(9), 0x40, 2)
+    system.take(Thread(7), 0x50, 2)
     system.wait(MILLISECOND)
     system.add("ros2:callback_start", Thread(7), callback=0x30, is_intra_process=0)
     begin = system.publish(Thread(7), 0x10, 1)
@@ -140,8 +144,9 @@ def test_a_thread_on_two_cpus_at_one_moment_is_of_several_processes(
         (7, is_ambiguous),
         (9, False),
     ]
-    for view in ("link_transport", "link_causal"):
-        assert model.column(f"SELECT candidate_count FROM {view}") == [1 + is_ambiguous], view
+    for view, count in (("link_transport", 2), ("link_causal", 1)):
+        found = model.column(f"SELECT candidate_count FROM {view}")
+        assert found == [1 + is_ambiguous] * count, view
     assert (
         model.rows("SELECT count, detail FROM store.finding WHERE name = 'mixed_processes'")
         == [(1, "processes that are several with equal ids: main 7 on alpha")] * is_ambiguous

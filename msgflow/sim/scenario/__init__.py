@@ -59,7 +59,7 @@ def scenarios() -> Mapping[str, Scenario]:
         lives.restarts(),
         lives.container_restarts(),
         containers.containers_one_daemon(),
-        containers.containers_one_name(),
+        containers.containers_one_hostname(),
         bursts.equal_stamps(),
         traffic.host_chain(),
         bursts.bursts(),

@@ -65,24 +65,24 @@ def containers_one_daemon() -> Scenario:
     )  # fmt: skip
 
 
-def containers_one_name() -> Scenario:
+def containers_one_hostname() -> Scenario:
     """Two containers with one hostname, a session daemon each: equal ids in two traces."""
     hosts = tuple(Host(name, boot="robot", recorded_as="robot") for name in ("robot_1", "robot_2"))
     sink = Node("sink", subscriptions=(Subscription("/c"), Subscription("/f")))
     return Scenario(
-        name="containers_one_name",
+        name="containers_one_hostname",
         description="Containers with one hostname and a session daemon each: equal ids and names.",
         hosts=hosts,
         processes=(
             Process("source", "robot_1", 1101, (_source("/a", 5 * MILLISECOND),)),
-            Process("relay", "robot_1", 1201, (_relay("/b", "/c"),), start_ns=4 * MILLISECOND),
-            Process("sink", "robot_1", 1301, (sink,), start_ns=8 * MILLISECOND),
+            Process("relay", "robot_1", 1201, (_relay("/b", "/c"),), start_ns=5 * MILLISECOND),
+            Process("sink", "robot_1", 1301, (sink,), start_ns=10 * MILLISECOND),
             Process(
                 "source", "robot_2", 1101, (_source("/e", 8 * MILLISECOND),),
-                start_ns=12 * MILLISECOND,
+                start_ns=15 * MILLISECOND,
             ),
-            Process("relay", "robot_2", 1201, (_relay("/a", "/b"),), start_ns=16 * MILLISECOND),
-            Process("sink", "robot_2", 1301, (_relay("/e", "/f"),), start_ns=20 * MILLISECOND),
+            Process("relay", "robot_2", 1201, (_relay("/a", "/b"),), start_ns=21 * MILLISECOND),
+            Process("sink", "robot_2", 1301, (_relay("/e", "/f"),), start_ns=26 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
     )  # fmt: skip

@@ -3,9 +3,10 @@
 -- description: Threads were on two CPUs at one moment: they are threads of several processes that
 --     have the same ids and names. Each such mixture is one process here. Its objects, callbacks
 --     and executors may be those of any of them, and all its links have a candidate_count above 1.
--- cause: Containers number their processes alike, and share a session daemon, or a hostname.
--- cure: Record the namespace of the ids (lttng add-context -u -t pid_ns), or start a session daemon
---     in each container and give each a hostname.
+-- cause: Containers number their processes alike, and share a session daemon, or a hostname. Or the
+--     session lacks the ids of processes and threads.
+-- cure: Record the ids and their namespace (lttng add-context -u -t vpid -t vtid -t pid_ns), or start
+--     a session daemon in each container and give each a hostname.
 -- grain: one row, if there are any
 -- severity: error
 SELECT
