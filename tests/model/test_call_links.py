@@ -135,6 +135,16 @@ def test_what_was_sent_before_spinning_tells_nothing(system: RosSystem, analyse:
     assert analyse(system).rows(LINKS) == [(2, taken, True, 1)]
 
 
+def test_behind_a_gap_nothing_is_sent_otherwise(calls: RosSystem, analyse: Analyse) -> None:
+    """What was taken before it may be lost."""
+    calls.lose()
+    calls.publish(CLIENT, 0x11, 1)
+    calls.ready(CLIENT)
+    taken = respond(calls)
+    calls.publish(CLIENT, 0x11, 2)
+    assert analyse(calls).rows(LINKS) == [(2, taken, True, 1)]
+
+
 def test_a_request_without_callback(calls: RosSystem, analyse: Analyse) -> None:
     """An action server. That a request leads to its response is no such link."""
     taken = calls.take_request(SERVER, 0x20, 1, gid=7)

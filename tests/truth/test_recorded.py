@@ -153,6 +153,40 @@ def test_nothing_is_wrong_where_events_were_lost(
     assert all(float(recall) > 0.94 for _, recall in scores.values())
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "count"),
+    few(
+        [("client_callbacks", "link_call", 1448), ("polling", "polled", 866)],
+        ("polling", "polled", 866),
+    ),
+)
+def test_what_follows_from_responses_and_polled_messages(
+    recordings: Callable[[str], Ingested], shared_traces: Path, name: str, kind: str, count: int
+) -> None:
+    """Of the polled messages those that were taken in the callback itself are decided."""
+    ingested = recordings(name)
+    path = Path(ingested.rows("SELECT path FROM duckdb_databases() WHERE NOT internal")[0][0])
+    scores = compare_recorded(path, shared_traces / name / "truth.jsonl.gz")
+    assert {(score.precision, score.recall, score.doubted) for score in scores} == {(1, 1, 0)}
+    assert {score.kind: score.found for score in scores}[kind] == count
+
+
+def test_flows_go_on_from_responses_of_real_services(
+    recordings: Callable[[str], Ingested], shared_traces: Path
+) -> None:
+    """The client's callback publishes, and a deferred response follows from another one."""
+    if not (shared_traces / "real_services").is_dir():
+        pytest.skip("the recording of real services is not here")
+    ingested = recordings("real_services")
+    assert ingested.rows(
+        "SELECT count(taken_response_id), count(publication_id), count(response_id), "
+        "max(candidate_count) FROM link_call"
+    ) == [(110, 55, 55, 1)]
+    assert ("/caller → (/outer) → /outer → /caller → /result → /observer",) in ingested.rows(
+        "SELECT path FROM flow_path([1]) WHERE is_path"
+    )
+
+
 @pytest.mark.thorough
 def test_wrong_inputs_of_a_reentrant_node_are_marked(
     recordings: Callable[[str], Ingested], shared_traces: Path
