@@ -23,6 +23,7 @@ EXPECTED: dict[str, list[tuple[str, str | None, int]]] = {
     "real_pipeline": [],
     "real_py_mixed": [("process_without_rclcpp", "python3.11 20878 on vm", 137)],
     "real_py_timer": [
+        ("doubtful_answer", "/filter_timer", 288),
         ("process_without_rclcpp", "python3.11 19960 on vm", 25),
         ("process_without_rclcpp", "python3.11 19963 on vm", 437),
         ("process_without_rclcpp", "python3.11 19964 on vm", 142),
