@@ -183,8 +183,8 @@ SELECT
     d.lateness[3] AS lateness_p99_ns,
     d.lateness[4] AS lateness_max_ns,
     CASE
-        -- On its grid a timer takes count - 2 periods for that many calls at the least; one more for
-        -- how long starting takes.
+        -- On its grid a timer takes count - 2 periods for that many calls at the least. One more is
+        -- for how long starting takes.
         WHEN c.span_ns < (c.count - 3) * a.period_ns THEN 'clock'
         -- What a busy executor adds is not that constant, and calls of fast timers are late by more
         -- than a hundredth of their period for the time that waking takes. Fewer than ten may be

@@ -3,7 +3,7 @@
 -- description: The process was seen to create nodes and to publish through rcl, and has no event
 --     of rclcpp, although these were enabled. So there are no callbacks, durations or executor
 --     states of it. A message is taken to have caused what its thread sent before the next take:
---     what a timer of the process sent in that time cannot be told from that.
+--     what a timer of the process sent in that time may look the same (doubtful_answer).
 -- cause: It is written in Python (rclpy) or uses another client library. These have no tracepoints
 --     of their own.
 -- cure: None for this recording. Measure callbacks of such nodes in the nodes themselves.
