@@ -85,7 +85,8 @@ RECORDINGS = {
     ),
     "truncated": Recording(cut_streams=1, unfinished_streams=1),
     "dual": Recording(start_ns=SECOND // 3, is_dual_session=True, clock_error_ns=3_000),
-    "rotated": Recording(rotations=(SECOND // 3, SECOND // 2)),
+    # The last one while the source of `stall` computes.
+    "rotated": Recording(rotations=(SECOND // 3, SECOND // 2, SECOND * 4 // 3)),
     "chunk_missing": Recording(rotations=(SECOND // 3, SECOND // 2), missing_chunk=1),
     "brim": Recording(
         lost_event_share=0.8, longest_loss=400, filled_share=0.3, packet_bytes=_SMALL
@@ -146,7 +147,7 @@ TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
-WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services")
+WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services", "stall")
 # The truth names hosts as their traces do: holes of one would be looked for in the other.
 ONE_NAME = {"containers_one_name"}
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))

@@ -135,6 +135,29 @@ def test_scores(
     assert float(agreement[0]) >= 0.99
 
 
+# Systems on which links were wrong or missing once, with kinds of links that were.
+ONCE_WRONG = {
+    # A rotation in a silence.
+    "rotated_autoware": ("direct", "partial_sync", "periodic_async"),
+}
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ONCE_WRONG)
+def test_what_was_wrong_is_right(
+    recordings: Callable[[str], Ingested], shared_traces: Path, name: str
+) -> None:
+    ingested = recordings(name)
+    path = Path(ingested.rows("SELECT path FROM duckdb_databases() WHERE NOT internal")[0][0])
+    scores = {
+        score.kind: score
+        for score in compare_recorded(path, shared_traces / name / "truth.jsonl.gz")
+    }
+    for kind in ONCE_WRONG[name]:
+        assert (scores[kind].wrong, scores[kind].missing) == (0, 0), kind
+        assert scores[kind].found > 0
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["lossy_intra_mt", "intra_lost", "snapshots_intra"])
 def test_nothing_is_wrong_where_events_were_lost(

@@ -41,6 +41,7 @@ def scenarios() -> Mapping[str, Scenario]:
         pipeline.fan_out(),
         pipeline.two_hosts(),
         pipeline.quiet(),
+        pipeline.stall(),
         robot.demo(),
         executors.multi_threaded(),
         executors.executors(),
