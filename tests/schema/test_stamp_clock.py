@@ -239,6 +239,40 @@ def test_clocks_stand_for_three_stretches_or_it_is_not_said(
     assert {row[4] for row in step(rules, 6 * STRETCH_NS, 7_000)} == {0}
 
 
+@pytest.mark.parametrize(
+    ("stretches", "agreeing", "ppb", "stands"),
+    [
+        pytest.param(3, 99, 0, True, id="nearly_all_messages"),
+        pytest.param(3, 98, 0, False, id="fewer"),
+        pytest.param(2, 100, 0, False, id="of_two_stretches"),
+        pytest.param(3, 100, 1_000, True, id="hardly_a_drift"),
+        pytest.param(3, 100, 1_001, False, id="a_drift"),
+        pytest.param(3, 100, -1_001, False, id="backward"),
+    ],
+)
+def test_clocks_stood_where_one_difference_explains_what_several_do(
+    rules: duckdb.DuckDBPyConnection, stretches: int, agreeing: int, ppb: int, *, stands: bool
+) -> None:
+    """A hundred messages a second; each second alone has a difference for all of them."""
+    rules.execute(
+        "CREATE TABLE pairs AS SELECT 1 AS clock_id, stretch, "
+        "CASE WHEN n < $agreeing THEN 0 ELSE 50000 + 9000 * stretch END AS least_ns, "
+        "least_ns + 8000 AS greatest_ns "
+        "FROM range($stretches) AS s(stretch), range(100) AS r(n)",
+        {"agreeing": agreeing, "stretches": stretches},
+    )
+    rules.execute(
+        "CREATE TABLE chosen AS SELECT 1 AS clock_id, 0 AS place, stretch, "
+        "stretch * 1000000000 AS at_ns, stretch * $ppb AS offset_ns, 0 AS least_ns, "
+        "8000 AS greatest_ns, 100 AS most_count FROM range($stretches) AS s(stretch)",
+        {"ppb": ppb, "stretches": stretches},
+    )
+    rows = rules.execute(
+        "SELECT difference_ns FROM derive.standing_difference('pairs', 'chosen')"
+    ).fetchall()
+    assert rows == ([(4_000,)] * stretches if stands else [])
+
+
 def test_where_nothing_is_told_a_clock_that_stood_stands(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:
