@@ -193,8 +193,8 @@ torn_stamp AS (
         AND p.rmw_ns < h.end_ns AND p.stamped_ns > h.begin_ns
     WHERE p.stamped_ns - p.rmw_ns > p.usual_ns
 ),
--- Messages that another one of the topic resembles: by an equal stamp, or from another publisher at
--- nearly the same time.
+-- Messages that another one of the topic resembles: by an equal stamp, or from another publisher or
+-- thread at nearly the same time.
 twin AS (
     SELECT a.publication_id, bool_or(a.source_timestamp_ns = b.source_timestamp_ns) AS is_equal
     FROM simulated_publication AS a
@@ -204,8 +204,8 @@ twin AS (
         AND b.source_timestamp_ns BETWEEN a.source_timestamp_ns - 5_000_000
             AND a.source_timestamp_ns + 5_000_000
     WHERE a.source_timestamp_ns = b.source_timestamp_ns
-        OR (a.publisher_handle, a.host, a.pid)
-            IS DISTINCT FROM (b.publisher_handle, b.host, b.pid)
+        OR (a.publisher_handle, a.host, a.pid, a.tid)
+            IS DISTINCT FROM (b.publisher_handle, b.host, b.pid, b.tid)
     GROUP BY a.publication_id
 ),
 asked AS (

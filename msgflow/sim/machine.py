@@ -55,11 +55,13 @@ class Machine:
         self.free_at = [0] * recorder.cpu_count
         self._realtime_offset_ns = recording.realtime_offset_ns
         self._slew_ppb = round(recording.slew_ppm * 1000)
+        self._realtime_steps = recording.realtime_steps
 
     def stamp_ns(self, time: int) -> int:
         """What the clock that makes source stamps shows at `time` (ns since the epoch)."""
         now = time + self.epoch + self._realtime_offset_ns
         now += time * self._slew_ppb // 1_000_000_000
+        now += sum(by for at, by in self._realtime_steps if time >= at)
         return now - now % self._stamp_resolution
 
 

@@ -50,6 +50,7 @@ class Recording:
         realtime_offset_ns: what the clock that makes source stamps is ahead of the trace's clock
             at the begin.
         slew_ppm: parts per million by which it is faster than the trace's clock.
+        realtime_steps: it is set: at these times, forward by so much.
     """
 
     start_ns: int = 0
@@ -75,6 +76,7 @@ class Recording:
     unfinished_streams: int = 0
     realtime_offset_ns: int = 0
     slew_ppm: float = 0.0
+    realtime_steps: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
         for share in (self.lost_event_share, self.lost_packet_share, self.filled_share):
@@ -129,7 +131,11 @@ class Recording:
     @property
     def is_perfect(self) -> bool:
         """Whether every event of the layout is recorded, by one trace of each host."""
-        return self == Recording(realtime_offset_ns=self.realtime_offset_ns, slew_ppm=self.slew_ppm)
+        return self == Recording(
+            realtime_offset_ns=self.realtime_offset_ns,
+            slew_ppm=self.slew_ppm,
+            realtime_steps=self.realtime_steps,
+        )
 
 
 PERFECT = Recording()

@@ -334,6 +334,48 @@ def test_a_rotation_ends_packets_too(system: RosSystem, analyse: Analyse) -> Non
     assert analyse(system).rows(GAPS) == []
 
 
+def test_what_opens_a_chunk_shows_that_nothing_was_stopped(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Silent behind it as never else: the empty packets of a rotation, not those of stopping."""
+    opened, later, none = 2_000 * MS, 2_035 * MS, ()
+    # Packets of the later chunk on two CPUs (begin, end, events), and the pause that they show.
+    empty = (opened, opened, 0)
+    cases: tuple[tuple[list[tuple[int, int, int]], list[tuple[int, int, int]], object], ...] = (
+        ([empty], [empty], none),
+        # An event came between the end of the chunk before and what opened this one.
+        ([empty], [(opened, opened + MS - 1, 2)], none),
+        ([empty], [(opened, opened + MS, 2)], (opened + MS, later)),
+        # Stopping leaves empty packets too, which do not come first.
+        ([empty, (opened + 9 * MS,) * 2 + (0,)], [empty], (opened + 9 * MS, later)),
+        # No rotation leaves these: an event is in it; it took its time.
+        ([(opened, opened, 1)], [(opened, opened, 1)], (opened, later)),
+        ([(opened - 5, opened, 0)], [(opened - 5, opened, 0)], (opened, later)),
+    )
+    for case, (*cpus, _) in enumerate(cases):
+        for trace in (2 * case, 2 * case + 1):
+            system.add_source(trace, f"host {case}", f"boot {case}", f"recording {case}")
+        events_at(system, *range(0, opened, 10 * MS), trace=2 * case)
+        events_at(system, *range(later, 4_001 * MS, 10 * MS), trace=2 * case + 1)
+        for cpu, packets in enumerate(cpus):
+            system.add_packet(0, opened - 10, last_event=opened - 20, cpu=cpu, trace=2 * case)
+            for begin, end, count in packets:
+                system.add_packet(begin, end, count=count, cpu=cpu, trace=2 * case + 1)
+            system.add_packet(later, 4_000 * MS, cpu=cpu, trace=2 * case + 1)
+    model = analyse(system)
+    for case, (*_, pause) in enumerate(cases):
+        found = [(start, end) for _, _, start, end, _ in gaps_of(model, 2 * case + 1)]
+        assert found == ([pause] if pause else []), case
+
+
+def test_a_recording_is_not_opened_by_an_empty_packet(system: RosSystem, analyse: Analyse) -> None:
+    """Another chunk must be before it. Here it was stopped before anything was recorded."""
+    for cpu in (0, 1):
+        system.add_packet(MS, MS, count=0, cpu=cpu)
+        system.add_packet(40 * MS, 60 * MS, cpu=cpu)
+    assert analyse(system).rows(GAPS) == [("pause", None, MS, 40 * MS, None)]
+
+
 def test_a_pause_is_no_usual_silence(system: RosSystem, analyse: Analyse) -> None:
     """Stopped twice for as long."""
     for cpu in (0, 1):

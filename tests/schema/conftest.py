@@ -13,6 +13,7 @@ RULES = (
     "agreed_difference",
     "clock_drift",
     "followed_difference",
+    "standing_difference",
     "close_pair",
     "sharp_difference",
     "stamp_pair",
@@ -25,8 +26,9 @@ STAGE = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;
 CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
-    topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, publication_id BIGINT,
-    written_ns BIGINT, next_event_ns BIGINT, has_break BOOLEAN DEFAULT false);
+    topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
+    publication_id BIGINT, written_ns BIGINT, next_event_ns BIGINT,
+    has_break BOOLEAN DEFAULT false);
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, clock_id BIGINT DEFAULT 1, taken_ns BIGINT);
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
@@ -34,8 +36,8 @@ CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT
     message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);
 CREATE TABLE derive.exposed_trace (trace_id BIGINT, recording_id BIGINT);
 INSERT INTO derive.exposed_trace VALUES (1, 7);
-CREATE TABLE derive.recording_gap (recording_id BIGINT DEFAULT 7, start_ns BIGINT,
-    covered_until_ns BIGINT);
+CREATE TABLE derive.recording_gap (run_id BIGINT DEFAULT 1, recording_id BIGINT DEFAULT 7,
+    start_ns BIGINT, covered_until_ns BIGINT);
 CREATE VIEW store.publication AS
     SELECT publication_id, 1 AS trace_id, written_ns AS start_ns, written_ns AS end_ns,
         next_event_ns FROM published;

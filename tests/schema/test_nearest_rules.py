@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import duckdb
 import pytest
@@ -33,12 +34,15 @@ def publish(
     written: int,
     closes: int | None,
     topic: str = "/a",
+    *,
+    publisher: int | None = None,
+    thread: int = 1,
 ) -> None:
-    """A publication and when its thread went on."""
+    """A publication and when its thread went on; one publisher for each topic, unless given."""
     con.execute(
         "INSERT INTO published (publication_id, written_ns, next_event_ns, topic_name, "
-        "publisher_id) VALUES (?, ?, ?, ?, ?)",
-        [identity, written, closes, topic, ord(topic[1])],
+        "publisher_id, thread_id) VALUES (?, ?, ?, ?, ?, ?)",
+        [identity, written, closes, topic, publisher or ord(topic[1]), thread],
     )
 
 
@@ -161,12 +165,12 @@ def test_or_for_twice_what_is_usual_on_its_host(
 @pytest.mark.parametrize(
     ("median", "width", "delay", "is_found"),
     [
-        pytest.param(1, 17, 16.0, True, id="writes_for_less_than_a_fifth"),
-        pytest.param(1, 19, 16.0, False, id="writes_for_more"),
-        pytest.param(1, 19, 5.0, True, id="five_milliseconds"),
-        pytest.param(1, 19, 5.1, False, id="longer"),
-        pytest.param(3, 19, 12.0, True, id="four_medians"),
-        pytest.param(3, 19, 12.1, False, id="more"),
+        pytest.param(1, 44, 16.0, True, id="writes_for_less_than_half"),
+        pytest.param(1, 46, 16.0, False, id="writes_for_more"),
+        pytest.param(1, 46, 5.0, True, id="five_milliseconds"),
+        pytest.param(1, 46, 5.1, False, id="longer"),
+        pytest.param(3, 46, 12.0, True, id="four_medians"),
+        pytest.param(3, 46, 12.1, False, id="more"),
     ],
 )
 def test_who_writes_for_much_of_the_time_has_messages_of_others_within(
@@ -176,7 +180,114 @@ def test_who_writes_for_much_of_the_time_has_messages_of_others_within(
     clock(rules, (0, 100, 0))
     late = round(delay * MILLISECOND)
     periodic(rules, [median * MILLISECOND] * 9 + [late], width * MILLISECOND)
-    assert nearest(rules).get(9 * PERIOD + late) == ((9, 1) if is_found else None)
+    assert nearest(rules)[9 * PERIOD + late] == (9 if is_found else None, 1)
+
+
+@pytest.mark.parametrize("second", ["thread", "publisher"])
+def test_all_writes_that_go_on_come_into_question(
+    rules: duckdb.DuckDBPyConnection, second: str
+) -> None:
+    """Of threads that share a publisher, and of publishers; also an earlier one."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [10_000] * 10, MILLISECOND)
+    publish(rules, 998, time, time + 900_000)
+    publish(rules, 999, time + 100_000, time + 500_000, **{second: 2})
+    take(rules, time + 200_000, time + 300_000)
+    found = nearest(rules)
+    assert found[time + 200_000] == found[time + 300_000] == (None, 2)
+
+
+@pytest.mark.parametrize("first", [50_000, 600_000])
+@pytest.mark.parametrize("second", ["thread", "publisher"])
+def test_a_publication_that_has_its_message_has_no_other(
+    rules: duckdb.DuckDBPyConnection, second: str, first: int
+) -> None:
+    """One message can only be of the longer write, so that the other is of the shorter."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [10_000] * 10, MILLISECOND)
+    publish(rules, 998, time, time + 900_000)
+    publish(rules, 999, time + 100_000, time + 500_000, **{second: 2})
+    take(rules, time + first, time + 200_000)
+    found = nearest(rules)
+    assert (found[time + first], found[time + 200_000]) == ((998, 1), (999, 1))
+
+
+def test_unless_that_comes_later_than_is_usual(rules: duckdb.DuckDBPyConnection) -> None:
+    """The publisher writes for most of the time, so that it may be of somebody else."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [MILLISECOND] * 20, 60 * MILLISECOND)
+    publish(rules, 998, time, time + 60 * MILLISECOND)
+    publish(rules, 999, time + 100_000, time + 500_000, publisher=2)
+    take(rules, time + 200_000, time + 5_100_000)
+    found = nearest(rules)
+    assert found[time + 200_000] == (None, 2)
+    assert found[time + 5_100_000] == (None, 1)
+
+
+def beside_strangers(
+    con: duckdb.DuckDBPyConnection,
+    *,
+    stranger: int | None = 50 * MILLISECOND,
+    taken: int = 19,
+    others: Iterable[int] = (),
+) -> None:
+    """Twenty writes of 10 ms; 19 or 20 have a message, 10 µs after each but one: 100 µs."""
+    clock(con, (0, 100, 0), (0, 100, 0), (0, 100, 0))
+    for n in range(20):
+        publish(con, n, n * PERIOD, n * PERIOD + 10 * MILLISECOND)
+        if n < taken:
+            take(con, n * PERIOD + (100_000 if n == 9 else 10_000))
+    if stranger is not None:
+        take(con, stranger)
+    for n, delay in enumerate(others):
+        publish(con, 100 + n, n * MILLISECOND, n * MILLISECOND + 500_000, "/b")
+        take(con, n * MILLISECOND + delay, topic="/b")
+
+
+UNUSUAL = 9 * PERIOD + 100_000
+
+
+@pytest.mark.parametrize(
+    ("system", "is_found"),
+    [
+        pytest.param({}, False, id="it_may_be_theirs"),
+        pytest.param({"stranger": None}, True, id="nobody_else_publishes"),
+        pytest.param({"stranger": -1}, True, id="nobody_else_while_it_was_recorded"),
+        pytest.param({"stranger": 19 * PERIOD + 50 * MILLISECOND}, True, id="nor_behind"),
+        pytest.param({"taken": 20}, True, id="each_publication_has_one"),
+        pytest.param({"others": [100_000] * 90}, True, id="usual_where_nobody_else_publishes"),
+        pytest.param({"others": [99_999] * 90}, False, id="longer_than_is_usual_there"),
+    ],
+)
+def test_a_message_of_somebody_else_may_take_the_place_of_one_that_nobody_took(
+    rules: duckdb.DuckDBPyConnection, system: dict[str, Any], *, is_found: bool
+) -> None:
+    """Where another one came while nobody wrote, a publication has what comes as soon as usual."""
+    beside_strangers(rules, **system)
+    found = nearest(rules)
+    assert found[10_000] == (0, 1)
+    assert found[UNUSUAL] == (9 if is_found else None, 1)
+
+
+@pytest.mark.parametrize(("delay", "is_found"), [(25_000, True), (24_999, False)])
+def test_else_four_times_what_half_of_them_take(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_found: bool
+) -> None:
+    beside_strangers(rules)
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns + $delay - 10000 "
+        "WHERE source_timestamp_ns % 100000000 = 10000",
+        {"delay": delay},
+    )
+    assert nearest(rules)[UNUSUAL] == (9 if is_found else None, 1)
+
+
+def test_a_message_whose_publication_is_lost_is_of_nobody_else(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    beside_strangers(rules)
+    lose(rules, 40 * MILLISECOND, 60 * MILLISECOND)
+    assert nearest(rules)[UNUSUAL] == (9, 1)
 
 
 @pytest.mark.parametrize(("delay", "is_rival"), [(500_000, True), (500_001, False)])

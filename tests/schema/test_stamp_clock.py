@@ -187,13 +187,106 @@ def test_bursts_are_told_at_any_drift(rules: duckdb.DuckDBPyConnection, ppm: int
 
 def test_three_stretches_on_either_side_vote_together(rules: duckdb.DuckDBPyConnection) -> None:
     """Threads that go on late say little; the first stretch has others."""
-    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=20)
     rules.execute(
         "UPDATE published SET next_event_ns = written_ns + 1000000 WHERE written_ns >= ?",
         [STRETCH_NS],
     )
-    rows = rules.execute("SELECT difference_ns FROM derive.stamp_clock(1) ORDER BY start_ns")
-    assert [abs(value) < 1_000 for (value,) in rows.fetchall()] == [True] * 4 + [False] * 4
+    rows = rules.execute(
+        "SELECT difference_ns - at_ns * 20 // 1000000 FROM derive.stamp_clock(1) ORDER BY start_ns"
+    )
+    assert [abs(value) < 1_500 for (value,) in rows.fetchall()] == [True] * 4 + [False] * 4
+
+
+def step(con: duckdb.DuckDBPyConnection, at_ns: int, by_ns: int) -> list[tuple[Any, ...]]:
+    """Begin, end, difference, drift and segment over time once the clock of stamps was set."""
+    con.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns + $by "
+        "WHERE source_timestamp_ns >= $at",
+        {"at": at_ns, "by": by_ns},
+    )
+    return con.execute(
+        "SELECT start_ns, end_ns, difference_ns, drift_ppb, segment "
+        "FROM derive.stamp_clock(1) ORDER BY start_ns"
+    ).fetchall()
+
+
+@pytest.mark.parametrize("by_ns", [7_000, -7_000, 60_000, -60_000])
+@pytest.mark.parametrize("part", [0.0, 0.5])
+def test_a_step_is_no_drift(rules: duckdb.DuckDBPyConnection, by_ns: int, part: float) -> None:
+    """However small, between bursts 2 µs apart, at the begin of a stretch or in its middle."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
+    at = round((4 + part) * STRETCH_NS)
+    rows = step(rules, at, by_ns)
+    assert [row[0] for row in rows[1:]] == [row[1] for row in rows[:-1]]
+    assert rows[0][0] == 0
+    assert {drift for *_, drift, _ in rows} == {0}
+    for *_, difference, _, segment in rows:
+        assert abs(difference - segment * by_ns) < 1_000
+    # The time that lies on either side, as there is no message that tells.
+    first = next(n for n, row in enumerate(rows) if row[4] == 1)
+    assert rows[first - 1][0] < at <= rows[first][1]
+    assert rows[first][1] - rows[first - 1][0] < 100_000_000
+    assert len(rows) == 10
+
+
+def test_clocks_stand_for_three_stretches_or_it_is_not_said(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, per_burst=6)
+    assert {row[4] for row in step(rules, 5 * STRETCH_NS, 7_000)} == {0, 1}
+    step(rules, 5 * STRETCH_NS, -7_000)
+    assert {row[4] for row in step(rules, 6 * STRETCH_NS, 7_000)} == {0}
+
+
+@pytest.mark.parametrize(
+    ("stretches", "agreeing", "ppb", "stands"),
+    [
+        pytest.param(3, 99, 0, True, id="nearly_all_messages"),
+        pytest.param(3, 98, 0, False, id="fewer"),
+        pytest.param(2, 100, 0, False, id="of_two_stretches"),
+        pytest.param(3, 100, 1_000, True, id="hardly_a_drift"),
+        pytest.param(3, 100, 1_001, False, id="a_drift"),
+        pytest.param(3, 100, -1_001, False, id="backward"),
+    ],
+)
+def test_clocks_stood_where_one_difference_explains_what_several_do(
+    rules: duckdb.DuckDBPyConnection, stretches: int, agreeing: int, ppb: int, *, stands: bool
+) -> None:
+    """A hundred messages a second; each second alone has a difference for all of them."""
+    rules.execute(
+        "CREATE TABLE pairs AS SELECT 1 AS clock_id, stretch, "
+        "CASE WHEN n < $agreeing THEN 0 ELSE 50000 + 9000 * stretch END AS least_ns, "
+        "least_ns + 8000 AS greatest_ns "
+        "FROM range($stretches) AS s(stretch), range(100) AS r(n)",
+        {"agreeing": agreeing, "stretches": stretches},
+    )
+    rules.execute(
+        "CREATE TABLE chosen AS SELECT 1 AS clock_id, 0 AS place, stretch, "
+        "stretch * 1000000000 AS at_ns, stretch * $ppb AS offset_ns, 0 AS least_ns, "
+        "8000 AS greatest_ns, 100 AS most_count FROM range($stretches) AS s(stretch)",
+        {"ppb": ppb, "stretches": stretches},
+    )
+    rows = rules.execute(
+        "SELECT difference_ns FROM derive.standing_difference('pairs', 'chosen')"
+    ).fetchall()
+    assert rows == ([(4_000,)] * stretches if stands else [])
+
+
+def test_where_nothing_is_told_a_clock_that_stood_stands(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """For however long, if it stands as before then."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0, count=800)
+    rules.execute(
+        "DELETE FROM message WHERE source_timestamp_ns BETWEEN $first AND $last",
+        {"first": 7 * SECOND // 2, "last": 11 * SECOND // 2},
+    )
+    rows = rules.execute(
+        "SELECT message_count > 0, difference_ns, segment FROM derive.stamp_clock(1)"
+    ).fetchall()
+    assert {known for known, *_ in rows} == {True}
+    assert len({(difference, segment) for _, difference, segment in rows}) == 1
 
 
 @pytest.mark.parametrize(("here", "is_known"), [(10, True), (7, True), (6, False), (0, False)])

@@ -94,3 +94,21 @@ def test_a_quiet_system_pauses_where_it_was_stopped(tmp_path: Path, name: str) -
     assert [score for score in scores if score.wrong] == []
     assert drops is not None
     assert [drop for drop in drops if not drop.is_right and not drop.undecided] == []
+
+
+def test_a_rotation_is_no_pause_however_silent_the_system_is(tmp_path: Path) -> None:
+    """The one long callback runs across the border: it keeps its end, and what it causes."""
+    recording = Recording(rotations=(4 * SECOND // 3,))
+    simulation = simulate("stall", tmp_path / "trace", recording=recording)
+    database = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, database).connection.close()
+    with duckdb.connect(str(database), read_only=True) as connection:
+        assert connection.execute("FROM gap").fetchall() == []
+        assert connection.execute(
+            "SELECT count(*), bool_or(n.start_ns - r.start_ns < 1_333_333_333 "
+            "AND n.end_ns - r.start_ns > 1_433_333_333) "
+            "FROM callback_instance AS n CROSS JOIN run AS r "
+            "WHERE n.end_ns - n.start_ns > 100_000_000"
+        ).fetchall() == [(1, True)]
+    scores, _ = compare_simulated(database, simulation.truth)
+    assert [score for score in scores if score.wrong or score.missing] == []

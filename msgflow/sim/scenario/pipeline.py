@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from msgflow.sim.entity import MILLISECOND, Publisher, Subscription, Timer
+from msgflow.sim.entity import MILLISECOND, SECOND, Publisher, Subscription, Timer, Work
 from msgflow.sim.system import Host, Node, Process, Scenario
 
 _SOURCE = Node(
@@ -62,6 +62,33 @@ def quiet() -> Scenario:
             Process("source", "alpha", 1101, (source,)),
             Process("sink", "alpha", 1201, (sink,), start_ns=3 * MILLISECOND),
         ),
+    )
+
+
+def stall() -> Scenario:
+    """A source that is busy with one callback for 150 ms, once, and a sink."""
+    source = Node(
+        "source",
+        publishers=(Publisher("/topic_a"), Publisher("/map")),
+        timers=(
+            Timer(10 * MILLISECOND, publishes=("/topic_a",)),
+            Timer(
+                1_300 * MILLISECOND,
+                publishes=("/map",),
+                work=Work(typical_ns=150 * MILLISECOND, percent_before=100),
+            ),
+        ),
+    )
+    sink = Node("sink", subscriptions=(Subscription("/topic_a"), Subscription("/map")))
+    return Scenario(
+        name="stall",
+        description="A source with a timer of 10 ms and a callback that holds it up once.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("source", "alpha", 1101, (source,)),
+            Process("sink", "alpha", 1201, (sink,), start_ns=3 * MILLISECOND),
+        ),
+        duration_ns=2 * SECOND,
     )
 
 

@@ -31,6 +31,11 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- publishers that are not traced, fewer agree, but no other difference is a rival. If the drift
     -- is wrong, each stretch has a difference of its own.
     'sharp_share': 0.95,
+    -- Of clocks that stand, the drift is found to be less than this in some stretch.
+    'still_ppb': 1000,
+    -- If the clocks stood, one difference explains what the stretches do with one each; if they
+    -- drifted by as little as 20 ppm, it explains less, even in bursts.
+    'standing_share': 0.99,
     -- Differences closer together than this lie within a burst; there the best one is right. Others
     -- are periods apart.
     'burst_ns': 500000,
@@ -39,11 +44,12 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- A drift stays the same over so many stretches before and after.
     'steady_stretches': 5,
     -- So many stretches before and after vote together. First, fewer of them make the drift known
-    -- to a few ppm; then the more messages vote, the fewer differences remain.
+    -- to a few ppm; then the more messages vote, the fewer differences remain. Nor do clocks stand
+    -- for less: in fewer, a constant explains as much as a drift.
     'sharp_stretches': 3,
-    -- If a publisher writes for less of the time than this, few messages of others fall within its
-    -- writes by chance.
-    'writing_share': 0.2,
+    -- If a publisher writes for less of the time than this, messages of others come between its
+    -- writes as often, and show.
+    'writing_share': 0.5,
     -- The limit of the delays of a publisher: twice what nearly all take, or four times what half
     -- of them take. Less than half of what nearly all take at least is unusual, too.
     'usual_quantile': 0.99,

@@ -1,14 +1,15 @@
 -- name: derive.nearest_message
 -- kind: macro
 -- description: Messages matched with publications that carry no stamp. A message was stamped
---     after its publication was written, and before the publishing thread went on. Per publisher
---     a message has one publication and a publication one message, the first. Where a publisher
---     writes for much of the time, or what the thread did next is not known, the delays that are
---     usual for it bound the search. A message has no publication where that would be a guess:
---     where several publishers have one for it; where two messages may both be of one
---     publication; in a burst, if the clock is not known sharply; if it was stamped sooner after
---     a publication than is usual, and another publication may be lost. Nor has it one where the
---     difference of the clocks is not known, or explains less than half of the messages.
+--     after its publication was written, and before the publishing thread went on; all writes on
+--     the topic that go on at that moment come into question. A message has one publication and a
+--     publication one message, the first. Where a publisher writes for much of the time, or what
+--     the thread did next is not known, or publishers are not traced, the delays that are usual
+--     bound the search. A message has no publication where that would be a guess: where several
+--     come into question; where two messages may both be of one publication; in a burst, if the
+--     clock is not known sharply; if it was stamped sooner after a publication than is usual, and
+--     another publication may be lost. Nor has it one where the difference of the clocks is not
+--     known, or explains less than half of the messages.
 -- grain: one row per message that has, or might have, a publication
 -- param: only_run BIGINT  Run to look at
 -- when: store.stamp_clock
@@ -51,8 +52,8 @@ course AS (
 ),
 located AS (
     SELECT
-        b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.publication_id, b.written_ns,
-        b.next_event_ns, b.has_break, c.state, c.before, c.after,
+        b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.thread_id, b.publication_id,
+        b.written_ns, b.next_event_ns, b.has_break, c.state, c.before, c.after,
         c.state.difference_ns
         + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS difference_ns,
         -- Where the drift is not known, it may be any that clocks have, also among the messages
@@ -86,7 +87,7 @@ sided AS (
 ),
 published AS MATERIALIZED (
     SELECT
-        side, clock_id, topic_name, publisher_id, publication_id, written_ns,
+        side, clock_id, topic_name, publisher_id, thread_id, publication_id, written_ns,
         written_ns + then_ns AS opens_ns,
         next_event_ns + then_ns AS closes_ns,
         next_event_ns IS NOT NULL AND NOT has_break AS goes_on,
@@ -126,26 +127,50 @@ message AS MATERIALIZED (
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
     GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id
 ),
+-- Threads that share a publisher write at the same time; one alone never does.
 looked_for AS (
-    SELECT m.publisher_id, m.source_timestamp_ns, m.taken_ns, p.side
+    SELECT m.topic_name, m.publisher_id, p.thread_id, m.source_timestamp_ns, m.taken_ns, p.side
     FROM message AS m
-    JOIN (SELECT DISTINCT publisher_id, side FROM published) AS p
+    JOIN (SELECT DISTINCT publisher_id, thread_id, side FROM published) AS p
         ON m.publisher_id = p.publisher_id
 ),
 within AS MATERIALIZED (
     SELECT
-        m.publisher_id, m.source_timestamp_ns, p.publication_id, p.clock_id, p.goes_on,
-        p.is_crowded, m.source_timestamp_ns - p.opens_ns AS delay_ns,
+        m.topic_name, m.publisher_id, m.source_timestamp_ns, p.publication_id, p.clock_id,
+        p.goes_on, p.is_crowded, m.source_timestamp_ns - p.opens_ns AS delay_ns,
         row_number() OVER (
             PARTITION BY p.publication_id, p.side ORDER BY m.source_timestamp_ns
         ) AS place
     FROM looked_for AS m
     ASOF JOIN published AS p
         ON m.publisher_id = p.publisher_id
+        AND m.thread_id = p.thread_id
         AND m.side = p.side
         AND m.source_timestamp_ns >= p.opens_ns
     WHERE coalesce(m.source_timestamp_ns < p.closes_ns, true)
         AND coalesce(p.written_ns < m.taken_ns, true)
+),
+-- A message that came while none of the known publishers wrote is of another one, or its
+-- publication was lost. Where nothing is lost, there is another one.
+strange AS MATERIALIZED (
+    SELECT DISTINCT m.topic_name
+    FROM message AS m
+    JOIN (
+        SELECT topic_name, min(opens_ns) AS first_ns, max(opens_ns) AS last_ns
+        FROM published
+        GROUP BY topic_name
+    ) AS p ON m.topic_name = p.topic_name
+    ANTI JOIN within AS w
+        ON m.topic_name = w.topic_name AND m.source_timestamp_ns = w.source_timestamp_ns
+    WHERE m.source_timestamp_ns BETWEEN p.first_ns AND p.last_ns
+        AND NOT EXISTS (FROM derive.recording_gap AS g WHERE g.run_id = only_run)
+),
+-- Its messages take the place of those that no reader took.
+exposed AS (
+    SELECT DISTINCT p.publisher_id
+    FROM published AS p
+    JOIN strange AS s ON p.topic_name = s.topic_name
+    ANTI JOIN within AS w ON p.publication_id = w.publication_id
 ),
 -- How much of the time the publisher was writing: the more, the more messages fall into it by
 -- chance.
@@ -179,46 +204,89 @@ usual_of_clock AS (
     SELECT
         clock_id,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
-        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns,
+        -- What is usual where nobody else publishes.
+        coalesce(
+            quantile_disc(delay_ns, derive.clock_limit().usual_quantile)
+                FILTER (topic_name NOT IN (FROM strange)),
+            derive.clock_limit().median_factor * median(delay_ns)
+        ) AS familiar_ns
     FROM within
     WHERE place = 1 AND goes_on
     GROUP BY clock_id
 ),
-plausible AS (
+-- All that a message may be of. Several writes may go on at the moment of its stamp.
+candidate AS MATERIALIZED (
     SELECT
-        w.publisher_id, w.source_timestamp_ns, w.publication_id, w.place, w.is_crowded,
-        w.place = 2 AND w.delay_ns <= u.usual_ns AS is_rival,
-        coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false) AS is_hasty
-    FROM within AS w
-    LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
-    LEFT JOIN usual_of_clock AS c ON w.clock_id = c.clock_id
-    WHERE CASE
-        WHEN w.goes_on THEN coalesce(w.delay_ns <= u.limit_ns, true)
-        ELSE w.delay_ns <= coalesce(
-            derive.clock_limit().usual_factor * coalesce(u.usual_ns, c.usual_ns),
-            derive.clock_limit().write_ns
-        )
-    END
+        topic_name, source_timestamp_ns, publisher_id, publication_id,
+        bool_or(is_crowded) AS is_crowded,
+        bool_or(is_usual) AS is_usual,
+        bool_or(is_prompt) AS is_prompt,
+        bool_or(is_hasty) AS is_hasty,
+        count(*) OVER (PARTITION BY topic_name, source_timestamp_ns) AS candidate_count
+    FROM (
+        SELECT
+            w.topic_name, w.source_timestamp_ns, w.publisher_id, w.publication_id, w.is_crowded,
+            w.goes_on,
+            w.delay_ns <= u.usual_ns AS is_prompt,
+            coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false)
+                AS is_hasty,
+            CASE
+                WHEN x.publisher_id IS NOT NULL THEN coalesce(w.delay_ns <= c.familiar_ns, false)
+                WHEN w.goes_on THEN coalesce(w.delay_ns <= u.limit_ns, true)
+                ELSE w.delay_ns <= coalesce(
+                    derive.clock_limit().usual_factor * coalesce(u.usual_ns, c.usual_ns),
+                    derive.clock_limit().write_ns
+                )
+            END AS is_usual
+        FROM within AS w
+        LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
+        LEFT JOIN usual_of_clock AS c ON w.clock_id = c.clock_id
+        LEFT JOIN exposed AS x ON w.publisher_id = x.publisher_id
+    )
+    -- Whether a thread that is not seen to go on still writes is known by what is usual alone.
+    WHERE is_usual OR goes_on
+    GROUP BY topic_name, source_timestamp_ns, publisher_id, publication_id
+),
+-- A publication that is all a message may be of has that message: the first of several, unless
+-- others came as soon. So no other message is of it.
+owned AS MATERIALIZED (
+    SELECT
+        topic_name, source_timestamp_ns, publication_id, is_usual,
+        coalesce(lead(is_prompt) OVER on_publication, false) AS is_rivalled,
+        row_number() OVER on_publication AS place
+    FROM candidate
+    WHERE candidate_count = 1
+    WINDOW on_publication AS (PARTITION BY publication_id ORDER BY source_timestamp_ns)
+),
+left_over AS (
+    SELECT
+        c.topic_name, c.source_timestamp_ns, c.publisher_id, c.publication_id, c.is_crowded,
+        c.is_usual, c.is_hasty, c.is_prompt,
+        count(*) OVER (PARTITION BY c.topic_name, c.source_timestamp_ns) AS candidate_count
+    FROM candidate AS c
+    LEFT JOIN owned AS o
+        ON c.publication_id = o.publication_id
+        AND c.source_timestamp_ns <> o.source_timestamp_ns
+        AND o.place = 1
+    WHERE o.publication_id IS NULL
+        OR NOT o.is_usual
+        OR (o.is_rivalled AND c.candidate_count = 1 AND c.is_prompt)
 ),
 hasty AS MATERIALIZED (
-    SELECT DISTINCT publication_id FROM plausible WHERE is_hasty
+    SELECT DISTINCT publication_id FROM left_over WHERE is_hasty
 ),
 doubtful AS (
     FROM derive.publication_beside_gap('hasty')
 ),
 matched AS (
     SELECT
-        publisher_id, source_timestamp_ns, publication_id, bool_or(is_rivalled) AS is_rivalled
-    FROM (
-        SELECT
-            *,
-            is_crowded
-            OR bool_or(is_rival) OVER (PARTITION BY publication_id)
-            OR (is_hasty AND publication_id IN (FROM doubtful)) AS is_rivalled
-        FROM plausible
-    )
-    WHERE place = 1 OR is_rival
-    GROUP BY publisher_id, source_timestamp_ns, publication_id
+        topic_name, publisher_id, source_timestamp_ns, publication_id,
+        is_crowded
+        OR NOT is_usual
+        OR count(*) OVER (PARTITION BY publication_id, candidate_count) > 1
+        OR (is_hasty AND publication_id IN (FROM doubtful)) AS is_rivalled
+    FROM left_over
 ),
 placed AS (
     SELECT

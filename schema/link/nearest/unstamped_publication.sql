@@ -11,6 +11,7 @@ SELECT
     h.clock_id,
     p.topic_name,
     b.publisher_id,
+    b.thread_id,
     b.publication_id,
     coalesce(b.rmw_ns, b.rcl_ns) AS written_ns,
     b.next_event_ns,

@@ -1,14 +1,15 @@
 -- name: derive.link_transport_nearest
 -- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
---     message once. The link is doubtful where events may be lost around the moment of
---     publishing.
+--     message once, and those of a publisher in the order in which they were published: what
+--     seems to be older than one taken before was stamped after the clock had been set back. The
+--     link is doubtful where events may be lost around the moment of publishing.
 -- grain: one row per take whose publication is known by time
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_transport_nearest(only_run) AS TABLE
 WITH received AS (
     SELECT
-        t.run_id, t.take_id, t.subscription_id, m.publication_id, m.candidate_count
+        t.run_id, t.take_id, t.taken_ns, t.subscription_id, m.publication_id, m.candidate_count
     FROM store.nearest_message AS m
     JOIN store.subscription AS s ON m.run_id = s.run_id AND m.topic_name = s.topic_name
     JOIN store.take AS t
@@ -25,6 +26,14 @@ sent AS MATERIALIZED (
     FROM received AS r
     JOIN store.publication AS b ON r.publication_id = b.publication_id
     WHERE b.run_id = only_run
+    -- Threads that take messages of one subscription may be held up.
+    QUALIFY coalesce(
+        max(b.end_ns) OVER (
+            PARTITION BY r.subscription_id, b.publisher_id ORDER BY r.taken_ns, r.take_id
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        ) - b.end_ns <= derive.clock_limit().write_ns,
+        true
+    )
 )
 SELECT
     s.run_id,
