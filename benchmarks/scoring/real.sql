@@ -87,8 +87,9 @@ FROM truth_callback AS c
 ASOF JOIN placed_run AS i ON c.pid = i.pid AND c.tid = i.tid AND c.t0 >= i.start_ns
 WHERE c.kind <> 'client' AND coalesce(c.t0 <= i.end_ns, true);
 
--- Nothing says what of these recordings was torn.
+-- Nothing says what of these recordings is missing or was torn.
 CREATE OR REPLACE TEMP TABLE truth_torn (kind VARCHAR, id VARCHAR);
+CREATE OR REPLACE TEMP TABLE truth_hole (host VARCHAR);
 
 CREATE OR REPLACE TEMP TABLE truth_link AS
 WITH recording AS (

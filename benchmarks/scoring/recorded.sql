@@ -29,8 +29,9 @@ FROM (SELECT kind, id, host, vpid, vtid, unnest(times) AS moment FROM instance) 
 JOIN hostname AS n ON i.host = n.host
 WHERE moment IS NOT NULL;
 
--- Nothing says what of these recordings was torn.
+-- Nothing says what of these recordings is missing or was torn.
 CREATE OR REPLACE TEMP TABLE truth_torn (kind VARCHAR, id VARCHAR);
+CREATE OR REPLACE TEMP TABLE truth_hole (host VARCHAR);
 
 CREATE OR REPLACE TEMP TABLE truth_link AS
 WITH pub AS (FROM recorded WHERE t = 'pub'),
