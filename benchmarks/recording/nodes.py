@@ -1,6 +1,8 @@
 """One process of a system of real ROS 2 nodes, which write down what they do.
 
-    python nodes.py SYSTEM PROCESS SECONDS TRUTH
+    python nodes.py SYSTEM PROCESS TRUTH
+
+It says `ready` when its nodes spin, and ends when its standard input does.
 
 Needs rclpy and no package of msgflow: another Python runs it. The rows of TRUTH are JSON, a line
 each: `callback` (what ran, with which message), `publication`, `request` and `response` (what was
@@ -226,16 +228,17 @@ SYSTEMS = {
 
 
 def main() -> None:
-    """Run a process of a system for so many seconds."""
-    system, process, seconds, path = sys.argv[1:]
+    """Run a process of a system until the standard input ends."""
+    system, process, path = sys.argv[1:]
     make, executor_class = SYSTEMS[system][process]
     truth = Truth()
     rclpy.init()
     executor = executor_class()
     for node in make(truth):
         executor.add_node(node)
-    end = threading.Timer(float(seconds), rclpy.shutdown)
+    end = threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()))
     end.start()
+    print("ready", flush=True)
     with suppress(ExternalShutdownException):
         # Its spin() of rclpy 9.1 does nothing but use the CPU.
         while executor_class is EventsExecutor and rclpy.ok():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import shutil
@@ -27,8 +28,8 @@ _SET_UP = (
     ("add-context", "--userspace", "--type=vpid", "--type=vtid", "--type=procname"),
     ("start",),
 )
-# Those who hear are there first. Seconds.
-_APART = 0.5
+# Those who hear go last. Seconds.
+_APART = 0.2
 _LONGEST = 60
 
 
@@ -83,16 +84,23 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
     recorded = directory / "trace"
     with _session(recorded):
         running = []
-        processes = systems(python)[system]
-        for position, process in enumerate(processes):
-            rest = _APART * (len(processes) - position) + seconds
-            words = (python, _NODES, system, process, rest, parts / process)
-            command = [str(word) for word in words]
-            running.append(subprocess.Popen(command, env=environment))
-            time.sleep(_APART)
         try:
+            for process in systems(python)[system]:
+                command = [str(word) for word in (python, _NODES, system, process, parts / process)]
+                running.append(
+                    subprocess.Popen(
+                        command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+                    )
+                )
             for one in running:
-                if one.wait(_LONGEST + seconds):
+                assert one.stdout is not None
+                one.stdout.readline()
+            time.sleep(seconds)
+            for one in reversed(running):
+                assert one.stdin is not None
+                one.stdin.close()
+                time.sleep(_APART)
+                if one.wait(_LONGEST):
                     raise subprocess.CalledProcessError(one.returncode, one.args)
         finally:
             for one in running:
@@ -108,8 +116,13 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
 
 @contextlib.contextmanager
 def _session(directory: Path) -> Iterator[None]:
-    """Trace what happens in the block, with a session daemon of our own where there is none."""
-    with tempfile.TemporaryDirectory() as home:
+    """Trace what happens in the block, with a session daemon of our own where there is none.
+
+    A machine has one daemon of root: others wait.
+    """
+    lock = Path(tempfile.gettempdir()) / f"{_SESSION}.lock"
+    with tempfile.TemporaryDirectory() as home, lock.open("w") as one_at_a_time:
+        fcntl.flock(one_at_a_time, fcntl.LOCK_EX)
         environment = os.environ | {"LTTNG_HOME": home}
         command = ["lttng-sessiond", "--no-kernel", "--quiet"]
         daemon = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)

@@ -131,6 +131,7 @@ link AS (
         CASE s.k WHEN 'publication' THEN s.k ELSE s.k || '_sent' END, s.sent
     FROM truth_sent AS s
     JOIN truth_callback AS c ON s.callback = c.callback
+    JOIN traced AS t ON s.pid = t.pid
     WHERE c.kind = 'client'
     UNION ALL
     SELECT 'take_adjacent', 'take', s.callback, 'publication', s.sent

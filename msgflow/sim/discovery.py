@@ -26,13 +26,15 @@ class DiscoveryListener(Thread):
         self._message = process.memory.on_thread_stack()
         self._heard: deque[int] = deque()
         self._awake = False
+        self._done = 0
 
     def hear(self, time: int, taken: int) -> None:
         """A message has arrived; `taken` is 0 for the own ones, else 1."""
         self._heard.append(taken)
         if not self._awake:
             self._awake = True
-            self.scheduler.at(time + 10_000 + self.scheduler.tail(20_000), self._listen)
+            awake = time + 10_000 + self.scheduler.tail(20_000)
+            self.scheduler.at(max(awake, self._done), self._listen)
 
     def _listen(self, time: int, _: None) -> None:
         if self.process.is_stopped:
@@ -46,6 +48,7 @@ class DiscoveryListener(Thread):
             time += 1_500 + int(self.scheduler.random() * 2_000)
         self.keep_cpu(time)
         self._awake = False
+        self._done = time
 
 
 class Discovery:

@@ -70,7 +70,7 @@ def test_writes_that_go_on_at_the_same_time(tmp_path: Path, layout: str) -> None
     score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
     transport = score["transport"]
     assert (transport.wrong, transport.missing) == (0, 0)
-    assert transport.found >= 0.95 * transport.happened
+    assert transport.found >= 0.9 * transport.happened
 
 
 def test_a_clock_that_is_set_back_by_seconds_makes_few_wrong(tmp_path: Path) -> None:

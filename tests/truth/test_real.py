@@ -14,7 +14,7 @@ from msgflow.ingest import ingest
 
 # `make` installs the wheels of ROS 2 there.
 ROS = Path(sys.prefix) / "ros" / "bin" / "python"
-SECONDS = 1.5
+SECONDS = 3
 
 Recorded = Callable[[str], dict[str, Score]]
 

@@ -22,7 +22,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "truth.py"
 def simulation(tmp_path_factory):
     directory = tmp_path_factory.mktemp("scoring")
     recording = Recording(lost_event_share=0.3)
-    return simulate("two_hosts", directory / "trace", factor=0.1, recording=recording)
+    return simulate("two_hosts", directory / "trace", factor=0.2, recording=recording)
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +157,7 @@ def test_a_row_twice_is_repeated(simulation, database):
 @pytest.fixture(scope="module")
 def losses(tmp_path_factory):
     directory = tmp_path_factory.mktemp("losses")
-    simulation = simulate("losses", directory / "trace", factor=0.3)
+    simulation = simulate("losses", directory / "trace", factor=0.2)
     path = directory / "run.duckdb"
     ingest_one(simulation.directory, path).connection.close()
     return simulation, path

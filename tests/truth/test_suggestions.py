@@ -15,7 +15,7 @@ NOT_FOUND = {
     "periodic_async": {"/sharing": 3},
     "partial_sync": {"/partial_1_to_1": 1, "/partial_1_to_3": 3, "/both_kinds": 2},
     "reentrant": {},
-    "merges": {"/shared": 2},
+    "merges": {},
 }
 
 

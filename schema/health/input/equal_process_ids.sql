@@ -1,8 +1,8 @@
 -- name: finding.equal_process_ids
 -- title: Processes had equal ids at one time
 -- description: Processes had the same ids at the same time. They are told apart by their names, or
---     by the sessions that recorded them. A thread with a name of its own, which no main thread has,
---     is of no known process.
+--     by the sessions that recorded them. A thread with a name of its own, which no main thread
+--     has, is of no known process.
 -- cause: Containers number their processes alike, and share a session daemon, or a hostname.
 -- cure: None needed if the processes below are those that ran. To be sure, record the namespace of
 --     the ids: lttng add-context -u -t pid_ns.

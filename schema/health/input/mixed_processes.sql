@@ -5,8 +5,8 @@
 --     and executors may be those of any of them, and all its links have a candidate_count above 1.
 -- cause: Containers number their processes alike, and share a session daemon, or a hostname. Or the
 --     session lacks the ids of processes and threads.
--- cure: Record the ids and their namespace (lttng add-context -u -t vpid -t vtid -t pid_ns), or start
---     a session daemon in each container and give each a hostname.
+-- cure: Record the ids and their namespace (lttng add-context -u -t vpid -t vtid -t pid_ns), or
+--     start a session daemon in each container and give each a hostname.
 -- grain: one row, if there are any
 -- severity: error
 SELECT

@@ -104,8 +104,8 @@ chosen AS MATERIALIZED (
 standing AS MATERIALIZED (
     FROM derive.standing_difference('close', 'chosen')
 ),
--- Between two stretches in which the clocks stood alike, they stood so. If they stepped, one stretch
--- may tell nothing, since half of it lies on either side.
+-- Between two stretches in which the clocks stood alike, they stood so. If they stepped, one
+-- stretch may tell nothing, since half of it lies on either side.
 placed AS (
     SELECT
         clock_id, stretch, difference_ns, message_count, segment,
