@@ -1,6 +1,7 @@
 -- name: derive.certain_cause
--- description: Causal links that flows follow. Left out are those where the message may have led to
---     nothing. An indirect link with several candidates is followed: one of the messages is right.
+-- description: Causal links that flows follow. Links without a declaration are left out if they
+--     have more than one candidate: the message may have led to nothing, or be of another process.
+--     Indirect links are as true as their declaration, and are followed.
 -- grain: one row per causal link that is followed
 SELECT
     run_id, callback_instance_id, publication_id, take_id, subscription_id, publisher_id, kind,

@@ -40,7 +40,7 @@ published AS (
             derive.vertex_key('response', taken_response_id)
         ),
         NULL, taken_request_id, taken_response_id, publication_id, publisher_id, 'take_adjacent'
-    FROM store.link_call
+    FROM derive.certain_call
     WHERE run_id = only_run AND publication_id IS NOT NULL
 )
 SELECT

@@ -18,7 +18,7 @@ WITH RECURSIVE sender AS (
             derive.vertex_key('request', taken_request_id),
             derive.vertex_key('response', taken_response_id)
         )
-    FROM store.link_call
+    FROM derive.certain_call
     WHERE request_id IS NOT NULL
 ),
 -- Whatever a request led to, its response too.
@@ -31,12 +31,12 @@ answer AS (
     UNION ALL
     SELECT DISTINCT
         run_id, taken_request_id, derive.vertex_key('request', taken_request_id)
-    FROM store.link_call
+    FROM derive.certain_call
     WHERE taken_request_id IS NOT NULL
     UNION ALL
     SELECT r.run_id, r.request_id, derive.vertex_key('response', r.response_id)
     FROM store.response AS r
-    SEMI JOIN store.link_call AS l ON r.response_id = l.taken_response_id
+    SEMI JOIN derive.certain_call AS l ON r.response_id = l.taken_response_id
     WHERE r.request_id IS NOT NULL
 ),
 called AS MATERIALIZED (

@@ -72,4 +72,4 @@ SELECT
     END,
     coalesce(publication_id, request_id, response_id),
     'take_adjacent'
-FROM store.link_call
+FROM derive.certain_call

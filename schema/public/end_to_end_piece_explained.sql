@@ -122,7 +122,7 @@ origin AS MATERIALIZED (
                 derive.vertex_key('request', taken_request_id),
                 derive.vertex_key('response', taken_response_id)
             )
-        FROM store.link_call
+        FROM derive.certain_call
         WHERE request_id IS NOT NULL
     ) AS s ON a.request_id = s.request_id
 ),

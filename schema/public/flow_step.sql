@@ -88,7 +88,7 @@ aside AS MATERIALIZED (
             derive.vertex_key('publication', l.publication_id),
             derive.vertex_key('request', l.request_id)
         )
-    FROM store.link_call AS l
+    FROM derive.certain_call AS l
     LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     LEFT JOIN store.request AS q ON l.request_id = q.request_id
     LEFT JOIN store.client AS c ON q.client_id = c.client_id
@@ -210,16 +210,24 @@ LEFT JOIN derive.flow_cause AS lc
     AND a.from_id = coalesce(lc.callback_instance_id, lc.take_id)
     AND a.to_id = lc.publication_id
     AND a.link_kind = lc.kind
-LEFT JOIN store.link_call AS ls
-    ON a.from_kind IN ('request', 'response')
-    AND a.link_kind = 'take_adjacent'
-    AND a.from_id
-        = CASE a.from_kind WHEN 'request' THEN ls.taken_request_id ELSE ls.taken_response_id END
-    AND a.to_id = CASE d.kind
-        WHEN 'publication' THEN ls.publication_id
-        WHEN 'request' THEN ls.request_id
-        ELSE ls.response_id
-    END
+LEFT JOIN (
+    SELECT
+        CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END AS from_kind,
+        coalesce(taken_request_id, taken_response_id) AS from_id,
+        CASE
+            WHEN publication_id IS NOT NULL THEN 'publication'
+            WHEN request_id IS NOT NULL THEN 'request'
+            ELSE 'response'
+        END AS to_kind,
+        coalesce(publication_id, request_id, response_id) AS to_id,
+        candidate_count
+    FROM derive.certain_call
+) AS ls
+    ON a.link_kind = 'take_adjacent'
+    AND a.from_kind = ls.from_kind
+    AND a.from_id = ls.from_id
+    AND d.kind = ls.to_kind
+    AND a.to_id = ls.to_id
 LEFT JOIN store.thread AS h ON d.thread_id = h.thread_id
 JOIN store.process AS q ON d.process_id = q.process_id
 JOIN store.host AS m ON q.host_id = m.host_id

@@ -116,7 +116,7 @@ JOIN (
     FROM main.request AS q
     LEFT JOIN (SELECT DISTINCT request_id FROM store.response) AS r
         ON q.request_id = r.request_id
-    LEFT JOIN (SELECT DISTINCT taken_request_id FROM store.link_call) AS l
+    LEFT JOIN (SELECT DISTINCT taken_request_id FROM derive.certain_call) AS l
         ON q.request_id = l.taken_request_id
     UNION ALL
     SELECT

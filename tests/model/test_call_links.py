@@ -172,6 +172,14 @@ def test_a_request_without_callback(calls: RosSystem, analyse: Analyse) -> None:
     ]
 
 
+def test_a_response_that_a_loop_sends(calls: RosSystem, analyse: Analyse) -> None:
+    """An executor event lies between: nothing was taken that it follows from."""
+    calls.take_request(SERVER, 0x20, 1, gid=7)
+    calls.ready(SERVER)
+    calls.send_response(SERVER, 0x20, 1, gid=7, stamp=1)
+    assert analyse(calls).rows(LINKS) == []
+
+
 def test_a_request_with_a_callback(calls: RosSystem, analyse: Analyse) -> None:
     """Its callback tells what it led to; a response sent inside of it follows from it alone."""
     calls.service(SERVER, 0x23, "/sum", callback=0xC2)

@@ -128,7 +128,7 @@ Table(
     ),
     reference(
         "annotation_id",
-        "Annotation that declares it; NULL for direct links and take_adjacent",
+        "Annotation that declares it; NULL for links that are not indirect",
         to="annotation.annotation_id",
     ),
     number(

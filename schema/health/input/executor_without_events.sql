@@ -2,8 +2,8 @@
 -- title: An executor that records no events
 -- description: Threads ran callbacks one after the other, and no event of an executor, although
 --     these events were enabled. What the threads did between callbacks is not known: they have no
---     executor states, and how long a message waited for them is bounded by callbacks only. Links
---     are not affected.
+--     executor states, and how long a message waited for them is bounded by callbacks only. Direct
+--     links are not affected.
 -- cause: The process uses an EventsExecutor, a StaticSingleThreadedExecutor, or a loop of its own
 --     that calls callbacks (wait sets). rclcpp has no tracepoints in these.
 -- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.

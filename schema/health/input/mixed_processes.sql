@@ -2,7 +2,8 @@
 -- title: Processes with equal ids cannot be told apart
 -- description: Threads were on two CPUs at one moment: they are threads of several processes that
 --     have the same ids and names. Each such mixture is one process here. Its objects, callbacks
---     and executors may be those of any of them, and all its links have a candidate_count above 1.
+--     and executors may be those of any of them, all its links between messages and callbacks have
+--     a candidate_count above 1, and flows do not pass its callbacks.
 -- cause: Containers number their processes alike, and share a session daemon, or a hostname. Or the
 --     session lacks the ids of processes and threads.
 -- cure: Record the ids and their namespace (lttng add-context -u -t vpid -t vtid -t pid_ns), or

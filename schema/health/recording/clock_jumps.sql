@@ -14,7 +14,10 @@ WITH stamped AS (
         shift_ns - lag(shift_ns) OVER (PARTITION BY run_id, host_id ORDER BY from_ns) AS step_ns
     FROM derive.stamp_shift
     WHERE host_id NOT IN (
-        SELECT h.host_id FROM store.host AS h JOIN store.stamp_clock AS c ON h.clock_id = c.clock_id
+        SELECT h.host_id
+        FROM store.host AS h
+        JOIN store.stamp_clock AS c ON h.clock_id = c.clock_id
+        WHERE c.message_count > 0
     )
 ),
 step AS (

@@ -17,7 +17,10 @@ WITH pair AS (
     FROM store.link_causal AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     LEFT JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
+    -- All links of an ambiguous process are doubtful, for another reason.
+    JOIN store.process AS o ON p.process_id = o.process_id
     WHERE l.kind = 'take_adjacent' AND l.candidate_count > 1 AND NOT p.is_internal
+        AND NOT coalesce(o.is_ambiguous, false)
     GROUP BY ALL
 )
 SELECT

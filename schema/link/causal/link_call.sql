@@ -124,4 +124,5 @@ LEFT JOIN store.response AS r ON l.response_id = r.response_id
 JOIN store.thread AS h ON l.thread_id = h.thread_id
 JOIN store.process AS p ON h.process_id = p.process_id
 -- That a request leads to its own response goes without saying.
-WHERE l.taken_response_id IS NOT NULL OR l.taken_request_id IS DISTINCT FROM r.request_id
+WHERE l.taken_response_id IS NOT NULL
+    OR l.taken_request_id IS NOT NULL AND l.taken_request_id IS DISTINCT FROM r.request_id
