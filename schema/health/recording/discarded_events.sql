@@ -43,7 +43,7 @@ sized AS (
         -- About 100 bytes for an event, the next power of two that holds the packet and the burst.
         -- LTTng takes no less than a page.
         CASE
-            WHEN (l.largest + f.events) * 100 < 4096 THEN 4
+            WHEN (l.largest::DOUBLE + f.events) * 100 < 4096 THEN 4
             ELSE (2 ** ceil(log2((l.largest::DOUBLE + f.events) * 100 / 1024)))::BIGINT
         END AS kibibytes
     FROM loss AS l
