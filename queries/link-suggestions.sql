@@ -238,7 +238,10 @@ independent AS (
         'if it does answer these messages, write direct instead' AS doubt
     FROM doubtful AS d
     JOIN (
-        SELECT publisher_id, count(*) AS publication_count FROM main.publication GROUP BY ALL
+        SELECT publisher_id, count(*) AS publication_count
+        FROM main.publication
+        WHERE list_contains($runs, run_id)
+        GROUP BY publisher_id
     ) AS b ON d.publisher_id = b.publisher_id
     GROUP BY d.node_id, d.output_topic
 ),

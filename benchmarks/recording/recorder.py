@@ -116,7 +116,7 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
 
 @contextlib.contextmanager
 def _session(directory: Path) -> Iterator[None]:
-    """Trace what happens in the block, with a session daemon of our own where there is none.
+    """Trace what happens in the block, and start a session daemon if none runs.
 
     A machine has one daemon of root: others wait.
     """

@@ -1,6 +1,6 @@
 -- name: main.end_to_end
 -- kind: macro
--- description: What became of every root of every path. A root that reached the sink has one row
+-- description: Roots of paths, and what became of them. A root that reached the sink has one row
 --     per take there; a root that did not has a single row with the reason. Roots are callback
 --     instances of timers that published, or publications (always with from_event 'publish'). The
 --     time window applies to roots. A message that stopped a root is lost if others passed the same

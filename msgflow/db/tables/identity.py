@@ -49,8 +49,8 @@ Table(
     moment("last_seen_ns", "Last event", clock="process_id"),
     number(
         "pid_namespace",
-        "PID namespace, where the trace has it; a negative one where processes with equal ids are"
-        " told apart without it",
+        "PID namespace, where the trace has it; a negative number if msgflow gave it, since "
+        "processes have equal ids",
     ),
     Column(
         "life",
