@@ -7,20 +7,7 @@
 --     services in order (0: not known), each of them once.
 -- grain: one row per instance of a service callback, and per request or response that led on
 --     without a callback (derive.vertex_key), and route to it
-WITH RECURSIVE sender AS (
-    SELECT request_id, derive.vertex_key('callback_instance', callback_instance_id) AS sender_key
-    FROM store.link_request
-    WHERE callback_instance_id IS NOT NULL
-    UNION ALL
-    SELECT
-        request_id,
-        coalesce(
-            derive.vertex_key('request', taken_request_id),
-            derive.vertex_key('response', taken_response_id)
-        )
-    FROM derive.certain_call
-    WHERE request_id IS NOT NULL
-),
+WITH RECURSIVE
 -- Whatever a request led to, its response too.
 answer AS (
     SELECT
@@ -44,7 +31,7 @@ called AS MATERIALIZED (
         a.run_id, s.sender_key, a.called_key, q.client_id,
         coalesce(q.service_id, 0) AS service_id
     FROM answer AS a
-    JOIN sender AS s ON a.request_id = s.request_id
+    JOIN derive.request_sender AS s ON a.request_id = s.request_id
     LEFT JOIN store.request AS q ON a.request_id = q.request_id
 ),
 caller (run_id, called_key, caller_key, client_id, services) AS (

@@ -110,21 +110,7 @@ origin AS MATERIALIZED (
         FROM store.response
         WHERE list_contains(runs, run_id)
     ) AS a
-    JOIN (
-        SELECT
-            request_id, derive.vertex_key('callback_instance', callback_instance_id) AS sender_key
-        FROM store.link_request
-        WHERE callback_instance_id IS NOT NULL
-        UNION ALL
-        SELECT
-            request_id,
-            coalesce(
-                derive.vertex_key('request', taken_request_id),
-                derive.vertex_key('response', taken_response_id)
-            )
-        FROM derive.certain_call
-        WHERE request_id IS NOT NULL
-    ) AS s ON a.request_id = s.request_id
+    JOIN derive.request_sender AS s ON a.request_id = s.request_id
 ),
 -- Calls of services between the two, from the last one back to the first.
 leg (publishing_key, caller_id, level, request_id, called_key, sender_key) AS (

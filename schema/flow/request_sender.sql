@@ -1,0 +1,18 @@
+-- name: derive.request_sender
+-- description: What sent a request, as flows follow it: a callback instance, or a request or
+--     response that the thread had taken without a callback (derive.vertex_key).
+-- grain: one row per request with a known cause
+SELECT
+    request_id,
+    derive.vertex_key('callback_instance', callback_instance_id) AS sender_key
+FROM store.link_request
+WHERE callback_instance_id IS NOT NULL
+UNION ALL
+SELECT
+    request_id,
+    coalesce(
+        derive.vertex_key('request', taken_request_id),
+        derive.vertex_key('response', taken_response_id)
+    )
+FROM derive.certain_call
+WHERE request_id IS NOT NULL
