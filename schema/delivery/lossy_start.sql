@@ -1,6 +1,7 @@
 -- name: derive.lossy_start
 -- description: Processes that may have lost events while they were created: a gap other than a
---     pause lies before the first callback instance, or before the process was seen at all.
+--     pause lies before the first callback instance, or before the process was seen at all; or
+--     anywhere, if the process began in the recording.
 -- grain: one row per process
 WITH loss AS (
     SELECT r.recording_id, min(l.start_ns) AS start_ns
@@ -18,4 +19,4 @@ SELECT DISTINCT p.run_id, p.process_id
 FROM derive.process_presence AS p
 JOIN loss AS l ON p.recording_id = l.recording_id
 LEFT JOIN started AS s ON p.process_id = s.process_id
-WHERE l.start_ns <= greatest(p.first_ns, s.start_ns)
+WHERE p.is_born OR l.start_ns <= greatest(p.first_ns, s.start_ns)
