@@ -74,11 +74,18 @@ class Publish:
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """Send the response to the oldest request of a service of the node that waits for one."""
+
+    service: str
+
+
+@dataclass(frozen=True, slots=True)
 class Transition:
     """Take a managed node to its next state: configured, active, inactive, active, and so on."""
 
 
-Action = Call | Spin | Poll | Publish | Transition
+Action = Call | Spin | Poll | Publish | Answer | Transition
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +186,12 @@ class MessageLink:
 
 @dataclass(frozen=True, slots=True)
 class Timer:
-    """A timer of a node and what its callback does; see `Subscription`."""
+    """A timer of a node and what its callback does; see `Subscription`.
+
+    Attributes:
+        reset_ns: when user code resets it, after the begin of tracing: periods count from then on.
+        rate: how fast its clock runs, as a multiple of that of the host (simulated time).
+    """
 
     period_ns: int
     publishes: tuple[str, ...] = ()
@@ -187,6 +199,8 @@ class Timer:
     logs: bool = False
     does: tuple[Action, ...] = ()
     group: str = ""
+    reset_ns: int | None = None
+    rate: float = 1.0
 
     def __post_init__(self) -> None:
         if self.period_ns <= 0:
@@ -200,6 +214,7 @@ class Service:
     Attributes:
         is_action: it is of an action server, whose callbacks are not traced.
         is_deferred: the callback does not return the response, which is sent on its own.
+        is_answered_later: not even the callback sends it, but `Answer` does.
     """
 
     name: str
@@ -210,6 +225,7 @@ class Service:
     group: str = ""
     is_action: bool = False
     is_deferred: bool = False
+    is_answered_later: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -260,7 +260,10 @@ class UserCode:
 
 @dataclass(slots=True, eq=False)
 class TimerObject:
-    """A timer as it exists in its process; `due` is when it has to be called next."""
+    """A timer as it exists in its process.
+
+    `due` is when it has to be called next, `reset` when user code will reset it.
+    """
 
     node: str
     handle: int
@@ -269,6 +272,7 @@ class TimerObject:
     code: UserCode
     group: CallbackGroup
     due: int
+    reset: int | None = None
 
     def is_ready(self, time: int) -> bool:
         """Whether it has to be called."""

@@ -43,6 +43,7 @@ class Request:
     taken_ns: int | None = None
     callback_instance_id: int | None = None
     stamp_ns: int | None = None
+    answered_tid: int | None = None
     answered_ns: int | None = None
     received_tid: int | None = None
     received_ns: int | None = None
@@ -50,7 +51,7 @@ class Request:
 
 @dataclass(slots=True, eq=False)
 class ServiceObject:
-    """A service as it exists in its process."""
+    """A service as it exists in its process; `waiting` are requests without a response."""
 
     network: ServiceNetwork
     process: RunningProcess
@@ -64,7 +65,9 @@ class ServiceObject:
     message: int
     code: UserCode
     is_deferred: bool = False
-    requests: deque[Request] = field(default_factory=deque)
+    is_answered_later: bool = False
+    requests: deque[Request | None] = field(default_factory=deque)
+    waiting: deque[Request] = field(default_factory=deque)
 
     def is_ready(self, time: int) -> bool:
         """Whether a request is there."""
@@ -73,7 +76,12 @@ class ServiceObject:
 
 @dataclass(slots=True, eq=False)
 class ClientObject:
-    """A client as it exists in its process; `answered` is the number of the last response taken."""
+    """A client as it exists in its process.
+
+    Attributes:
+        answered: number of the last response taken.
+        responses: those that have come; None stands for one to another client of the service.
+    """
 
     network: ServiceNetwork
     process: RunningProcess
@@ -88,7 +96,7 @@ class ClientObject:
     code: UserCode
     sequence_number: int = 0
     answered: int = 0
-    responses: deque[Request] = field(default_factory=deque)
+    responses: deque[Request | None] = field(default_factory=deque)
 
     def is_ready(self, time: int) -> bool:
         """Whether a response is there."""
@@ -101,11 +109,16 @@ class ServiceNetwork:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._services: dict[str, ServiceObject] = {}
+        self._clients: dict[str, list[ClientObject]] = {}
         self._requests: list[Request] = []
 
     def add(self, service: ServiceObject) -> None:
         """A service was created."""
         self._services[service.name] = service
+
+    def add_client(self, client: ClientObject) -> None:
+        """A client was created."""
+        self._clients.setdefault(client.name, []).append(client)
 
     def send_request(self, time: int, request: Request) -> None:
         """Send a request; without such a service it is lost."""
@@ -116,17 +129,22 @@ class ServiceNetwork:
             self._scheduler.at(arrival, self._arrive, (service.requests, service.executor, request))
 
     def send_response(self, time: int, service: ServiceObject, request: Request) -> None:
-        """Send a response to the client."""
-        client = request.client
-        arrival = self._arrival(time, service.process, client.process)
-        self._scheduler.at(arrival, self._arrive, (client.responses, client.executor, request))
+        """Send a response: all clients of the service get it, one can take it."""
+        for client in self._clients[service.name]:
+            if client is request.client or not client.process.is_stopped:
+                arrival = self._arrival(time, service.process, client.process)
+                response = request if client is request.client else None
+                delivery = (client.responses, client.executor, response)
+                self._scheduler.at(arrival, self._arrive, delivery)
 
     def finish(self) -> None:
         """Write down what became of each request."""
         for request in self._requests:
             write_request(self._scheduler.truth, request)
 
-    def _arrive(self, time: int, delivery: tuple[deque[Request], Executor, Request]) -> None:
+    def _arrive(
+        self, time: int, delivery: tuple[deque[Request | None], Executor, Request | None]
+    ) -> None:
         queue, executor, request = delivery
         queue.append(request)
         executor.wake(time)
@@ -151,7 +169,7 @@ def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstanc
     )  # fmt: skip
     if cause is not None and cause.request_id is not None:
         thread.scheduler.truth.link_call.add(
-            cause.request_id, cause.is_response, None, request.request_id
+            cause.request_id, cause.is_response, None, request.request_id, None
         )
     client.network.send_request(sent, request)
     return sent + 2_000 + int(random() * 4_000)
@@ -163,6 +181,7 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     random, tracepoints, epoch = thread.scheduler.random, machine.tracepoints, machine.epoch
     time += 1_000 + int(random() * 5_000)
     request = service.requests.popleft()
+    assert request is not None
     client = request.client
     thread.emit(
         tracepoints.rmw_take_request, time, thread.context,
@@ -182,12 +201,33 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     else:
         turn = _turn(thread, request, time, is_response=False)
         end = yield from settle(execute(thread, middleware, service.code, start, turn))
-    stamp = end + 300 + int(random() * 500)
+    if service.is_answered_later:
+        service.waiting.append(request)
+        return end
+    return _respond(thread, service, request, end)
+
+
+def answer(thread: Thread, service: ServiceObject, time: int, cause: CallbackInstance | None) -> int:
+    """Send the response that a request waits for, if one does; returns the time after that."""
+    if not service.waiting:
+        return time
+    request = service.waiting.popleft()
+    if cause is not None and cause.request_id is not None:
+        thread.scheduler.truth.link_call.add(
+            cause.request_id, cause.is_response, None, None, request.request_id
+        )
+    return _respond(thread, service, request, time)
+
+
+def _respond(thread: Thread, service: ServiceObject, request: Request, time: int) -> int:
+    random, machine = thread.scheduler.random, thread.machine
+    stamp = time + 300 + int(random() * 500)
     sent = stamp + 60 + int(random() * 300)
-    request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + epoch
+    request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + machine.epoch
+    request.answered_tid = thread.tid
     thread.emit(
-        tracepoints.rmw_send_response, sent, thread.context,
-        service.rmw_handle, service.message, client.gid, request.sequence_number,
+        machine.tracepoints.rmw_send_response, sent, thread.context,
+        service.rmw_handle, service.message, request.client.gid, request.sequence_number,
         request.stamp_ns,
     )  # fmt: skip
     service.network.send_response(sent, service, request)
@@ -195,10 +235,19 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
 
 
 def run_client(thread: Thread, middleware: Middleware, client: ClientObject, time: int) -> Run:
-    """Take a response and do what is to be done with it, in no callback that is traced."""
+    """Take a response and do what is to be done with it, in no callback that is traced.
+
+    Nothing is there to take if it was one to another client.
+    """
     random, machine = thread.scheduler.random, thread.machine
     time += 1_000 + int(random() * 5_000)
     request = client.responses.popleft()
+    if request is None:
+        thread.emit(
+            machine.tracepoints.rmw_take_response, time, thread.context,
+            client.rmw_handle, client.message, client.message, 0, 0,
+        )  # fmt: skip
+        return time
     thread.emit(
         machine.tracepoints.rmw_take_response, time, thread.context,
         client.rmw_handle, client.message, request.sequence_number, request.stamp_ns, 1,
@@ -235,6 +284,6 @@ def write_request(truth: Truth, request: Request) -> None:
     if request.answered_ns is not None:
         truth.response.add(
             request.request_id, client.name, client.gid, request.sequence_number,
-            request.stamp_ns, host, pid, request.taken_tid, request.answered_ns,
+            request.stamp_ns, host, pid, request.answered_tid, request.answered_ns,
             client_host, client_pid, request.received_tid, request.received_ns,
         )  # fmt: skip

@@ -93,7 +93,8 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         client_host=_TEXT, client_pid=_NUMBER, client_tid=_NUMBER, taken_ns=_TIME,
     ),
     "link_call": _schema(
-        request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID
+        request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID,
+        answered_request_id=_ID,
     ),
     "lifecycle_transition": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, at_ns=_TIME, start_state=_TEXT,
