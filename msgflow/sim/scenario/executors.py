@@ -149,7 +149,7 @@ def timers() -> Scenario:
     node = Node(
         "node",
         timers=(
-            Timer(100 * MILLISECOND, reset_ns=1_040 * MILLISECOND),
+            Timer(100 * MILLISECOND, reset_ns=540 * MILLISECOND),
             Timer(70 * MILLISECOND, rate=2.0),
             Timer(50 * MILLISECOND),
         ),
