@@ -306,9 +306,7 @@ class Creator:
         code = self._code(node, description, executor)
         name = node.description.full_name
         executor.timers.append(
-            TimerObject(
-                name, handle, callback, period, code, group, due, description.reset_ns
-            )
+            TimerObject(name, handle, callback, period, code, group, due, description.reset_ns)
         )
 
     def links(self, node: NodeContext, created: Mapping[str, NodeContext]) -> None:
@@ -345,6 +343,9 @@ class Creator:
             or any(publisher.intra is not None for publisher in publishers),
             executor.has_callbacks,
             _links(node, description),
+            deeds(description.first, node.objects)
+            if isinstance(description, entity.Subscription)
+            else (),
         )
 
     def _buffer(self, subscription: SubscriptionObject, symbol: str) -> IntraBuffer:

@@ -123,6 +123,7 @@ class Subscription:
         message_type: C++ name of the message, part of the callback's symbol.
         logs: each run of the callback logs once, which publishes on /rosout.
         does: what each run does after it has published.
+        first: what each run does before anything else.
         group: name of its callback group; the node's default one if empty.
         kind: 'typed', 'serialized' or 'loaned', which pass different layers.
         intra_process: see `Publisher`.
@@ -151,6 +152,7 @@ class Subscription:
     polled: bool = False
     created_ns: int | None = None
     destroyed_ns: int | None = None
+    first: tuple[Action, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

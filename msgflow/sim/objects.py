@@ -247,6 +247,7 @@ class UserCode:
         is_stepwise: other threads must be able to act between its publications.
         is_callback: it runs in a callback that is traced.
         links: what it has to do with caches of its node.
+        first: what it does before anything else, like `deeds`.
     """
 
     work: Work
@@ -256,6 +257,7 @@ class UserCode:
     is_stepwise: bool = False
     is_callback: bool = True
     links: CallbackLinks | None = None
+    first: tuple[Callable[..., Steps], ...] = ()
 
 
 @dataclass(slots=True, eq=False)

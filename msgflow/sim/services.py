@@ -207,7 +207,9 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     return _respond(thread, service, request, end)
 
 
-def answer(thread: Thread, service: ServiceObject, time: int, cause: CallbackInstance | None) -> int:
+def answer(
+    thread: Thread, service: ServiceObject, time: int, cause: CallbackInstance | None
+) -> int:
     """Send the response that a request waits for, if one does; returns the time after that."""
     if not service.waiting:
         return time

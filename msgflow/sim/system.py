@@ -268,6 +268,7 @@ def _check_topics(node: Node) -> None:
         *node.services,
     )
     actions = [action for each in (*callbacks, *node.clients) for action in each.does]
+    actions += [action for each in node.subscriptions for action in each.first]
     used = {topic for each in (*callbacks, *node.clients) for topic in each.publishes}
     used |= {action.topic for action in actions if isinstance(action, Publish)}
     if missing := sorted(used - own):
