@@ -106,8 +106,8 @@ kept AS (
     WHERE i.interval_ns IS NOT NULL AND NOT i.is_loss_affected
     GROUP BY i.callback_id
 ),
--- How far behind the grid of its creation a timer is called. Its creation is recorded a little later
--- than the instant from which the periods count: a hundredth of the period is allowed for that.
+-- How far behind the grid of its creation a timer is called. Its creation is recorded a little
+-- later than the instant from which periods count: a hundredth of the period is allowed for that.
 placed AS (
     SELECT
         i.callback_id,
