@@ -119,9 +119,12 @@ class Startup:
         else:
             time = yield from thread.poll(executor, time, description.polled_ns)
         for _ in self._process.description.nodes:
+            time = yield time
+            while later := thread.take_cpu(time):
+                time = yield later
             creator.time = time
             creator.announce()
-            time = yield thread.hold(creator.time)
+            time = thread.hold(creator.time)
         return time
 
     def _sequence(self) -> Iterator[bool]:
