@@ -46,7 +46,7 @@ def _execute_first(
     instance: CallbackInstance | None,
 ) -> Steps:
     """Run user code that does something before it looks at its message."""
-    time = start
+    time = start + 200
     for deed in code.first:
         time = yield thread.hold(time)
         time = yield from deed(thread, middleware, time, instance)
