@@ -2,7 +2,7 @@
 
 import { h, clear } from "./dom.js";
 import { current, go, replace } from "./address.js";
-import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
+import { EVENT, KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
 import { Renderer, AXIS } from "./renderer.js";
 import { ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
@@ -106,7 +106,7 @@ export class TimelinePage {
     return h("div", { className: "legend", "aria-label": "colours" },
       item("timer", "timer callback"), item("subscription", "subscription callback"), item("service", "service callback"),
       item("publication", "publication"), item("take", "take"), item("call", "request, response"),
-      item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"),
+      item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"), item("event", "event of your own"),
       item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
       item("indirect", "indirect link", "stroke dashed"), item("critical", "critical path", "stroke"),
       item("gap", "not recorded"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
@@ -140,6 +140,7 @@ export class TimelinePage {
         if (this.rows.kind[row] === "thread" && processes.has(this.rows.process_id[row])) only.add(this.rows.row_key[row]);
       }
     }
+    if (only) this.addEvents(only);
     const made = layout(this.rows, { ...this.state, only, critical: Boolean(flow?.pieces?.rows) });
     this.renderer.lanes = made.lanes;
     this.renderer.height = made.height;
@@ -150,6 +151,17 @@ export class TimelinePage {
     this.canvas.style.height = `${wanted}px`;
     this.renderer.resize();
     this.scrollTo(this.renderer.scroll);
+  }
+
+  // Events of the user that happened in callback instances of the flow, where they are at hand.
+  addEvents(only) {
+    const { flow, bars } = this.renderer;
+    const instances = new Set(flow.vertices.filter((vertex) => vertex.kind === 0).map((vertex) => vertex.id));
+    for (let row = 0; row < this.rows.rows; row++) {
+      if (this.rows.kind[row] !== "event") continue;
+      const [first, last] = bars.ranges.get(this.rows.row_key[row]) ?? [0, 0];
+      for (let at = first; at < last; at++) if (instances.has(bars.table.id[at])) { only.add(this.rows.row_key[row]); break; }
+    }
   }
 
   scrollTo(y) {
@@ -461,7 +473,8 @@ export class TimelinePage {
       lines.push(h("span", {}, `${count(hit.count, KINDS[hit.kind])} in ${duration(hit.length)}, ${duration(hit.busy)} in all (${percent(hit.busy / hit.length)})`));
     } else {
       const end = hit.flags & 2 ? "end not seen" : duration(hit.length);
-      lines.push(h("span", {}, `${KINDS[hit.kind]}${hit.id >= 0 ? ` ${hit.id}` : ""}: ${end}`));
+      if (hit.kind === EVENT) lines.push(h("span", {}, hit.id >= 0 ? `event in callback instance ${hit.id}` : "event in no callback"));
+      else lines.push(h("span", {}, `${KINDS[hit.kind]}${hit.id >= 0 ? ` ${hit.id}` : ""}: ${end}`));
       if (hit.together > 1) lines.push(h("span", {}, `one of ${hit.together} in this column`));
     }
     lines.push(h("span", {}, `begins at ${moment(hit.at)}`));
