@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 SHARED_TRACES = Path(__file__).parents[1] / ".." / "shared" / "traces"
 SECOND = 1_000_000_000
 PERFECT = "perfect"
+OWN_EVENTS = ("my_pkg:*",)
 LONG = "long_recording"
 # Recall of the half an hour in which clocks drift apart by 36 ms; and of bursts that another host
 # takes: where losses leave few publications, the clocks are known to a microsecond only.
@@ -244,7 +245,7 @@ def compare(case: Case) -> tuple[list[Judged], list[Drop] | None] | None:
         )
         database = Path(temporary) / "run.duckdb"
         try:
-            ingest([simulation.directory], database)
+            ingest([simulation.directory], database, events=OWN_EVENTS)
         except TraceError as error:
             if "nothing was recorded" in str(error) and not _has_streams(simulation.directory):
                 return None

@@ -56,13 +56,21 @@ instance AS (
     UNION ALL
     SELECT 'response_taken', response_id, receiver_thread_id, taken_ns
     FROM analysed.store.response
+    UNION ALL
+    SELECT 'user_event', user_event_id, thread_id, at_ns FROM analysed.store.user_event
 ),
 link AS (
     SELECT
         kind, kind AS label, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id,
         false AS is_guess
     FROM instance
-    WHERE kind IN ('publication', 'callback_instance')
+    WHERE kind IN ('publication', 'callback_instance', 'user_event')
+    UNION ALL
+    SELECT
+        'recorded_in', name, 'callback_instance', callback_instance_id, 'user_event',
+        user_event_id, false
+    FROM analysed.store.user_event
+    WHERE callback_instance_id IS NOT NULL
     UNION ALL
     -- What a loss on other CPUs may have made of two says so.
     SELECT 'callback_run', 'callback_run', 'callback_instance', callback_instance_id,

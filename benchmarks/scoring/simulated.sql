@@ -47,6 +47,9 @@ WITH happened AS (
     SELECT 'response_taken', request_id, client_host, client_pid, client_tid,
         'ros2:rmw_take_response', taken_ns
     FROM simulated_response
+    UNION ALL
+    SELECT 'user_event', user_event_id, host, pid, tid, name, at_ns
+    FROM simulated_user_event
 ),
 declared AS (
     SELECT DISTINCT event FROM simulated_declared
@@ -426,6 +429,18 @@ FROM simulated_causal AS c
 JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.id
 JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id
 WHERE c.callback_instance_id IS NULL
+UNION ALL
+SELECT 'user_event', kind, id, kind, id, is_any, NULL
+FROM recorded
+WHERE kind = 'user_event'
+UNION ALL
+SELECT
+    'recorded_in', 'callback_instance', u.callback_instance_id::VARCHAR, 'user_event',
+    u.user_event_id::VARCHAR, r.is_any AND w.id IS NOT NULL, NULL
+FROM simulated_user_event AS u
+JOIN recorded AS r ON r.kind = 'user_event' AND u.user_event_id::VARCHAR = r.id
+LEFT JOIN whole_callback AS w ON u.callback_instance_id::VARCHAR = w.id
+WHERE u.callback_instance_id IS NOT NULL
 UNION ALL
 -- What a thread turned to before or meanwhile may be missing.
 SELECT

@@ -11,8 +11,8 @@ that another trace holds as well),
 `staging.asked` (patterns of the user's events to load, with the events that match, likewise),
 `staging.packet_read_once` (packets that a trace holds twice, or where it is NULL several traces),
 `staging.implausible` (values that were left out), `staging.damage`, `staging.event` (all events of
-known tracepoints but those of the kernel, and of the user, without payload), `staging.predecessor` (the pointers
-from event to event), and the objects of `schema/model`.
+the user and of known tracepoints, but those of the kernel, without payload), `staging.predecessor`
+(the pointers from event to event), and the objects of `schema/model`.
 """
 
 from __future__ import annotations

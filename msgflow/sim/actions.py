@@ -1,4 +1,4 @@
-"""Actions of callbacks besides publishing: call a service, spin, take a message, change state."""
+"""Actions of callbacks besides publishing: call, spin, take a message, change state, record."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from msgflow.sim.callback_instance import CallbackInstance
-from msgflow.sim.entity import Call, Poll, Publish, Spin, Transition
+from msgflow.sim.entity import Call, Poll, Publish, Record, Spin, Transition
 from msgflow.sim.publication import publish
 from msgflow.sim.services import ClientObject, call
 from msgflow.sim.take import take
@@ -151,10 +151,31 @@ def _transition(
     yield  # It takes no step, but is called as one that does.
 
 
+def _record(
+    _: Record,
+    __: NodeObjects,
+    thread: ExecutorThread,
+    ___: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    machine, scheduler = thread.machine, thread.scheduler
+    number = next(scheduler.user_event_ids)
+    values = (number, number / 4, f"frame {number}")
+    thread.emit(machine.tracepoints.my_pkg_frame_done, time, thread.context, *values)
+    scheduler.truth.user_event.add(
+        number, machine.hostname, thread.process.pid, thread.tid, "my_pkg:frame_done",
+        time + machine.epoch, None if instance is None else instance.callback_instance_id, *values,
+    )  # fmt: skip
+    return time + 300
+    yield  # It takes no step, but is called as one that does.
+
+
 _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Call: _call,
     Spin: _spin,
     Poll: _poll,
     Publish: _publish,
     Transition: _transition,
+    Record: _record,
 }

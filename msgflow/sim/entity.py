@@ -78,7 +78,12 @@ class Transition:
     """Take a managed node to its next state: configured, active, inactive, active, and so on."""
 
 
-Action = Call | Spin | Poll | Publish | Transition
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Record an event of a tracepoint of the user's own, `my_pkg:frame_done`."""
+
+
+Action = Call | Spin | Poll | Publish | Transition | Record
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from msgflow.errors import UsageError
 from msgflow.sim.entity import (
     SECOND,
+    Action,
     Call,
     Client,
     MessageLink,
     Publish,
     Publisher,
+    Record,
     Service,
     Subscription,
     Timer,
@@ -200,6 +202,17 @@ class Scenario:
             _check_executors(process)
         _check_ids(self)
 
+    @property
+    def has_own_events(self) -> bool:
+        """Whether callbacks record events of tracepoints of the user's own."""
+        nodes = (node for process in self.processes for node in process.nodes)
+        return any(isinstance(action, Record) for node in nodes for action in _actions(node))
+
+
+def _actions(node: Node) -> list[Action]:
+    callbacks = (*node.subscriptions, *node.timers, *node.services, *node.clients)
+    return [action for each in callbacks for action in each.does]
+
 
 def _check_ids(scenario: Scenario) -> None:
     """No thread has an id that another one has at the same time."""
@@ -257,7 +270,7 @@ def _check_topics(node: Node) -> None:
         *node.timers,
         *node.services,
     )
-    actions = [action for each in (*callbacks, *node.clients) for action in each.does]
+    actions = _actions(node)
     used = {topic for each in (*callbacks, *node.clients) for topic in each.publishes}
     used |= {action.topic for action in actions if isinstance(action, Publish)}
     if missing := sorted(used - own):

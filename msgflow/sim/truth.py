@@ -95,6 +95,10 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "link_call": _schema(
         request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID
     ),
+    "user_event": _schema(
+        user_event_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, name=_TEXT, at_ns=_TIME,
+        callback_instance_id=_ID, frame=_COUNT, score=pa.float64(), label=_TEXT,
+    ),
     "lifecycle_transition": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, at_ns=_TIME, start_state=_TEXT,
         goal_state=_TEXT,
