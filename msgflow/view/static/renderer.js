@@ -2,7 +2,7 @@
 
 import { color } from "./dom.js";
 import { lowerBound } from "./timeline_rows.js";
-import { PALE, PART_COLORS, duration, partTitle } from "./labels.js";
+import { EVENT, PALE, PART_COLORS, duration, partTitle } from "./labels.js";
 
 export const AXIS = 30;
 const BAR_TOP = 3;
@@ -157,7 +157,7 @@ export class Renderer {
       case 3: case 4: return colors.call;
       case 5: return colors.wait;
       case 6: return colors.process;
-      case 8: return colors.event;
+      case EVENT: return colors.event;
       default: return colors.execute;
     }
   }
@@ -184,7 +184,7 @@ export class Renderer {
       let y = top + full;
       for (const kind of ORDER) {
         if (!shares[kind]) continue;
-        const high = Math.min(Math.max(shares[kind] * full, kind === 5 ? 0 : 4), y - top);
+        const high = Math.min(Math.max(shares[kind] * full, leastHeight(kind, full)), y - top);
         if (high > 0) {
           c.fillStyle = this.barColor(kind, lane.kind);
           c.fillRect(x, y - high, 1, high);
@@ -207,7 +207,7 @@ export class Renderer {
         // A bin: as high as the share of its time that is busy.
         flush();
         const share = length > 0 ? Math.min(busy[at] / length, 1) : 1;
-        const high = Math.min(Math.max(share * full, kind === 5 ? 0 : 4), full);
+        const high = Math.min(Math.max(share * full, leastHeight(kind, full)), full);
         const width = Math.max(wide, 1);
         const offset = this.binOffset(kind, table, at, full);
         c.fillStyle = this.barColor(kind, lane.kind);
@@ -528,6 +528,8 @@ export class Renderer {
   }
 }
 
+// Waiting may be nothing; an event has no length, and no other bar beside it.
+const leastHeight = (kind, full) => (kind === 5 ? 0 : kind === EVENT ? full : 4);
 const HEIGHT_HALF = 10;
 // Drawn from below: what an executor does for callbacks first.
 const ORDER = [7, 6, 0, 1, 2, 3, 4, 5, 8];

@@ -13,6 +13,8 @@ const LEAST_SPAN = 20;
 const MARGIN = 0.5;
 // As many bars as a person can tell apart at once: a longer run opens on so many of it.
 const READABLE = 400;
+// Events of one callback instance that the list of a flow names.
+const MOST_EVENTS = 5;
 
 export class TimelinePage {
   constructor(app, root) {
@@ -140,7 +142,7 @@ export class TimelinePage {
         if (this.rows.kind[row] === "thread" && processes.has(this.rows.process_id[row])) only.add(this.rows.row_key[row]);
       }
     }
-    if (only) this.addEvents(only);
+    if (only) for (const { row } of this.eventsOf(flow)) only.add(row);
     const made = layout(this.rows, { ...this.state, only, critical: Boolean(flow?.pieces?.rows) });
     this.renderer.lanes = made.lanes;
     this.renderer.height = made.height;
@@ -153,15 +155,21 @@ export class TimelinePage {
     this.scrollTo(this.renderer.scroll);
   }
 
-  // Events of the user that happened in callback instances of the flow, where they are at hand.
-  addEvents(only) {
-    const { flow, bars } = this.renderer;
+  // Events of the user in callback instances of the flow, where they are at hand.
+  eventsOf(flow) {
+    const { bars } = this.renderer;
     const instances = new Set(flow.vertices.filter((vertex) => vertex.kind === 0).map((vertex) => vertex.id));
-    for (let row = 0; row < this.rows.rows; row++) {
-      if (this.rows.kind[row] !== "event") continue;
-      const [first, last] = bars.ranges.get(this.rows.row_key[row]) ?? [0, 0];
-      for (let at = first; at < last; at++) if (instances.has(bars.table.id[at])) { only.add(this.rows.row_key[row]); break; }
+    const found = [];
+    for (let place = 0; bars && place < this.rows.rows; place++) {
+      if (this.rows.kind[place] !== "event") continue;
+      const row = this.rows.row_key[place];
+      const [first, last] = bars.ranges.get(row) ?? [0, 0];
+      for (let at = first; at < last; at++) {
+        const instance = bars.table.id[at];
+        if (instances.has(instance)) found.push({ row, instance, name: this.rows.label[place], at: bars.table.start_at[at] });
+      }
     }
+    return found.sort((a, b) => a.at - b.at);
   }
 
   scrollTo(y) {
@@ -603,6 +611,8 @@ export class TimelinePage {
     const gather = h("input", { type: "checkbox", checked: this.gathered, on: { change: () => { this.gathered = gather.checked; this.relayout(); this.redraw(); } } });
     const executors = h("input", { type: "checkbox", checked: this.withExecutors, on: { change: () => { this.withExecutors = executors.checked; this.relayout(); this.redraw(); } } });
     const { from, to } = extent(flow);
+    const events = new Map();
+    for (const event of this.eventsOf(flow)) events.set(event.instance, [...(events.get(event.instance) ?? []), event]);
     const inward = new Map();
     for (const edge of flow.edges) if (!inward.has(edge.to)) inward.set(edge.to, edge);
     const rows = flow.vertices.map((vertex, place) => {
@@ -615,7 +625,8 @@ export class TimelinePage {
       h("td", { className: "number" }, `+${duration(vertex.at - from)}`),
       h("td", {}, h("button", { type: "button", className: "pick" }, row === undefined ? "?" : this.rows.label[row]),
         h("div", { className: "soft" }, `${KINDS[vertex.kind]} · ${row === undefined ? "" : this.rows.node[row] ?? this.rows.process[row]}`),
-        edge && edge.kind !== "callback" && h("div", { className: "soft" }, `${LINKS[edge.kind]}${lead ? `, after ${duration(lead)}` : ""}`)),
+        edge && edge.kind !== "callback" && h("div", { className: "soft" }, `${LINKS[edge.kind]}${lead ? `, after ${duration(lead)}` : ""}`),
+        vertex.kind === 0 && eventLines(events.get(vertex.id) ?? [], from)),
       h("td", { className: "number" }, vertex.flags & 2 ? "end not seen" : vertex.length ? duration(vertex.length) : ""));
     });
     const causes = flow.vertices.filter((vertex) => vertex.isCause && !vertex.picked).length;
@@ -715,6 +726,12 @@ export class TimelinePage {
     details.addEventListener("toggle", () => { if (details.open) fill(); });
     clear(this.beside, details);
   }
+}
+
+function eventLines(events, from) {
+  const lines = events.slice(0, MOST_EVENTS).map(({ name, at }) => `${name} at +${duration(at - from)}`);
+  if (events.length > MOST_EVENTS) lines.push(`and ${count(events.length - MOST_EVENTS, "more event")}`);
+  return lines.map((line) => h("div", { className: "soft" }, line));
 }
 
 function number(text, fallback) {
