@@ -76,7 +76,7 @@ object AS (
             END
         ) IS NULL
     UNION ALL
-    SELECT row_key, 'event', -row_key, process_id, node_id, name, NULL, false, 6
+    SELECT row_key, 'event', -row_key, process_id, node_id, name, NULL, false, 9
     FROM event_row
     WHERE run_id = $run
     UNION ALL
