@@ -25,6 +25,7 @@ _SESSION = "msgflow-real"
 _SET_UP = (
     ("enable-channel", "--userspace", "--subbuf-size=1M", "--num-subbuf=4", "ros2"),
     ("enable-event", "--userspace", "--channel=ros2", "ros2:*"),
+    ("enable-event", "--userspace", "--channel=ros2", "my_pkg:*"),
     ("add-context", "--userspace", "--type=vpid", "--type=vtid", "--type=procname"),
     ("start",),
 )
@@ -82,7 +83,7 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
     environment = _environment(python) | {"LD_PRELOAD": str(library)}
     parts = _made(directory / "truth")
     recorded = directory / "trace"
-    with _session(recorded):
+    with session(recorded):
         running = []
         try:
             for process in systems(python)[system]:
@@ -115,7 +116,7 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
 
 
 @contextlib.contextmanager
-def _session(directory: Path) -> Iterator[None]:
+def session(directory: Path) -> Iterator[None]:
     """Trace what happens in the block, and start a session daemon if none runs.
 
     A machine has one daemon of root: others wait.
