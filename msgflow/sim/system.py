@@ -210,7 +210,12 @@ class Scenario:
 
 
 def _actions(node: Node) -> list[Action]:
-    callbacks = (*node.subscriptions, *node.timers, *node.services, *node.clients)
+    callbacks: tuple[Subscription | Timer | Service | Client, ...] = (
+        *node.subscriptions,
+        *node.timers,
+        *node.services,
+        *node.clients,
+    )
     return [action for each in callbacks for action in each.does]
 
 
