@@ -432,6 +432,6 @@ def test_events_of_ones_own_are_in_the_lake(tmp_path: Path) -> None:
     recording = simulate("own_events", tmp_path / "robot", factor=0.03).directory
     result = run("ingest", recording, "--lake", tmp_path / "lake", "--events", "my_pkg:*")
     assert result.exit_code == 0, result.stderr
-    asked = "SELECT name, count(*) > 0 AS n FROM view.user_event GROUP BY ALL"
+    asked = "SELECT DISTINCT name FROM view.user_event"
     found = run("sql", asked, "--lake", tmp_path / "lake", "--format", "csv")
-    assert found.stdout.split() == ["name,n", "my_pkg:frame_done,true"], found.stderr
+    assert found.stdout.split() == ["name", "my_pkg:frame_done"], found.stderr
