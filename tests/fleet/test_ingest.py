@@ -434,4 +434,4 @@ def test_events_of_ones_own_are_in_the_lake(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     asked = "SELECT DISTINCT name FROM view.user_event"
     found = run("sql", asked, "--lake", tmp_path / "lake", "--format", "csv")
-    assert found.stdout.split() == ["name", "my_pkg:frame_done"], found.stderr
+    assert found.stdout.split() == ['"name"', '"my_pkg:frame_done"'], found.stderr
