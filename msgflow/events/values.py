@@ -47,8 +47,8 @@ def readable(
         members = ", ".join(
             f"CASE WHEN {value} IS NOT NULL THEN {literal(f'{field.name}=')} || "
             f"{readable(value, field.type, lambdas=lambdas)} END"
-            for field in data_type
-            for value in [member(expression, field)]
+            for place, field in enumerate(data_type)
+            for value in [member(expression, place)]
         )
         joined = f"concat_ws(', ', {members})" if members else "''"
         text = f"'{{' || {joined} || '}}'"

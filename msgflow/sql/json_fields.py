@@ -48,15 +48,15 @@ def exact(expression: str, data_type: pa.DataType, lambdas: int = 0) -> str:
         element = exact("element", data_type.value_type, lambdas + 1)
         return f"list_transform({expression}, lambda element: {element})"
     members = ", ".join(
-        f"{literal(field.name)}, {exact(member(expression, field), field.type, lambdas)}"
-        for field in data_type
+        f"{literal(field.name)}, {exact(member(expression, place), field.type, lambdas)}"
+        for place, field in enumerate(data_type)
     )
     return f"CASE WHEN {expression} IS NOT NULL THEN json_object({members}) END"
 
 
-def member(expression: str, field: pa.Field) -> str:
-    """Return the SQL of a member of a structure."""
-    return f"struct_extract({expression}, {literal(field.name)})"
+def member(expression: str, place: int) -> str:
+    """Return the SQL of a member of a structure; names may differ in case alone."""
+    return f"struct_extract_at({expression}, {place + 1})"
 
 
 def _has_floats(data_type: pa.DataType) -> bool:
