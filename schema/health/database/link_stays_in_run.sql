@@ -44,3 +44,12 @@ WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
     )
     OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, l.take_id IS NOT NULL)
 GROUP BY l.run_id
+UNION ALL
+SELECT u.run_id, 'user_event', count(*), 'links to a row of another run'
+FROM store.user_event AS u
+LEFT JOIN callback_instance AS i ON u.run_id = i.run_id
+WHERE coalesce(
+    u.callback_instance_id NOT BETWEEN i.first_id AND i.last_id,
+    u.callback_instance_id IS NOT NULL
+)
+GROUP BY u.run_id
