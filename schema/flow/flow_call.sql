@@ -12,7 +12,7 @@ CREATE OR REPLACE MACRO derive.flow_call(only_run) AS TABLE
 WITH caller AS (
     SELECT i.callback_instance_id, i.take_id
     FROM store.callback_instance AS i
-    SEMI JOIN store.link_request AS l ON i.callback_instance_id = l.callback_instance_id
+    SEMI JOIN derive.certain_request AS l ON i.callback_instance_id = l.callback_instance_id
     WHERE i.run_id = only_run
 ),
 taking AS (

@@ -34,8 +34,7 @@ SELECT
     'callback_instance', callback_instance_id,
     'request', request_id,
     'direct'
-FROM store.link_request
-WHERE callback_instance_id IS NOT NULL
+FROM derive.certain_request
 UNION ALL
 SELECT
     run_id,

@@ -5,8 +5,7 @@
 SELECT
     request_id,
     derive.vertex_key('callback_instance', callback_instance_id) AS sender_key
-FROM store.link_request
-WHERE callback_instance_id IS NOT NULL
+FROM derive.certain_request
 UNION ALL
 SELECT
     request_id,

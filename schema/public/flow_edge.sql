@@ -65,7 +65,7 @@ SELECT
     'direct',
     i.start_ns,
     q.sent_ns
-FROM main.link_request AS l
+FROM derive.certain_request AS l
 JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
 JOIN main.request AS q ON l.request_id = q.request_id
 UNION ALL

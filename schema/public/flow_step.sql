@@ -74,7 +74,7 @@ aside AS MATERIALIZED (
     SELECT
         derive.vertex_key('callback_instance', l.callback_instance_id),
         derive.vertex_key('request', l.request_id)
-    FROM store.link_request AS l
+    FROM derive.certain_request AS l
     JOIN store.request AS q ON l.request_id = q.request_id
     JOIN store.client AS c ON q.client_id = c.client_id
     WHERE c.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
