@@ -30,24 +30,31 @@ sent AS (
     WHERE publication_id IN (SELECT id FROM step WHERE kind = 'publication')
 ),
 next AS (
-    SELECT thread_id, start_event_id AS event_id, start_ns AS at_ns FROM store.publication
+    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns
+    FROM store.publication
     UNION ALL
-    SELECT thread_id, start_event_id, taken_ns FROM store.take WHERE start_event_id IS NOT NULL
+    SELECT run_id, thread_id, start_event_id, taken_ns
+    FROM store.take
+    WHERE start_event_id IS NOT NULL
     UNION ALL
-    SELECT thread_id, start_event_id, start_ns FROM store.callback_instance
+    SELECT run_id, thread_id, start_event_id, start_ns FROM store.callback_instance
     UNION ALL
-    SELECT thread_id, end_event_id, end_ns
+    SELECT run_id, thread_id, end_event_id, end_ns
     FROM store.callback_instance
     WHERE end_event_id IS NOT NULL
     UNION ALL
-    SELECT thread_id, start_event_id, start_ns FROM store.executor_state
+    SELECT run_id, thread_id, start_event_id, start_ns FROM store.executor_state
 ),
 went_on AS (
     SELECT
         s.publication_id,
         derive.corrected_ns(n.at_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS until_ns
     FROM sent AS s
-    ASOF JOIN (SELECT * FROM next WHERE thread_id IN (SELECT thread_id FROM sent)) AS n
+    ASOF JOIN (
+        SELECT thread_id, event_id, at_ns
+        FROM next
+        WHERE run_id = $run_id AND thread_id IN (SELECT thread_id FROM sent)
+    ) AS n
         ON s.thread_id = n.thread_id AND s.end_event_id < n.event_id
     ASOF LEFT JOIN store.thread_break AS b
         ON s.thread_id = b.thread_id AND s.end_event_id < b.resumed_event_id
