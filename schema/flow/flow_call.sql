@@ -34,12 +34,8 @@ published AS (
     WHERE l.run_id = only_run
     UNION ALL
     SELECT
-        run_id,
-        coalesce(
-            derive.vertex_key('request', taken_request_id),
-            derive.vertex_key('response', taken_response_id)
-        ),
-        NULL, taken_request_id, taken_response_id, publication_id, publisher_id, 'take_adjacent'
+        run_id, derive.vertex_key(from_kind, from_id), NULL, taken_request_id, taken_response_id,
+        publication_id, publisher_id, 'take_adjacent'
     FROM derive.certain_call
     WHERE run_id = only_run AND publication_id IS NOT NULL
 )
