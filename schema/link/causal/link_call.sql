@@ -16,11 +16,11 @@ WITH taken AS (
         receiver_thread_id AS thread_id, taken_ns, request_id AS taken_request_id,
         NULL::BIGINT AS taken_response_id
     FROM store.request
-    WHERE run_id = only_run AND taken_ns IS NOT NULL AND callback_instance_id IS NULL
+    WHERE run_id = only_run AND callback_instance_id IS NULL
     UNION ALL
     SELECT receiver_thread_id, taken_ns, NULL, response_id
     FROM store.response
-    WHERE run_id = only_run AND taken_ns IS NOT NULL
+    WHERE run_id = only_run
 ),
 -- Threads that take calls, with all that shows what they turn to.
 executing AS MATERIALIZED (
@@ -39,7 +39,7 @@ turn AS (
     FROM taken AS k
     SEMI JOIN executing AS e ON k.thread_id = e.thread_id
     UNION ALL
-    SELECT thread_id, at_ns, NULL, NULL FROM executing WHERE at_ns IS NOT NULL
+    SELECT thread_id, at_ns, NULL, NULL FROM executing
     UNION ALL
     SELECT thread_id, taken_ns, NULL, NULL
     FROM store.take AS t
@@ -73,7 +73,7 @@ sent AS (
         WHERE l.run_id = only_run
             AND r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
     ) AS i ON r.response_id = i.response_id
-    WHERE r.run_id = only_run AND r.sent_ns IS NOT NULL
+    WHERE r.run_id = only_run
 ),
 behind AS MATERIALIZED (
     SELECT s.*, t.at_ns, t.taken_request_id, t.taken_response_id

@@ -25,7 +25,7 @@ by_hand AS MATERIALIZED (
     FROM store.take AS t
     ANTI JOIN handled AS h ON t.take_id = h.take_id
     ANTI JOIN buffered AS b ON t.subscription_id = b.subscription_id
-    WHERE t.run_id = only_run AND t.subscription_id IS NOT NULL
+    WHERE t.run_id = only_run
 ),
 run AS MATERIALIZED (
     SELECT
