@@ -116,9 +116,7 @@ def test_a_gap_that_touches_the_take(
     taken = respond(calls)
     calls.publish(CLIENT, 0x11, 1)
     calls.ready(CLIENT)
-    calls.add_packet(
-        0, taken + until_taken, last_event=taken + from_taken, discarded=3, cpu=1
-    )
+    calls.add_packet(0, taken + until_taken, last_event=taken + from_taken, discarded=3, cpu=1)
     assert len(analyse(calls).rows(LINKS)) == count
 
 
