@@ -155,3 +155,32 @@ def test_used_by_one_annotation(merge: RosSystem, analyse: Analyse) -> None:
     merge.publish(other, 0x22, 32)
     merge.end(other, 0xCD)
     assert analyse(merge).rows(LINKS) == [(11, 12, 1), (11, 22, 2), (33, 32, 3)]
+
+
+def test_nested_in_what_is_no_input(merge: RosSystem, analyse: Analyse) -> None:
+    """The message came meanwhile on another thread: that has ended."""
+    other = Thread(100, 101)
+    merge.timer(NODE, 0x31, callback=0xCC)
+    merge.start(NODE, 0xCC)
+    begin(merge, B, 11)
+    merge.take(other, 0x11, 20)
+    merge.start(other, A)
+    merge.end(other, A)
+    merge.publish(NODE, 0x21, 12)
+    merge.end(NODE, B)
+    merge.end(NODE, 0xCC)
+    assert analyse(merge).rows(LINKS) == [(20, 12, 2)]
+
+
+def test_what_another_instance_ran_in_has_ended(merge: RosSystem, analyse: Analyse) -> None:
+    other = Thread(100, 101)
+    begin(merge, B, 11)
+    merge.take(other, 0x11, 20)
+    merge.start(other, A)
+    merge.take(other, 0x12, 21)
+    merge.start(other, B)
+    merge.end(other, B)
+    merge.end(other, A)
+    merge.publish(NODE, 0x21, 12)
+    merge.end(NODE, B)
+    assert analyse(merge).rows(LINKS) == [(20, 12, 2)]
