@@ -153,7 +153,7 @@ TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
-WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services", "stall")
+WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services", "actions", "stall")
 # The truth names hosts as their traces do: holes of one would be looked for in the other.
 ONE_NAME = {"containers_one_hostname"}
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))

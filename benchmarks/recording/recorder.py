@@ -58,8 +58,9 @@ def require(python: Path) -> None:
     for program in ("lttng", "lttng-sessiond", "gcc"):
         if shutil.which(program) is None:
             raise NotPossibleError(f"no {program}")
-    if not python.exists():
-        raise NotPossibleError(f"no Python with rclpy — {python}")
+    needed = [str(python), "-c", "import rclpy.action, std_msgs.msg, test_msgs.action"]
+    if not python.exists() or subprocess.run(needed, capture_output=True).returncode:
+        raise NotPossibleError(f"no Python with rclpy and test_msgs — {python}")
 
 
 def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[Path, Path]:

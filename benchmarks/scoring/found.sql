@@ -144,6 +144,36 @@ link AS (
         candidate_count > 1
     FROM analysed.store.link_call
     UNION ALL
+    SELECT
+        CASE WHEN is_accepted THEN 'goal_accepted' ELSE 'goal_rejected' END, 'goal',
+        'request_sent', goal_id, 'request_taken', goal_id, false
+    FROM analysed.main.goal
+    WHERE is_accepted IS NOT NULL
+    UNION ALL
+    SELECT
+        'goal_result', 'result', 'request_sent', goal_id, 'request_sent', result_request_id,
+        is_loss_affected
+    FROM analysed.main.goal
+    WHERE result_request_id IS NOT NULL
+    UNION ALL
+    SELECT
+        'goal_message', m.label, 'request_sent', g.goal_id, 'publication', b.publication_id,
+        g.is_loss_affected
+    FROM (
+        SELECT goal_id, action_server_id, 'feedback' AS label, first_feedback_ns AS at_ns
+        FROM analysed.main.goal
+        UNION
+        SELECT goal_id, action_server_id, 'feedback', last_feedback_ns FROM analysed.main.goal
+        UNION
+        SELECT goal_id, action_server_id, 'cancel', cancel_accepted_ns FROM analysed.main.goal
+    ) AS m
+    JOIN analysed.main.goal AS g ON m.goal_id = g.goal_id
+    JOIN analysed.main.action_server AS s ON g.action_server_id = s.action_server_id
+    JOIN analysed.main.publication AS b
+        ON m.at_ns = b.start_ns
+        AND CASE m.label WHEN 'cancel' THEN s.status_publisher_id ELSE s.feedback_publisher_id END
+        = b.publisher_id
+    UNION ALL
     SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id, false
     FROM analysed.store.request
     WHERE sent_ns IS NOT NULL AND taken_ns IS NOT NULL

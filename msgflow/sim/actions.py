@@ -1,4 +1,4 @@
-"""Actions of callbacks besides publishing: call, spin, take a message, change state, record."""
+"""Actions of callbacks besides publishing: call, send a goal, spin, poll, change state, record."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from msgflow.sim.callback_instance import CallbackInstance
-from msgflow.sim.entity import Call, Poll, Publish, Record, Spin, Transition
+from msgflow.sim.entity import Call, Poll, Publish, Record, SendGoal, Spin, Transition
 from msgflow.sim.publication import publish
 from msgflow.sim.services import ClientObject, call
 from msgflow.sim.take import take
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from msgflow.sim.entity import Action
     from msgflow.sim.executor import Executor
     from msgflow.sim.executor_thread import ExecutorThread
+    from msgflow.sim.goals import ActionClientObject
     from msgflow.sim.machine import Steps
     from msgflow.sim.objects import PublisherObject, SubscriptionObject
     from msgflow.sim.transport import Middleware
@@ -46,6 +47,7 @@ class NodeObjects:
     executors: Sequence[Executor]
     publishers: dict[str, PublisherObject]
     clients: dict[str, ClientObject] = field(default_factory=dict)
+    action_clients: dict[str, ActionClientObject] = field(default_factory=dict)
     polled: dict[str, SubscriptionObject] = field(default_factory=dict)
     lifecycle: Lifecycle | None = None
 
@@ -64,7 +66,7 @@ def _call(
     instance: CallbackInstance | None,
 ) -> Steps:
     client = objects.clients[action.service]
-    time = call(thread, client, time, instance)
+    time = call(thread, client, time, instance)[0]
     if action.spins is None:
         return time
     number = client.sequence_number
@@ -76,6 +78,18 @@ def _call(
             lambda: client.answered >= number,
         )
     )
+
+
+def _send_goal(
+    action: SendGoal,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    _: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    return objects.action_clients[action.action].send(thread, time, instance)
+    yield  # It takes no step, but is called as one that does.
 
 
 def _spin(
@@ -173,6 +187,7 @@ def _record(
 
 _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Call: _call,
+    SendGoal: _send_goal,
     Spin: _spin,
     Poll: _poll,
     Publish: _publish,

@@ -11,12 +11,15 @@ from msgflow.errors import UsageError
 from msgflow.sim.entity import (
     SECOND,
     Action,
+    ActionClient,
+    ActionServer,
     Call,
     Client,
     MessageLink,
     Publish,
     Publisher,
     Record,
+    SendGoal,
     Service,
     Subscription,
     Timer,
@@ -64,7 +67,8 @@ class Node:
     Attributes:
         name: name without namespace.
         namespace: its namespace.
-        publishers: its publishers; likewise subscriptions, timers, services, clients.
+        publishers: its publishers; likewise subscriptions, timers, services, clients,
+            action_servers, action_clients.
         links: what its messages have to do with each other beyond single callbacks.
         groups: its callback groups besides the default one.
         executor: number of the executor that spins it.
@@ -79,6 +83,8 @@ class Node:
     timers: tuple[Timer, ...] = ()
     services: tuple[Service, ...] = ()
     clients: tuple[Client, ...] = ()
+    action_servers: tuple[ActionServer, ...] = ()
+    action_clients: tuple[ActionClient, ...] = ()
     links: tuple[MessageLink, ...] = ()
     groups: tuple[Group, ...] = ()
     executor: int = 0
@@ -284,6 +290,10 @@ def _check_topics(node: Node) -> None:
     calls = {action.service for action in actions if isinstance(action, Call)}
     if missing := sorted(calls - clients):
         raise UsageError(f"no client of {', '.join(missing)} — node {node.full_name}")
+    known = {client.action for client in node.action_clients}
+    goals = {action.action for action in actions if isinstance(action, SendGoal)}
+    if missing := sorted(goals - known):
+        raise UsageError(f"no action client of {', '.join(missing)} — node {node.full_name}")
     groups = {"", *(group.name for group in node.groups)}
     if missing := sorted({each.group for each in (*callbacks, *node.clients)} - groups):
         raise UsageError(f"no callback group {missing[0]} — node {node.full_name}")

@@ -92,6 +92,8 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         service_host=_TEXT, service_pid=_NUMBER, service_tid=_NUMBER, sent_ns=_TIME,
         client_host=_TEXT, client_pid=_NUMBER, client_tid=_NUMBER, taken_ns=_TIME,
     ),
+    "goal": _schema(goal_id=_ID, is_accepted=_FLAG, result_request_id=_ID),
+    "goal_message": _schema(goal_id=_ID, publication_id=_ID),
     "link_call": _schema(
         request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID
     ),

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from msgflow.sim.scenario import (
+    actions,
     annotated,
     autoware,
     bursts,
@@ -60,6 +61,7 @@ def scenarios() -> Mapping[str, Scenario]:
         transforms.transforms(),
         services.services(),
         services.calls(),
+        actions.actions(),
         lives.restarts(),
         lives.container_restarts(),
         containers.containers_one_daemon(),
