@@ -114,7 +114,7 @@ chromium:
 # Programs to record with, and an environment with the wheels of ROS 2.
 ros: $(VENV)/.made
 	@$(HAS_LTTNG) || { $(APT); apt_install lttng-tools liblttng-ust-dev gcc libc6-dev || true; }
-	@test -e $(VENV)/ros/.installed || { $(BIN)/python -m venv --clear $(VENV)/ros \
+	@test $(VENV)/ros/.installed -nt pyproject.toml || { $(BIN)/python -m venv --clear $(VENV)/ros \
 		&& $(VENV)/ros/bin/python -m pip install --quiet --upgrade 'pip>=25.1' \
 		&& $(VENV)/ros/bin/python -m pip install --quiet --group ros \
 		&& touch $(VENV)/ros/.installed; } \

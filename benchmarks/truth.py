@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 SHARED_TRACES = Path(__file__).parents[1] / ".." / "shared" / "traces"
 SECOND = 1_000_000_000
 PERFECT = "perfect"
+OWN_EVENTS = ("my_pkg:*",)
 LONG = "long_recording"
 # Recall of the half an hour in which clocks drift apart by 36 ms; and of bursts that another host
 # takes: where losses leave few publications, the clocks are known to a microsecond only.
@@ -152,7 +153,7 @@ TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
-WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services", "stall")
+WHOLE = ("losses", "restarts", "container_restarts", "host_chain", "services", "actions", "stall")
 # The truth names hosts as their traces do: holes of one would be looked for in the other.
 ONE_NAME = {"containers_one_hostname"}
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))
@@ -244,7 +245,7 @@ def compare(case: Case) -> tuple[list[Judged], list[Drop] | None] | None:
         )
         database = Path(temporary) / "run.duckdb"
         try:
-            ingest([simulation.directory], database)
+            ingest([simulation.directory], database, events=OWN_EVENTS)
         except TraceError as error:
             if "nothing was recorded" in str(error) and not _has_streams(simulation.directory):
                 return None

@@ -23,7 +23,7 @@ import termios
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PAGES = ("why-late.md", "tour.md", "cookbook.md", "../README.md")
+PAGES = ("why-late.md", "tour.md", "cookbook.md", "own-events.md", "../README.md")
 # What pages without a setup of their own start from: the database of `make demo`.
 DEMO = """\
 msgflow simulate demo trace

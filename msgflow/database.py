@@ -127,6 +127,7 @@ class Database:
         reader: str = "auto",
         strict: bool = False,
         ignore: Sequence[str] = (),
+        events: Sequence[str] = (),
         progress: Callable[[IngestProgress], None] | None = None,
     ) -> IngestReport:
         """Read all traces below `paths` as one run, in one transaction.
@@ -144,6 +145,7 @@ class Database:
             reader: 'auto', 'msgflow' or 'bt2'.
             strict: refuse a trace at its first damage, instead of keeping what is good.
             ignore: names of events to leave out.
+            events: names of the user's own events to load into `user_event`, such as 'my_pkg:*'.
             progress: called now and then while reading.
 
         Raises:
@@ -167,6 +169,7 @@ class Database:
             reader=reader,
             strict=strict,
             ignore=ignore,
+            events=events,
             memory_limit=self._memory_limit,
             progress=progress,
         )

@@ -1,7 +1,7 @@
 -- name: flows
 -- title: Flows, one by one
--- description: What became of every root of every path: when it started, when it arrived at the end
---     of the path and how long that took, or why it did not arrive.
+-- description: Every flow: when the callback or publication that begins it (its root) started, and
+--     when the end of the path was reached and how long that took, or why it was not.
 -- grain: one row per path and root, or per pair of root and arrival
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
 --     commas (default: any)

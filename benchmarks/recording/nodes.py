@@ -6,7 +6,8 @@ It says `ready` when its nodes spin, and ends when its standard input does.
 
 Needs rclpy and no package of msgflow: another Python runs it. The rows of TRUTH are JSON, a line
 each: `callback` (what ran, with which message), `publication`, `request` and `response` (what was
-sent, and in which callback). Times are of CLOCK_MONOTONIC, around the call.
+sent, in which callback, and, if it is feedback, for which goal). Times are of CLOCK_MONOTONIC,
+around the call.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from pathlib import Path
 
 import rclpy
 from rcl_interfaces.srv import ListParameters
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from std_msgs.msg import UInt64
+from test_msgs.action import Fibonacci
 
 
 class Witness(Node):
@@ -41,7 +44,7 @@ class Witness(Node):
         self._ids = itertools.count(os.getpid() << 32)
         self._numbers = itertools.count(1)
         self._running = threading.local()
-        self._senders = {}
+        self._actions = []
 
     def every(self, seconds: float, work, group=None) -> None:
         """Do some work at a period."""
@@ -101,20 +104,77 @@ class Witness(Node):
 
         return send
 
+    def act(self, action: str, work, messages: int) -> None:
+        """Execute goals: do some work before each message of feedback. Each fifth is rejected."""
+
+        def decide(goal: Fibonacci.Goal) -> GoalResponse:
+            is_accepted = goal.order % 5 != 0
+            with self._callback("service", f"{action}/_action/send_goal", goal.order, is_accepted):
+                return GoalResponse.ACCEPT if is_accepted else GoalResponse.REJECT
+
+        def execute(goal) -> Fibonacci.Result:
+            number = goal.request.order
+            for _ in range(messages):
+                work()
+                if goal.is_cancel_requested:
+                    goal.canceled()
+                    return Fibonacci.Result()
+                feedback = f"{action}/_action/feedback"
+                with self._sent("publication", feedback, next(self._ids), goal=number):
+                    goal.publish_feedback(Fibonacci.Feedback(sequence=[number]))
+            goal.succeed()
+            return Fibonacci.Result(sequence=[number])
+
+        self._actions.append(
+            ActionServer(
+                self, Fibonacci, action, execute, callback_group=ReentrantCallbackGroup(),
+                goal_callback=decide, cancel_callback=lambda goal: CancelResponse.ACCEPT,
+            )
+        )  # fmt: skip
+
+    def sender_of_goals(self, action: str):
+        """Return a function that sends a goal, and asks for its result; cancels each seventh."""
+        client = ActionClient(self, Fibonacci, action)
+        goals = itertools.count(1)
+
+        def send() -> None:
+            if client.server_is_ready():
+                number = next(goals)
+                with self._sent("request", f"{action}/_action/send_goal", number):
+                    future = client.send_goal_async(Fibonacci.Goal(order=number))
+                future.add_done_callback(lambda future: answered(number, future.result()))
+
+        def answered(number: int, goal) -> None:
+            with self._callback("client", f"{action}/_action/send_goal", number):
+                if goal.accepted:
+                    with self._sent("request", f"{action}/_action/get_result", number):
+                        future = goal.get_result_async()
+                    future.add_done_callback(lambda _: finished(number))
+                    if number % 7 == 0:
+                        goal.cancel_goal_async()
+
+        def finished(number: int) -> None:
+            with self._callback("client", f"{action}/_action/get_result", number):
+                pass
+
+        return send
+
     @contextmanager
-    def _callback(self, kind: str, name: str, message: int):
+    def _callback(self, kind: str, name: str, message: int, accepted: bool | None = None):
         number = self._running.number = next(self._numbers)
         begin = time.monotonic_ns()
         yield
         self._running.number = 0
-        self._write("callback", begin, kind=kind, name=name, id=message, n=number)
+        self._write(
+            "callback", begin, kind=kind, name=name, id=message, n=number, accepted=accepted
+        )
 
     @contextmanager
-    def _sent(self, kind: str, topic: str, message: int):
+    def _sent(self, kind: str, topic: str, message: int, goal: int | None = None):
         begin = time.monotonic_ns()
         yield
         number = getattr(self._running, "number", 0)
-        self._write(kind, begin, topic=topic, id=message, cb=number)
+        self._write(kind, begin, topic=topic, id=message, cb=number, goal=goal)
 
     def _write(self, what: str, begin: int, **row: object) -> None:
         place = {
@@ -211,6 +271,22 @@ def several(truth: Truth) -> list[Node]:
     return [node, exclusive, *relay(truth)]
 
 
+def actor(truth: Truth) -> list[Node]:
+    """Execute goals of two actions."""
+    node = Witness("actor", truth)
+    node.act("/dock", lambda: time.sleep(0.01), 3)
+    node.act("/move", lambda: time.sleep(0.03), 5)
+    return [node]
+
+
+def asker(truth: Truth) -> list[Node]:
+    """Send goals: of one action when the last one is over, of the other one sooner."""
+    node = Witness("asker", truth)
+    node.every(0.08, node.sender_of_goals("/dock"))
+    node.every(0.11, node.sender_of_goals("/move"))
+    return [node]
+
+
 SYSTEMS = {
     "pipeline": {"sink": (sink, SingleThreadedExecutor), "filter": (relay, SingleThreadedExecutor),
                  "source": (source, SingleThreadedExecutor)},
@@ -222,6 +298,7 @@ SYSTEMS = {
     "multi_threaded": {"sink": (sink, SingleThreadedExecutor),
                        "several": (several, MultiThreadedExecutor),
                        "source": (source, SingleThreadedExecutor)},
+    "actions": {"actor": (actor, MultiThreadedExecutor), "asker": (asker, SingleThreadedExecutor)},
     "events": {"sink": (sink, EventsExecutor), "filter": (relay, EventsExecutor),
                "source": (source, EventsExecutor)},
 }  # fmt: skip

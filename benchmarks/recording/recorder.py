@@ -25,6 +25,7 @@ _SESSION = "msgflow-real"
 _SET_UP = (
     ("enable-channel", "--userspace", "--subbuf-size=1M", "--num-subbuf=4", "ros2"),
     ("enable-event", "--userspace", "--channel=ros2", "ros2:*"),
+    ("enable-event", "--userspace", "--channel=ros2", "my_pkg:*"),
     ("add-context", "--userspace", "--type=vpid", "--type=vtid", "--type=procname"),
     ("start",),
 )
@@ -57,8 +58,9 @@ def require(python: Path) -> None:
     for program in ("lttng", "lttng-sessiond", "gcc"):
         if shutil.which(program) is None:
             raise NotPossibleError(f"no {program}")
-    if not python.exists():
-        raise NotPossibleError(f"no Python with rclpy — {python}")
+    needed = [str(python), "-c", "import rclpy.action, std_msgs.msg, test_msgs.action"]
+    if not python.exists() or subprocess.run(needed, capture_output=True).returncode:
+        raise NotPossibleError(f"no Python with rclpy and test_msgs — {python}")
 
 
 def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[Path, Path]:
@@ -82,7 +84,7 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
     environment = _environment(python) | {"LD_PRELOAD": str(library)}
     parts = _made(directory / "truth")
     recorded = directory / "trace"
-    with _session(recorded):
+    with session(recorded):
         running = []
         try:
             for process in systems(python)[system]:
@@ -115,7 +117,7 @@ def record(python: Path, system: str, seconds: float, directory: Path) -> tuple[
 
 
 @contextlib.contextmanager
-def _session(directory: Path) -> Iterator[None]:
+def session(directory: Path) -> Iterator[None]:
     """Trace what happens in the block, and start a session daemon if none runs.
 
     A machine has one daemon of root: others wait.

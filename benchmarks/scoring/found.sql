@@ -56,13 +56,21 @@ instance AS (
     UNION ALL
     SELECT 'response_taken', response_id, receiver_thread_id, taken_ns
     FROM analysed.store.response
+    UNION ALL
+    SELECT 'user_event', user_event_id, thread_id, at_ns FROM analysed.store.user_event
 ),
 link AS (
     SELECT
         kind, kind AS label, kind AS from_kind, id AS from_id, kind AS to_kind, id AS to_id,
         false AS is_guess
     FROM instance
-    WHERE kind IN ('publication', 'callback_instance')
+    WHERE kind IN ('publication', 'callback_instance', 'user_event')
+    UNION ALL
+    SELECT
+        'recorded_in', name, 'callback_instance', callback_instance_id, 'user_event',
+        user_event_id, false
+    FROM analysed.store.user_event
+    WHERE callback_instance_id IS NOT NULL
     UNION ALL
     -- What a loss on other CPUs may have made of two says so.
     SELECT 'callback_run', 'callback_run', 'callback_instance', callback_instance_id,
@@ -135,6 +143,36 @@ link AS (
         coalesce(publication_id, request_id, response_id),
         candidate_count > 1
     FROM analysed.store.link_call
+    UNION ALL
+    SELECT
+        CASE WHEN is_accepted THEN 'goal_accepted' ELSE 'goal_rejected' END, 'goal',
+        'request_sent', goal_id, 'request_taken', goal_id, false
+    FROM analysed.main.goal
+    WHERE is_accepted IS NOT NULL
+    UNION ALL
+    SELECT
+        'goal_result', 'result', 'request_sent', goal_id, 'request_sent', result_request_id,
+        is_loss_affected
+    FROM analysed.main.goal
+    WHERE result_request_id IS NOT NULL
+    UNION ALL
+    SELECT
+        'goal_message', m.label, 'request_sent', g.goal_id, 'publication', b.publication_id,
+        g.is_loss_affected
+    FROM (
+        SELECT goal_id, action_server_id, 'feedback' AS label, first_feedback_ns AS at_ns
+        FROM analysed.main.goal
+        UNION
+        SELECT goal_id, action_server_id, 'feedback', last_feedback_ns FROM analysed.main.goal
+        UNION
+        SELECT goal_id, action_server_id, 'cancel', cancel_accepted_ns FROM analysed.main.goal
+    ) AS m
+    JOIN analysed.main.goal AS g ON m.goal_id = g.goal_id
+    JOIN analysed.main.action_server AS s ON g.action_server_id = s.action_server_id
+    JOIN analysed.main.publication AS b
+        ON m.at_ns = b.start_ns
+        AND CASE m.label WHEN 'cancel' THEN s.status_publisher_id ELSE s.feedback_publisher_id END
+        = b.publisher_id
     UNION ALL
     SELECT 'request', 'request', 'request_sent', request_id, 'request_taken', request_id, false
     FROM analysed.store.request

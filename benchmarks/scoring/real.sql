@@ -19,13 +19,13 @@ JOIN analysed.store.host AS h ON p.host_id = h.host_id;
 
 -- Runs of callbacks: number `n` of its node, and the message, request or response that it got.
 CREATE OR REPLACE TEMP TABLE truth_callback AS
-SELECT node || ' ' || n AS callback, kind, name, id, node, pid, tid, t0
+SELECT node || ' ' || n AS callback, kind, name, id, node, pid, tid, t0, accepted
 FROM truth_row
 WHERE k = 'callback';
 
 CREATE OR REPLACE TEMP TABLE truth_sent AS
 SELECT
-    k, topic, id::VARCHAR AS message, pid, tid, t0, t1, causes,
+    k, topic, id, id::VARCHAR AS message, pid, tid, t0, t1, causes, goal,
     node || ' ' || cb AS callback, topic || ' ' || id AS sent
 FROM truth_row
 WHERE k IN ('publication', 'request', 'response')
@@ -134,11 +134,53 @@ link AS (
     JOIN traced AS t ON s.pid = t.pid
     WHERE c.kind = 'client'
     UNION ALL
+    SELECT
+        CASE WHEN accepted THEN 'goal_accepted' ELSE 'goal_rejected' END, 'request_sent',
+        name || ' ' || id, 'request_taken', callback
+    FROM truth_callback
+    WHERE accepted IS NOT NULL
+    UNION ALL
+    SELECT
+        'goal_result', 'request_sent', replace(topic, 'get_result', 'send_goal') || ' ' || id,
+        'request_sent', sent
+    FROM truth_sent
+    WHERE topic LIKE '%/\_action/get_result' ESCAPE '\'
+    UNION ALL
+    SELECT
+        'goal_message', 'request_sent', replace(topic, 'feedback', 'send_goal') || ' ' || goal,
+        'publication', sent
+    FROM truth_sent
+    WHERE goal IS NOT NULL
+    UNION ALL
     SELECT 'take_adjacent', 'take', s.callback, 'publication', s.sent
     FROM truth_sent AS s
     JOIN truth_callback AS c ON s.callback = c.callback
     ANTI JOIN traced AS t ON s.pid = t.pid
     WHERE s.k = 'publication' AND c.kind = 'sub'
+),
+-- A goal of an action from its acceptance to its result.
+goal AS (
+    SELECT
+        a.name, a.name || ' ' || a.id AS sent, a.id, a.t0 AS accepted_ns, min(r.t0) AS finished_ns
+    FROM truth_callback AS a
+    LEFT JOIN truth_callback AS r
+        ON r.kind = 'client' AND a.name = replace(r.name, 'get_result', 'send_goal')
+        AND a.name <> r.name AND a.id = r.id
+    WHERE a.accepted
+    GROUP BY ALL
+),
+-- Whose feedback it is, is said of the first and last message, if no other goal was accepted
+-- meanwhile.
+first_and_last AS (
+    SELECT unnest([arg_min(s.sent, s.t0), arg_max(s.sent, s.t0)]) AS sent
+    FROM goal AS g
+    JOIN truth_sent AS s
+        ON g.name = replace(s.topic, 'feedback', 'send_goal') AND g.id = s.goal
+    ANTI JOIN goal AS o
+        ON g.name = o.name AND g.id <> o.id
+        AND o.accepted_ns < coalesce(g.finished_ns, o.accepted_ns + 1)
+        AND coalesce(o.finished_ns > g.accepted_ns, true)
+    GROUP BY g.sent
 )
 -- Before Kilted, services have no events but those of callbacks.
 SELECT
@@ -146,6 +188,12 @@ SELECT
     r.is_whole AND (
         l.kind IN ('transport', 'direct', 'take_adjacent')
         OR EXISTS (FROM analysed.store.request)
+    ) AND (
+        l.kind <> 'goal_message' OR l.to_id IN (FROM first_and_last)
+    -- In rclpy, it may take the client to know.
+    ) AND (
+        l.kind <> 'goal_accepted'
+        OR l.from_id IN (SELECT from_id FROM link WHERE kind = 'goal_result')
     ) AS is_decided
 FROM link AS l
 CROSS JOIN recording AS r;

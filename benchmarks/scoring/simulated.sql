@@ -47,6 +47,9 @@ WITH happened AS (
     SELECT 'response_taken', request_id, client_host, client_pid, client_tid,
         'ros2:rmw_take_response', taken_ns
     FROM simulated_response
+    UNION ALL
+    SELECT 'user_event', user_event_id, host, pid, tid, name, at_ns
+    FROM simulated_user_event
 ),
 declared AS (
     SELECT DISTINCT event FROM simulated_declared
@@ -341,6 +344,53 @@ doubtful_call AS (
         ON e.host = h.host AND coalesce(e.pid = h.pid, true)
         AND t.ts_ns < h.end_ns AND e.ts_ns > h.begin_ns
 ),
+-- Goals of actions, from the answer to the request for the result on the side of the client, and to
+-- the result at the server.
+goal AS (
+    SELECT
+        g.*, q.service_name, q.client_handle, q.client_pid, q.client_host,
+        q.service_host, q.service_pid, a.taken_ns AS answer_taken_ns, a.sent_ns AS answered_ns,
+        k.sent_ns AS asked_ns, r.sent_ns AS result_sent_ns
+    FROM simulated_goal AS g
+    JOIN simulated_request AS q ON g.goal_id = q.request_id
+    LEFT JOIN simulated_response AS a ON g.goal_id = a.request_id
+    LEFT JOIN simulated_request AS k ON g.result_request_id = k.request_id
+    LEFT JOIN simulated_response AS r ON g.result_request_id = r.request_id
+),
+-- What is said of goals needs all of the trace. Others of the client, which had not asked, or of the
+-- server are in doubt.
+doubtful_goal AS (
+    SELECT
+        g.goal_id,
+        bool_or(
+            g.client_handle = o.client_handle AND g.client_host = o.client_host
+            AND g.client_pid = o.client_pid AND o.answer_taken_ns < coalesce(g.asked_ns, 0)
+            AND coalesce(o.asked_ns > g.answer_taken_ns, true)
+            AND g.result_request_id NOT IN (
+                SELECT sent_request_id FROM simulated_link_call WHERE sent_request_id IS NOT NULL
+            )
+        ) AS is_result_doubtful,
+        bool_or(
+            coalesce(o.answered_ns < g.result_sent_ns, true)
+            AND coalesce(o.result_sent_ns > g.answered_ns, true)
+        ) AS is_message_doubtful
+    FROM goal AS g
+    JOIN goal AS o
+        ON g.goal_id <> o.goal_id AND g.service_name = o.service_name AND o.is_accepted
+    GROUP BY g.goal_id
+),
+-- The first and the last message of feedback, and the status where it is cancelled.
+goal_message AS (
+    SELECT
+        m.goal_id, m.publication_id,
+        m.publication_id IN (
+            min(m.publication_id) OVER (PARTITION BY m.goal_id, b.topic_name),
+            max(m.publication_id) OVER (PARTITION BY m.goal_id, b.topic_name)
+        ) AS is_outer,
+        b.topic_name LIKE '%/feedback' AS is_feedback
+    FROM simulated_goal_message AS m
+    JOIN simulated_publication AS b ON m.publication_id = b.publication_id
+),
 -- Who is annotated says so once, by handles.
 untold_process AS (
     FROM unknown_process
@@ -431,6 +481,18 @@ JOIN recorded AS p ON p.kind = 'publication' AND c.publication_id::VARCHAR = p.i
 JOIN recorded AS t ON t.kind = 'take' AND c.take_id::VARCHAR = t.id
 WHERE c.callback_instance_id IS NULL
 UNION ALL
+SELECT 'user_event', kind, id, kind, id, is_any, NULL
+FROM recorded
+WHERE kind = 'user_event'
+UNION ALL
+SELECT
+    'recorded_in', 'callback_instance', u.callback_instance_id::VARCHAR, 'user_event',
+    u.user_event_id::VARCHAR, r.is_any AND w.id IS NOT NULL, NULL
+FROM simulated_user_event AS u
+JOIN recorded AS r ON r.kind = 'user_event' AND u.user_event_id::VARCHAR = r.id
+LEFT JOIN whole_callback AS w ON u.callback_instance_id::VARCHAR = w.id
+WHERE u.callback_instance_id IS NOT NULL
+UNION ALL
 -- What a thread turned to before or meanwhile may be missing.
 SELECT
     'link_call', t.kind, t.id, e.kind, e.id,
@@ -438,6 +500,34 @@ SELECT
 FROM call AS c
 JOIN recorded AS t ON c.taken_kind = t.kind AND c.taken_id = t.id
 JOIN recorded AS e ON c.sent_kind = e.kind AND c.sent_id = e.id
+UNION ALL
+SELECT
+    CASE WHEN g.is_accepted THEN 'goal_accepted' ELSE 'goal_rejected' END, s.kind, s.id, t.kind,
+    t.id, s.is_any AND t.is_any AND NOT EXISTS (FROM truth_hole), NULL
+FROM goal AS g
+JOIN recorded AS s ON s.kind = 'request_sent' AND g.goal_id::VARCHAR = s.id
+JOIN recorded AS t ON t.kind = 'request_taken' AND g.goal_id::VARCHAR = t.id
+WHERE g.is_accepted IS NOT NULL
+UNION ALL
+SELECT
+    'goal_result', s.kind, s.id, t.kind, t.id,
+    s.is_any AND t.is_any AND NOT EXISTS (FROM truth_hole)
+    AND NOT coalesce(d.is_result_doubtful, false),
+    NULL
+FROM goal AS g
+JOIN recorded AS s ON s.kind = 'request_sent' AND g.goal_id::VARCHAR = s.id
+JOIN recorded AS t ON t.kind = 'request_sent' AND g.result_request_id::VARCHAR = t.id
+LEFT JOIN doubtful_goal AS d ON g.goal_id = d.goal_id
+UNION ALL
+SELECT
+    'goal_message', s.kind, s.id, t.kind, t.id,
+    s.is_any AND t.is_any AND m.is_feedback AND m.is_outer AND NOT EXISTS (FROM truth_hole)
+    AND NOT coalesce(d.is_message_doubtful, false),
+    NULL
+FROM goal_message AS m
+JOIN recorded AS s ON s.kind = 'request_sent' AND m.goal_id::VARCHAR = s.id
+JOIN recorded AS t ON t.kind = 'publication' AND m.publication_id::VARCHAR = t.id
+LEFT JOIN doubtful_goal AS d ON m.goal_id = d.goal_id
 UNION ALL
 SELECT
     split_part(s.kind, '_', 1), s.kind, s.id, t.kind, t.id, s.is_any AND t.is_any,

@@ -122,8 +122,8 @@ def perfetto(
     """Write a run as a trace for the Perfetto UI (ui.perfetto.dev, in the browser).
 
     Each thread is a track with its callbacks, publications, takes, requests and
-    responses. Also: executor states, arrows for all links, gaps, and counters for
-    rates and for messages not yet taken.
+    responses. Also: executor states, arrows for all links, gaps, events of your own
+    tracepoints, and counters for rates and for messages not yet taken.
 
     Needs the package perfetto: pip install perfetto, or in a checkout '.\\[perfetto]'.
     """
@@ -133,9 +133,10 @@ def perfetto(
     with Database(database, memory_limit=memory_limit) as opened:
         trace = opened.export_perfetto(output, **asdict(part))
     print_runs([trace.run])
+    own = f", {count(trace.events, 'event')} of your own" if trace.events else ""
     print_status(
         f"{count(trace.slices, 'slice')}, {count(trace.arrows, 'arrow')},"
-        f" {count(trace.values, 'value')} of counters written to {output}:"
+        f" {count(trace.values, 'value')} of counters{own} written to {output}:"
         " open it at ui.perfetto.dev"
     )
 

@@ -107,6 +107,14 @@ def ingest(
         list[str] | None,
         typer.Option("--ignore", metavar="PATTERN", help="Skip events with these names"),
     ] = None,
+    events: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--events",
+            metavar="PATTERN",
+            help="Also load events of your own tracepoints, as msgflow ingest does",
+        ),
+    ] = None,
     quiet: Annotated[
         bool, typer.Option("--quiet", "-q", help="Print only errors, and what did not go in")
     ] = False,
@@ -129,6 +137,7 @@ def ingest(
         "reader": reader.value,
         "strict": strict,
         "ignore": ignore or [],
+        "events": events or [],
         "clock_sync": clock_sync,
     }
     options = Options(

@@ -88,6 +88,15 @@ def command(
             help="Skip events with these names, such as 'dds:*'; may be repeated",
         ),
     ] = None,
+    events: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--events",
+            metavar="PATTERN",
+            help="Also load events of your own tracepoints with these names, such as 'my_pkg:*',"
+            " into user_event; may be repeated",
+        ),
+    ] = None,
     memory_limit: Annotated[
         str | None,
         memory_limit_option(
@@ -122,6 +131,7 @@ def command(
                 reader=reader.value,
                 strict=strict,
                 ignore=ignore or [],
+                events=events or [],
                 progress=progress,
             )
         if not quiet:

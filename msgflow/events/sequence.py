@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import duckdb
 import pyarrow as pa
 
-from msgflow.events.values import exact, printable, readable
+from msgflow.events.values import printable, readable
+from msgflow.sql.json_fields import column_name, json_fields
 from msgflow.sql.quoting import literal
 from msgflow.trace import COMMON_SCHEMA
 from msgflow.trace.columns import BASE
@@ -37,11 +38,6 @@ COLUMNS = (
 """The columns that events of every name have, where a format has columns."""
 
 _WITHOUT = -1
-
-
-def column_name(position: int) -> str:
-    """Return the name in SQL of the payload column at this position."""
-    return f"payload_{position}"
 
 
 class Sequencer:
@@ -128,12 +124,12 @@ def text_line(name: str, payload: pa.Schema) -> str:
 def json_line(name: str, payload: pa.Schema) -> str:
     """Render an event as a JSON object."""
     members = ", ".join(f"'{column}', {_common(column, name)}" for column in COLUMNS)
-    return f"CAST(json_object({members}, 'fields', {_json_fields(payload)}) AS VARCHAR) AS line"
+    return f"CAST(json_object({members}, 'fields', {json_fields(payload)}) AS VARCHAR) AS line"
 
 
 def json_column(name: str, payload: pa.Schema) -> str:
     """Render an event as `COLUMNS` and its fields as one column of JSON."""
-    return f"{common_columns(name)}, CAST({_json_fields(payload)} AS VARCHAR) AS fields"
+    return f"{common_columns(name)}, CAST({json_fields(payload)} AS VARCHAR) AS fields"
 
 
 def common_columns(name: str) -> str:
@@ -143,14 +139,6 @@ def common_columns(name: str) -> str:
 
 def _common(column: str, name: str) -> str:
     return literal(name) if column == "name" else column
-
-
-def _json_fields(payload: pa.Schema) -> str:
-    members = (
-        f"{literal(field.name)}, {exact(column_name(position), field.type)}"
-        for position, field in enumerate(payload)
-    )
-    return f"json_object({', '.join(members)})"
 
 
 def _is_hexadecimal(field: pa.Field) -> bool:

@@ -12,8 +12,8 @@ import pyarrow as pa
 
 from msgflow.errors import UsageError
 from msgflow.events.formats import EventFormat, table_writer
-from msgflow.events.sequence import COLUMNS, Sequencer, column_name, common_columns
-from msgflow.events.values import exact
+from msgflow.events.sequence import COLUMNS, Sequencer, common_columns
+from msgflow.sql.json_fields import column_name, exact
 from msgflow.sql.quoting import identifier
 
 if TYPE_CHECKING:

@@ -154,6 +154,12 @@ class _Painter:
         offset_ns = start_ns - self.zero_ns
         return f"{'+' if offset_ns >= 0 else ''}{format_duration(offset_ns)}"
 
+    def _event(self, event: Row) -> str:
+        """Return what the user's own code recorded in a callback instance, and when."""
+        times = f" {event['event_count']} times, first" if event["event_count"] > 1 else ""
+        at = self._time({"start_ns": event["first_ns"]})
+        return f"{_printable(event['name'])}{times} at {at}"
+
     def _name(self, item: Item, link: Row | None) -> str:
         node = item.node
         label, place = _printable(node["label"]), _printable(node["node"])
@@ -194,6 +200,7 @@ class _Painter:
             details.append(f"ran {format_duration(node['end_ns'] - node['start_ns'])}")
         elif node["kind"] == "publication" and node["end_ns"] is not None:
             details.append(_publishing(node))
+        details += map(self._event, node["user_events"] or ())
         for vertex in (item.take, node):
             if vertex is not None and vertex["missing"] == "copy":
                 details.append("copy of a message within the process")

@@ -31,6 +31,7 @@ _NODE = (
     "busy_min_ns",
     "busy_max_ns",
     "until_ns",
+    "user_events",
 )
 _STATE = ("missing", "reason", "cut_count", "internal_count")
 NOT_TAKEN = "not_taken"
@@ -48,7 +49,8 @@ class FlowVertices:
         run: its run.
         table: the rows of `main.flow_step`, nearest to the start first, with the bounds of
             `main.executor_wait` for how long the executor was busy (busy_min_ns, busy_max_ns), and
-            when the thread of a publication went on at the latest (until_ns).
+            when the thread of a publication went on at the latest (until_ns), and the user's events
+            in a callback instance: name, event_count, first_ns (user_events).
         notes: what the rows do not say, a sentence each.
     """
 

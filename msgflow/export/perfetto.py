@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ _IDENTITIES = (
     "response_id",
     "executor_id",
 )
+_LARGEST_INTEGER = 2**63 - 1
 _SYMBOL = len(_IDENTITIES) + 1
 _CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
 
@@ -47,6 +49,7 @@ class PerfettoTrace:
         arrows: links between them.
         values: values of counters.
         gaps: stretches of a host in which something was not recorded.
+        events: events of the user's own tracepoints.
     """
 
     path: Path
@@ -55,6 +58,7 @@ class PerfettoTrace:
     arrows: int
     values: int
     gaps: int
+    events: int
 
 
 def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slice) -> PerfettoTrace:
@@ -84,7 +88,8 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
         slices, arrows = writer.slices()
         values = writer.values()
         gaps = writer.gaps()
-    return PerfettoTrace(path, run, slices, arrows, values, gaps)
+        events = writer.user_events()
+    return PerfettoTrace(path, run, slices, arrows, values, gaps, events)
 
 
 class _Writer:
@@ -233,3 +238,35 @@ class _Writer:
             )
             count += 1
         return count
+
+    def user_events(self) -> int:
+        """Write the user's events with their fields as arguments; return how many."""
+        count = 0
+        for row in self.rows("perfetto_event"):
+            packet = self.event(row, self.packets.TrackEvent.TYPE_INSTANT)
+            event = packet.track_event
+            event.name = row["name"]
+            event.categories.append("user_event")
+            event.debug_annotations.add(name="user_event_id", int_value=row["id"])
+            for name, value in json.loads(row["fields"]).items():
+                _add_argument(event, name, value)
+            self.builder.write_packet(packet)
+            count += 1
+        return count
+
+
+def _add_argument(event: Any, name: str, value: Any) -> None:
+    argument = event.debug_annotations.add(name=name)
+    match value:
+        case bool():
+            argument.bool_value = value
+        case int() if value > _LARGEST_INTEGER:
+            argument.uint_value = value
+        case int():
+            argument.int_value = value
+        case float():
+            argument.double_value = value
+        case str():
+            argument.string_value = value
+        case _:
+            argument.legacy_json_value = json.dumps(value)

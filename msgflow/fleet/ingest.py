@@ -42,7 +42,7 @@ class Options:
     """Options for all recordings.
 
     Attributes:
-        ingest: options of the ingest: reader, strict, ignore, clock_sync.
+        ingest: options of the ingest: reader, strict, ignore, events, clock_sync.
         views: also write the public views.
         database: also write the database.
         replace: ingest recordings again that the lake has already.

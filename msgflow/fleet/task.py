@@ -49,7 +49,7 @@ class Task:
         index: number of the recording in the call.
         source: address of the recording.
         lake: address of the lake.
-        options: of the ingest: reader, strict, ignore, clock_sync.
+        options: of the ingest: reader, strict, ignore, events, clock_sync.
         views: write the public views.
         database: write the database.
         timeout: most seconds.

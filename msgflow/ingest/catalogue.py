@@ -166,6 +166,16 @@ class Tracepoint:
         return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
 
 
+USER_EVENT = Tracepoint(
+    name="user_event",
+    description="An event of the user's own programs, of any name.",
+    fields=(Field("name", "VARCHAR"), Field("fields", "VARCHAR")),
+    predecessors=(Predecessor("call", Origin.EVENT_ID),),
+)
+"""What is staged of events that the user asks for, whatever they are called: their name, and their
+fields as JSON. Behind a gap they tell, as calls do, that the thread went on."""
+
+
 @dataclass(frozen=True)
 class Catalogue:
     """All tracepoints.
@@ -175,6 +185,11 @@ class Catalogue:
     """
 
     tracepoints: Mapping[str, Tracepoint]
+
+    @cached_property
+    def staged(self) -> Mapping[str, Tracepoint]:
+        """What has a staging table, by name: all tracepoints, and `USER_EVENT`."""
+        return {**self.tracepoints, USER_EVENT.name: USER_EVENT}
 
     @cached_property
     def in_traces(self) -> Mapping[str, Tracepoint]:
@@ -187,8 +202,8 @@ class Catalogue:
 
     @property
     def of_threads(self) -> tuple[Tracepoint, ...]:
-        """Those that happen in a thread of a process: all but the kernel's."""
-        return tuple(t for t in self.tracepoints.values() if not t.is_kernel)
+        """What is staged of threads of processes: all but the kernel's tracepoints."""
+        return tuple(t for t in self.staged.values() if not t.is_kernel)
 
     @property
     def sequences(self) -> tuple[str, ...]:

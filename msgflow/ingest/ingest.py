@@ -106,6 +106,7 @@ def ingest(
     reader: str = "auto",
     strict: bool = False,
     ignore: Sequence[str] = (),
+    events: Sequence[str] = (),
     memory_limit: str | None = None,
     progress: Callable[[IngestProgress], None] | None = None,
 ) -> IngestReport:
@@ -129,6 +130,8 @@ def ingest(
         reader: which reader to use: 'auto', 'msgflow' or 'bt2'.
         strict: refuse a trace at its first damage, instead of keeping what is good.
         ignore: patterns of event names that are not loaded, such as 'dds:*'.
+        events: patterns of names of the user's own events, such as 'my_pkg:*': they become rows of
+            `user_event`.
         memory_limit: most memory that the database takes, such as '4GB'; when None a quarter of
             that of the machine, at least 500 MB and at most 4 GB.
         progress: called every now and then.
@@ -184,6 +187,7 @@ def ingest(
                         traces,
                         hostnames=hostnames,
                         ignore=ignore,
+                        events=events,
                         may_hold=not target.is_new,
                         replace=replace,
                         interrupts=interrupts,
@@ -191,7 +195,7 @@ def ingest(
                     )
                 refusals.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
-                events = sum(loaded.event_counts.values())
+                event_count = sum(loaded.event_counts.values())
                 run = interruptible(
                     con,
                     lambda: _write(
@@ -208,7 +212,7 @@ def ingest(
                 watch.enter("closing the database")
                 staging.leave(con)
                 warnings = _finished(con, database, target)
-        return IngestReport(*run, events, watch.finish(), warnings)
+        return IngestReport(*run, event_count, watch.finish(), warnings)
 
 
 def _finished(con: duckdb.DuckDBPyConnection, database: Path, target: _Target) -> tuple[str, ...]:

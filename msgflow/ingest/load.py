@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fnmatch
 import itertools
 import time
 from dataclasses import dataclass
@@ -13,9 +12,11 @@ import pyarrow as pa
 
 from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
-from msgflow.ingest.catalogue import load
+from msgflow.ingest.catalogue import USER_EVENT, load
+from msgflow.ingest.event_patterns import is_match, matches
 from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
+from msgflow.ingest.user_events import names_of, user_rows
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace.prefetch import Prefetch
@@ -57,6 +58,7 @@ def load_traces(
     *,
     hostnames: Mapping[int, str],
     ignore: Sequence[str],
+    events: Sequence[str] = (),
     may_hold: bool,
     replace: bool,
     interrupts: Interrupts,
@@ -69,6 +71,7 @@ def load_traces(
         traces: what to read.
         hostnames: trace index -> name of the host, where the user gave one.
         ignore: patterns of event names to leave out, such as 'dds:*'.
+        events: patterns of the user's event names to load, such as 'my_pkg:*'.
         may_hold: the current database may hold some of these packets already.
         replace: packets that the database holds already are no error.
         interrupts: asked at every batch.
@@ -80,11 +83,13 @@ def load_traces(
         KeyboardInterrupt: Ctrl-C came.
     """
     catalogue = load()
-    wanted = {
+    user_names = {n for n in names_of(events, traces.traces) if not is_match(n, ignore)}
+    wanted: dict[str, pa.Schema | None] = {
         name: schema
         for name, schema in catalogue.arrow_schemas().items()
-        if not _is_ignored(name, ignore)
+        if not is_match(name, ignore)
     }
+    wanted |= dict.fromkeys(user_names)
     sources = _sources(traces.traces, hostnames)
     for source in sources:
         con.execute(f"INSERT INTO staging.source VALUES ({', '.join('?' * len(source))})", source)
@@ -101,9 +106,11 @@ def load_traces(
         batches = traces.batches(wanted, progress=report)
         implausible = ImplausibleValues()
         sequences = Sequences(catalogue, _hosts(sources))
-        with transaction(con):
+        with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
-            placed = Prefetch(lambda: _placed(batches, sequences, corrections, implausible), 1)
+            placed = Prefetch(
+                lambda: _placed(batches, sequences, corrections, implausible, beside), 1
+            )
             with contextlib.closing(placed):
                 for item in placed.items():
                     interrupts.check()
@@ -122,7 +129,7 @@ def load_traces(
         [
             [trace_index for trace_index, _ in traces.event_counts],
             [name for _, name in traces.event_counts],
-            [name in catalogue.in_traces for _, name in traces.event_counts],
+            [name in catalogue.in_traces or name in user_names for _, name in traces.event_counts],
             list(traces.event_counts.values()),
         ],
     )
@@ -142,8 +149,11 @@ def load_traces(
                 damage.message,
             ],
         )
-    for match in _ignored_events(ignore, traces.event_counts):
+    for match in matches(ignore, traces.event_counts):
         con.execute("INSERT INTO staging.ignored VALUES (?, ?, ?)", match)
+    for place, pattern, name in matches(events, traces.event_counts):
+        asked = [place, pattern, name, name in user_names]
+        con.execute("INSERT INTO staging.asked VALUES (?, ?, ?, ?)", asked)
     for left_out in implausible.rows():
         con.execute("INSERT INTO staging.implausible VALUES (?, ?, ?, ?)", left_out)
     if traces.duplicate_packet_count:
@@ -160,8 +170,12 @@ def _placed(
     sequences: Sequences,
     corrections: Corrections | None,
     implausible: ImplausibleValues,
+    beside: duckdb.DuckDBPyConnection,
 ) -> Iterator[Placed | tuple[str, pa.RecordBatch]]:
-    """Yield the events of all batches, round by round, and (table, rows) of packets and kernel."""
+    """Yield the events of all batches, round by round, and (table, rows) of packets and kernel.
+
+    Nothing else uses the connection `beside` meanwhile.
+    """
     tracepoints = load().in_traces
     for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
         events = []
@@ -169,13 +183,17 @@ def _placed(
             if batch.name == PACKET:
                 yield PACKET, batch.batch
                 continue
-            if tracepoints[batch.name].is_kernel:
-                yield without_thread(tracepoints[batch.name], batch.batch)
+            tracepoint = tracepoints.get(batch.name, USER_EVENT)
+            if tracepoint.is_kernel:
+                yield without_thread(tracepoint, batch.batch)
                 continue
-            rows = implausible.without(batch.name, batch.batch)
+            if tracepoint is USER_EVENT:
+                rows = user_rows(beside, batch.name, batch.batch)
+            else:
+                rows = implausible.without(batch.name, batch.batch)
             rows = rows if corrections is None else corrections.applied(rows)
             if rows.num_rows:
-                events.append((tracepoints[batch.name].name, rows))
+                events.append((tracepoint.name, rows))
         if events:
             yield sequences.place(events)
 
@@ -214,26 +232,6 @@ def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
     """Number the hosts of traces: (clock, hostname), see `schema/model/identity/host.sql`."""
     numbers: dict[tuple[object, object], int] = {}
     return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
-
-
-def _is_ignored(name: str, patterns: Sequence[str]) -> bool:
-    """Tell whether a name of events matches one of the patterns, such as 'dds:*'."""
-    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
-
-
-def _ignored_events(
-    patterns: Sequence[str], counts: Mapping[tuple[int, str], int]
-) -> Iterator[tuple[int, str, str | None]]:
-    """Yield (place, pattern, event) for each event that a pattern matches, else with None.
-
-    Args:
-        patterns: patterns of the event names to leave out.
-        counts: (trace index, event name) -> events that occurred.
-    """
-    occurred = sorted({name for (_, name), count in counts.items() if count})
-    for place, pattern in enumerate(dict.fromkeys(patterns)):
-        matching = [name for name in occurred if _is_ignored(name, [pattern])]
-        yield from ((place, pattern, name) for name in matching or (None,))
 
 
 class ImplausibleValues:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.ingest.catalogue import load
+from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.resources import resource_directory
 from msgflow.sql.statement import Statements
 from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
@@ -160,11 +160,20 @@ def statements() -> Statements:
 
 
 def _events() -> str:
-    return " UNION ALL ".join(
-        f"SELECT event_id, ts_ns, trace_index, cpu_id, thread_index, {number} AS tracepoint "
-        f"FROM raw.{tracepoint.table}"
-        for number, tracepoint in enumerate(load().of_threads)
+    of_threads = load().of_threads
+    columns = "event_id, ts_ns, trace_index, cpu_id, thread_index"
+    known = [
+        f"SELECT {columns}, {number} AS tracepoint FROM raw.{tracepoint.table}"
+        for number, tracepoint in enumerate(of_threads)
+        if tracepoint is not USER_EVENT
+    ]
+    # One table has the user's events of all names: each name is a tracepoint of its own.
+    user = (
+        f"SELECT {columns}, {len(of_threads)} + n.number FROM raw.{USER_EVENT.table} JOIN (SELECT "
+        "name, row_number() OVER (ORDER BY name) AS number FROM (SELECT DISTINCT name FROM "
+        f"raw.{USER_EVENT.table})) AS n USING (name)"
     )
+    return " UNION ALL ".join([*known, user])
 
 
 def _process(

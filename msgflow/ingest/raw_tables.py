@@ -72,9 +72,9 @@ class RawTables:
         self.add("thread", item.threads)
         self.add("thread_name", item.thread_names)
         self.add("cpu_return", item.cpu_returns)
-        tracepoints = load().tracepoints
+        staged = load().staged
         for name, rows in item.batches:
-            self.add(tracepoints[name].table, rows)
+            self.add(staged[name].table, rows)
 
     def add(self, table: str, rows: pa.RecordBatch) -> None:
         """Add rows to a table.

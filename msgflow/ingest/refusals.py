@@ -84,7 +84,7 @@ def require_ros_events(
 
 
 def _ros_events(names: Sequence[str] | Mapping[str, int]) -> list[str]:
-    known = {tracepoint.name for tracepoint in load().of_threads}
+    known = {name for name, tracepoint in load().tracepoints.items() if not tracepoint.is_kernel}
     return [name for name in names if name in known]
 
 

@@ -90,18 +90,18 @@ class Sequences:
             catalogue: says which sequences and predecessors there are.
             hosts: trace index -> a number that traces of the same host share.
         """
-        self._tracepoints = catalogue.tracepoints
+        self._tracepoints = catalogue.staged
         self._labels = catalogue.labels
         self._label_texts = texts_to_arrow(catalogue.labels)
         self._label_of = {
             name: _NONE if t.label is None else self._labels.index(t.label)
-            for name, t in catalogue.tracepoints.items()
+            for name, t in catalogue.staged.items()
         }
         self._bits = {name: 1 << bit for bit, name in enumerate(catalogue.sequences)}
         self._threads = _Threads(hosts)
         asked = {
             (before.sequence, before.origin)
-            for tracepoint in catalogue.tracepoints.values()
+            for tracepoint in catalogue.staged.values()
             for before in tracepoint.predecessors
         }
         self._latest = {
@@ -113,8 +113,8 @@ class Sequences:
         """Give the events of one round their threads and predecessors.
 
         Args:
-            batches: (event name, batch) of all wanted events of the round, as the reader
-                delivers them.
+            batches: (name in `Catalogue.staged`, batch) of all wanted events of the round, as the
+                reader delivers them.
         """
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])

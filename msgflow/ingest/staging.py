@@ -3,15 +3,16 @@
 `raw` and `staging` are temporary database files. A database in memory would have to compress what
 it spills, and keep the beginning of each column of each row group. `raw` has one table per
 tracepoint, the packets, and the threads, all as read (`raw.cpu_return`: events of threads that
-changed their CPU twice faster than a thread can).
+changed their CPU twice faster than a thread can; `raw.user_event`: the user's events of all names).
 `staging` has `staging.source` (one row per trace), `staging.event_count`, `staging.declared`
 (tracepoints that were enabled in a trace, also if they never occurred), `staging.left_out` (events
 that another trace holds as well),
 `staging.ignored` (patterns of events to leave out, with the events that match, NULL if none does),
+`staging.asked` (patterns of the user's events to load, with the events that match, likewise),
 `staging.packet_read_once` (packets that a trace holds twice, or where it is NULL several traces),
 `staging.implausible` (values that were left out), `staging.damage`, `staging.event` (all events of
-known tracepoints but those of the kernel, without payload), `staging.predecessor` (the pointers
-from event to event), and the objects of `schema/model`.
+the user and of known tracepoints, but those of the kernel, without payload), `staging.predecessor`
+(the pointers from event to event), and the objects of `schema/model`.
 """
 
 from __future__ import annotations
@@ -77,6 +78,10 @@ _IGNORED_TABLE = """
 CREATE TABLE staging.ignored (place INTEGER, pattern VARCHAR, event VARCHAR)
 """
 
+_ASKED_TABLE = """
+CREATE TABLE staging.asked (place INTEGER, pattern VARCHAR, event VARCHAR, is_loaded BOOLEAN)
+"""
+
 _PACKET_READ_ONCE_TABLE = """
 CREATE TABLE staging.packet_read_once (trace_index INTEGER, packet_count BIGINT)
 """
@@ -115,10 +120,7 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
 def _tables() -> tuple[str, ...]:
     catalogue = load()
     return (
-        *(
-            each.create_table_sql("raw", catalogue.labels)
-            for each in catalogue.tracepoints.values()
-        ),
+        *(each.create_table_sql("raw", catalogue.labels) for each in catalogue.staged.values()),
         _PACKET_TABLE,
         _THREAD_TABLES,
         _SOURCE_TABLE,
@@ -126,6 +128,7 @@ def _tables() -> tuple[str, ...]:
         _DECLARED_TABLE,
         _LEFT_OUT_TABLE,
         _IGNORED_TABLE,
+        _ASKED_TABLE,
         _PACKET_READ_ONCE_TABLE,
         _IMPLAUSIBLE_TABLE,
         _DAMAGE_TABLE,
@@ -157,7 +160,7 @@ def empty(con: duckdb.DuckDBPyConnection) -> None:
 
 def event_tables() -> tuple[str, ...]:
     """Return the tables of `raw` that events are read into, without their schema."""
-    return tuple(tracepoint.table for tracepoint in load().tracepoints.values())
+    return tuple(tracepoint.table for tracepoint in load().staged.values())
 
 
 @contextlib.contextmanager

@@ -68,6 +68,9 @@ link_call — one row per publication, request or response that followed from a 
 response, without a callback that is traced:
     request_id (which was taken, or answered), is_response, publication_id, sent_request_id,
     answered_request_id (whose response was sent)
+user_event — one row per event of the user's own tracepoints (`Record`):
+    user_event_id, host, pid, tid, name, at_ns, callback_instance_id (the innermost callback inside
+    which it was recorded, else NULL), frame, score, label (its fields)
 lifecycle_transition — one row per change of state of a managed node:
     host, pid, tid, node, at_ns, start_state, goal_state
 end_to_end — one row per flow from a run of a timer's callback (one that uses no messages) to a
@@ -111,6 +114,7 @@ from msgflow.sim.entity import (
     Poll,
     Publish,
     Publisher,
+    Record,
     Service,
     Spin,
     Subscription,
@@ -137,6 +141,7 @@ __all__ = [
     "Process",
     "Publish",
     "Publisher",
+    "Record",
     "Recording",
     "Scenario",
     "Service",

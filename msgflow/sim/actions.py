@@ -1,4 +1,4 @@
-"""Actions of callbacks besides publishing: call a service, spin, take a message, change state."""
+"""Actions of callbacks besides publishing: call, send a goal, spin, poll, change state, record."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from msgflow.sim.callback_instance import CallbackInstance
-from msgflow.sim.entity import Answer, Call, Poll, Publish, Spin, Transition
+from msgflow.sim.entity import Answer, Call, Poll, Publish, Record, SendGoal, Spin, Transition
 from msgflow.sim.publication import publish
 from msgflow.sim.services import ClientObject, ServiceObject, answer, call
 from msgflow.sim.take import take
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from msgflow.sim.entity import Action
     from msgflow.sim.executor import Executor
     from msgflow.sim.executor_thread import ExecutorThread
+    from msgflow.sim.goals import ActionClientObject
     from msgflow.sim.machine import Steps
     from msgflow.sim.objects import PublisherObject, SubscriptionObject
     from msgflow.sim.transport import Middleware
@@ -47,6 +48,7 @@ class NodeObjects:
     publishers: dict[str, PublisherObject]
     clients: dict[str, ClientObject] = field(default_factory=dict)
     services: dict[str, ServiceObject] = field(default_factory=dict)
+    action_clients: dict[str, ActionClientObject] = field(default_factory=dict)
     polled: dict[str, SubscriptionObject] = field(default_factory=dict)
     lifecycle: Lifecycle | None = None
 
@@ -65,7 +67,7 @@ def _call(
     instance: CallbackInstance | None,
 ) -> Steps:
     client = objects.clients[action.service]
-    time = call(thread, client, time, instance)
+    time = call(thread, client, time, instance)[0]
     if action.spins is None:
         return time
     number = client.sequence_number
@@ -77,6 +79,18 @@ def _call(
             lambda: client.answered >= number,
         )
     )
+
+
+def _send_goal(
+    action: SendGoal,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    _: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    return objects.action_clients[action.action].send(thread, time, instance)
+    yield  # It takes no step, but is called as one that does.
 
 
 def _spin(
@@ -164,11 +178,33 @@ def _transition(
     yield  # It takes no step, but is called as one that does.
 
 
+def _record(
+    _: Record,
+    __: NodeObjects,
+    thread: ExecutorThread,
+    ___: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    machine, scheduler = thread.machine, thread.scheduler
+    number = next(scheduler.user_event_ids)
+    values = (number, number / 4, f"frame {number}")
+    thread.emit(machine.tracepoints.my_pkg_frame_done, time, thread.context, *values)
+    scheduler.truth.user_event.add(
+        number, machine.hostname, thread.process.pid, thread.tid, "my_pkg:frame_done",
+        time + machine.epoch, None if instance is None else instance.callback_instance_id, *values,
+    )  # fmt: skip
+    return time + 300
+    yield  # It takes no step, but is called as one that does.
+
+
 _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Call: _call,
+    SendGoal: _send_goal,
     Spin: _spin,
     Poll: _poll,
     Publish: _publish,
     Answer: _answer,
     Transition: _transition,
+    Record: _record,
 }

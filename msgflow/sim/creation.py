@@ -12,6 +12,15 @@ from msgflow.sim import entity, symbols
 from msgflow.sim.actions import Lifecycle, NodeObjects, deeds
 from msgflow.sim.entity import MICROSECOND
 from msgflow.sim.executor import CallbackGroup, Executor
+from msgflow.sim.goals import (
+    FEEDBACK,
+    SERVICES,
+    STATUS,
+    ActionClientObject,
+    ActionServerObject,
+    GoalThread,
+    name_of,
+)
 from msgflow.sim.intra_process import put
 from msgflow.sim.links import CallbackLinks, LinkObject
 from msgflow.sim.objects import (
@@ -38,6 +47,8 @@ ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"
 INTERNAL_TOPICS = frozenset({ROSOUT, PARAMETER_EVENTS})
 _WRITER, _READER = 3, 4
+# Those before it are of executors, the last one is the user's.
+_FIRST_GOAL_THREAD = 4
 
 
 @dataclass(slots=True)
@@ -150,9 +161,9 @@ class Creator:
         publisher = PublisherObject(
             self._process, node.description.full_name, topic, init_handle, handle, rmw_handle,
             memory.on_stack(),
-            is_rclcpp and self._process.is_rclcpp and description.kind != "serialized",
+            is_rclcpp and self._process.is_rclcpp and description.kind not in {"serialized", "rcl"},
             topic in INTERNAL_TOPICS, self.time, [], description, intra,
-            description.kind != "typed" and not self._is_every_kind_traced,
+            description.kind not in {"typed", "rcl"} and not self._is_every_kind_traced,
         )  # fmt: skip
         self.middleware.add_publisher(publisher)
         return publisher
@@ -263,7 +274,48 @@ class Creator:
         service.executor.waitables.append(service)
         self._network.add(service)
 
-    def client(self, node: NodeContext, description: entity.Client) -> None:
+    def action_server(self, node: NodeContext, description: entity.ActionServer) -> None:
+        """An action server, whose executor answers, and the threads that execute its goals."""
+        action = description.action
+        services = [
+            self.rcl_service(
+                node,
+                entity.Service(name_of(action, part), group=description.group, is_action=True),
+            )
+            for part in SERVICES
+        ]
+        feedback, status = (
+            self.publisher(node, entity.Publisher(name_of(action, part), kind="rcl"))
+            for part in (FEEDBACK, STATUS)
+        )
+        server = ActionServerObject(description, feedback, status)
+        for _ in range(description.threads):
+            number = _FIRST_GOAL_THREAD + self._process.goal_threads
+            self._process.goal_threads += 1
+            server.threads.append(
+                GoalThread(
+                    self._process, self._process.description.tid(number), server, services[-1],
+                    self.middleware,
+                )
+            )  # fmt: skip
+        for service in services:
+            service.action = server.answer
+            self.spin_service(service)
+
+    def action_client(self, node: NodeContext, description: entity.ActionClient) -> None:
+        """An action client."""
+        clients = {
+            part: self.client(
+                node, entity.Client(name_of(description.action, part), group=description.group)
+            )
+            for part in SERVICES
+        }
+        client = ActionClientObject(description, clients)
+        for each in clients.values():
+            each.action = client.answered
+        node.objects.action_clients[description.action] = client
+
+    def client(self, node: NodeContext, description: entity.Client) -> ClientObject:
         """A client."""
         self.work(250 * MICROSECOND)
         self.announce()
@@ -289,6 +341,7 @@ class Creator:
         node.objects.clients[name] = client
         self._network.add_client(client)
         executor.waitables.append(client)
+        return client
 
     def timer(self, node: NodeContext, description: entity.Timer) -> None:
         """A timer, which its executor calls."""

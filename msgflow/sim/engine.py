@@ -29,6 +29,7 @@ from msgflow.sim.truth import Truth
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from msgflow.sim.layout import Layout
     from msgflow.sim.recording import Recording
     from msgflow.sim.system import Host, Scenario
 
@@ -99,7 +100,7 @@ def simulate(
     identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}/{clock_drift_ppm!r}"
     length = int(chosen.duration_ns * factor)
     truth = Truth(target / "truth")
-    for event in layouts()[chosen.layout].events:
+    for event in _layout(chosen).events:
         for field in event.fields or (None,):
             truth.declared.add(event.name, None if field is None else field.name)
     scheduler = Scheduler(course, truth)
@@ -172,6 +173,12 @@ def _choose(scenario: str | Scenario, layout: str | None, recording: Recording |
             f"unknown layout — {scenario.layout}", f"choose one of {', '.join(layouts())}"
         )
     return scenario
+
+
+def _layout(scenario: Scenario) -> Layout:
+    """The layout of its traces, which have the user's own events only where there are any."""
+    layout = layouts()[scenario.layout]
+    return layout.with_own_events() if scenario.has_own_events else layout
 
 
 def _start(
@@ -259,7 +266,7 @@ def _machine(
     )
     recorder = Recorder(
         target / host.hostname,
-        layouts()[scenario.layout],
+        _layout(scenario),
         identity,
         host.cpu_count,
         recording,

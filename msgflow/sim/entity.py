@@ -48,6 +48,13 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
+class SendGoal:
+    """Send a goal to an action; the node has an action client of it."""
+
+    action: str
+
+
+@dataclass(frozen=True, slots=True)
 class Spin:
     """Spin an executor of the process inside the callback for `duration_ns`.
 
@@ -85,7 +92,12 @@ class Transition:
     """Take a managed node to its next state: configured, active, inactive, active, and so on."""
 
 
-Action = Call | Spin | Poll | Publish | Answer | Transition
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Record an event of a tracepoint of the user's own, `my_pkg:frame_done`."""
+
+
+Action = Call | SendGoal | Spin | Poll | Publish | Answer | Transition | Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +108,8 @@ class Publisher:
         topic: topic, fully expanded.
         depth: history depth.
         size_bytes: size of its messages.
-        kind: 'typed', 'generic', 'serialized' or 'loaned', which pass different layers.
+        kind: 'typed', 'generic', 'serialized', 'loaned' or 'rcl' (of an action server), which pass
+            different layers.
         intra_process: subscriptions of the process that want it get messages without DDS.
         transient_local: the last `depth` messages are kept for subscriptions that come late.
         lifespan_ns: a message that waits for longer cannot be taken any more.
@@ -240,4 +253,42 @@ class Client:
     service: str
     publishes: tuple[str, ...] = ()
     does: tuple[Action, ...] = ()
+    group: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ActionServer:
+    """An action server of a node.
+
+    Attributes:
+        action: name of the action.
+        feedback: messages that it publishes while it executes a goal.
+        period_ns: time between them; up to half of it more or less.
+        threads: goals that it executes side by side; others wait.
+        rejects: it rejects every so many goals of a client; 0: none.
+        group: see `Subscription`.
+    """
+
+    action: str
+    feedback: int = 3
+    period_ns: int = 5 * MILLISECOND
+    threads: int = 1
+    rejects: int = 0
+    group: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ActionClient:
+    """An action client of a node.
+
+    Attributes:
+        action: name of the action.
+        asks_at_once: it asks for the result once a goal is accepted; else before it sends the next.
+        cancels: it cancels every so many goals as soon as they are accepted; 0: none.
+        group: see `Subscription`.
+    """
+
+    action: str
+    asks_at_once: bool = True
+    cancels: int = 0
     group: str = ""

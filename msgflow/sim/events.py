@@ -30,6 +30,7 @@ class FieldKind(Enum):
     POINTER = ("Q", _POINTER)
     UNSIGNED = ("Q", "integer { size = 64; align = 8; signed = 0; encoding = none; base = 10; }")
     SIGNED = ("q", "integer { size = 64; align = 8; signed = 1; encoding = none; base = 10; }")
+    DOUBLE = ("d", "floating_point { exp_dig = 11; mant_dig = 53; align = 8; }")
     SIGNED_32 = ("i", "integer { size = 32; align = 8; signed = 1; encoding = none; base = 10; }")
     BYTES = ("s", _BYTE)
     PADDED = ("16s8x", _BYTE)
@@ -127,3 +128,8 @@ SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
         }.items()
     }
 )
+
+OWN_SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
+    {"my_pkg:frame_done": parse_fields("frame unsigned, score double, label string")}
+)
+"""Events of tracepoints of the user's own, which no release of ROS 2 has."""

@@ -11,7 +11,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from msgflow.sim.events import SIGNATURES, EventField, parse_fields
+from msgflow.sim.events import OWN_SIGNATURES, SIGNATURES, EventField, parse_fields
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,6 +76,11 @@ class Layout:
         named = {f"{provider}:{name}": parse_fields(text) for name, text in fields.items()}
         complete = {f"{provider}:{name}": SIGNATURES[f"{provider}:{name}"] for name in whole}
         return {event.name: event.fields for event in self.events} | complete | named
+
+    def with_own_events(self) -> Layout:
+        """The layout with the tracepoints of the user's own, after all others."""
+        own = tuple(EventType(name, fields) for name, fields in OWN_SIGNATURES.items())
+        return replace(self, events=(*self.events, *own))
 
 
 def _events(fields: Mapping[str, tuple[EventField, ...]]) -> tuple[EventType, ...]:

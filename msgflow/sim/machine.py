@@ -111,6 +111,7 @@ class RunningProcess:
         number: its number among all processes; `life` counts those of this id before it.
         memory: its addresses.
         threads: those that execute callbacks.
+        goal_threads: how many execute goals of actions.
         is_stopped: it has ended, or ends as soon as its threads have executed what they execute.
         is_stepwise: it may end in the middle of a callback.
     """
@@ -142,6 +143,7 @@ class RunningProcess:
             + bytes((random[0] ^ life, random[1]))
             + bytes((1, 0, 0, 0))
         )
+        self.goal_threads = 0
         self._entities = 0
 
     def gid(self, kind: int) -> bytes:

@@ -19,7 +19,7 @@ from msgflow.sim.ctf import (
     TraceWriter,
     thread_of,
 )
-from msgflow.sim.events import SIGNATURES
+from msgflow.sim.events import OWN_SIGNATURES, SIGNATURES
 from msgflow.sim.recording import Buffers, Recording
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Tracepoints:
     def __init__(self, layout: Layout) -> None:
         numbers = {event.name: number for number, event in enumerate(layout.events)}
         self._all: dict[str, Tracepoint] = {}
-        for name, signature in SIGNATURES.items():
+        for name, signature in {**SIGNATURES, **OWN_SIGNATURES}.items():
             number = numbers.get(name)
             fields = None if number is None else layout.events[number].fields
             tracepoint = Tracepoint(name, number or 0, signature, fields)

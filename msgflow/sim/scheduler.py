@@ -38,6 +38,7 @@ class Scheduler:
         self.take_ids = count()
         self.callback_instance_ids = count()
         self.request_ids = count()
+        self.user_event_ids = count()
         self.subscription_ids = count()
         self.end = 0
         self._agenda: list[tuple[int, int, Action, Any]] = []

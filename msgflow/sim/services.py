@@ -17,6 +17,8 @@ from msgflow.sim.machine import Run, settle
 from msgflow.sim.user_code import execute
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from msgflow.sim.executor import CallbackGroup, Executor
     from msgflow.sim.machine import RunningProcess, Steps, Thread
     from msgflow.sim.objects import UserCode
@@ -24,12 +26,15 @@ if TYPE_CHECKING:
     from msgflow.sim.transport import Middleware
     from msgflow.sim.truth import Truth
 
+    Answer = Callable[[Thread, Middleware, "ServiceObject", "Request", int], int]
+
 
 @dataclass(slots=True, eq=False)
 class Request:
     """A request and its response; `caller` is the callback instance that sent it.
 
-    Names in `_ns` are times on the clock of the host where it happened.
+    Names in `_ns` are times on the clock of the host where it happened. `goal` is that of an
+    action.
     """
 
     request_id: int
@@ -47,11 +52,32 @@ class Request:
     answered_ns: int | None = None
     received_tid: int | None = None
     received_ns: int | None = None
+    goal: Goal | None = None
+
+
+@dataclass(slots=True, eq=False)
+class Goal:
+    """A goal of an action: which of its client's it is, and what became of it.
+
+    `asking` asks for its result; `waiting` is that request while the server has none. `is_over`
+    when the result is there.
+    """
+
+    number: int
+    request: Request
+    is_accepted: bool = False
+    is_cancelled: bool = False
+    is_over: bool = False
+    asking: Request | None = None
+    waiting: Request | None = None
 
 
 @dataclass(slots=True, eq=False)
 class ServiceObject:
-    """A service as it exists in its process; `waiting` are requests without a response."""
+    """A service as it exists in its process.
+
+    `waiting` are requests without a response; `action` answers requests of an action.
+    """
 
     network: ServiceNetwork
     process: RunningProcess
@@ -66,6 +92,7 @@ class ServiceObject:
     code: UserCode
     is_deferred: bool = False
     is_answered_later: bool = False
+    action: Answer | None = None
     requests: deque[Request | None] = field(default_factory=deque)
     waiting: deque[Request] = field(default_factory=deque)
 
@@ -81,6 +108,7 @@ class ClientObject:
     Attributes:
         answered: number of the last response taken.
         responses: those that have come; None stands for one to another client of the service.
+        action: does what follows from a response of an action.
     """
 
     network: ServiceNetwork
@@ -96,6 +124,7 @@ class ClientObject:
     code: UserCode
     sequence_number: int = 0
     answered: int = 0
+    action: Callable[[Thread, Request, int], int] | None = None
     responses: deque[Request | None] = field(default_factory=deque)
 
     def is_ready(self, time: int) -> bool:
@@ -154,8 +183,10 @@ class ServiceNetwork:
         return time + latency.base + self._scheduler.tail(latency.tail)
 
 
-def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstance | None) -> int:
-    """Send a request; returns the time at which the call returns."""
+def call(
+    thread: Thread, client: ClientObject, time: int, cause: CallbackInstance | None
+) -> tuple[int, Request]:
+    """Send a request; returns the time at which the call returns, and the request."""
     random, machine = thread.scheduler.random, thread.machine
     client.sequence_number += 1
     sent = time + 400 + int(random() * 1_500)
@@ -172,7 +203,7 @@ def call(thread: Thread, client: ClientObject, time: int, cause: CallbackInstanc
             cause.request_id, cause.is_response, None, request.request_id, None
         )
     client.network.send_request(sent, request)
-    return sent + 2_000 + int(random() * 4_000)
+    return sent + 2_000 + int(random() * 4_000), request
 
 
 def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, time: int) -> Steps:
@@ -189,6 +220,8 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     )  # fmt: skip
     request.service, request.taken_tid, request.taken_ns = service, thread.tid, time + epoch
     start = time + 600 + int(random() * 1_500)
+    if service.action is not None:
+        return service.action(thread, middleware, service, request, start)
     if service.code.is_callback:
         request.callback_instance_id = next(thread.scheduler.callback_instance_ids)
         end = yield from settle(
@@ -199,12 +232,12 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
             )
         )  # fmt: skip
     else:
-        turn = _turn(thread, request, time, is_response=False)
-        end = yield from settle(execute(thread, middleware, service.code, start, turn))
+        now = turn(thread, request, time, is_response=False)
+        end = yield from settle(execute(thread, middleware, service.code, start, now))
     if service.is_answered_later:
         service.waiting.append(request)
         return end
-    return _respond(thread, service, request, end)
+    return respond(thread, service, request, end)
 
 
 def answer(
@@ -218,11 +251,13 @@ def answer(
         thread.scheduler.truth.link_call.add(
             cause.request_id, cause.is_response, None, None, request.request_id
         )
-    return _respond(thread, service, request, time)
+    return respond(thread, service, request, time)
 
 
-def _respond(thread: Thread, service: ServiceObject, request: Request, time: int) -> int:
-    random, machine = thread.scheduler.random, thread.machine
+def respond(thread: Thread, service: ServiceObject, request: Request, time: int) -> int:
+    """Send the response to a request; returns the time at which that is done."""
+    machine = thread.machine
+    random = thread.scheduler.random
     stamp = time + 300 + int(random() * 500)
     sent = stamp + 60 + int(random() * 300)
     request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + machine.epoch
@@ -256,11 +291,13 @@ def run_client(thread: Thread, middleware: Middleware, client: ClientObject, tim
     )  # fmt: skip
     request.received_tid, request.received_ns = thread.tid, time + machine.epoch
     client.answered = request.sequence_number
-    turn = _turn(thread, request, time, is_response=True)
-    return execute(thread, middleware, client.code, time + 1_000, turn)
+    if client.action is not None:
+        return client.action(thread, request, time + 1_000)
+    now = turn(thread, request, time, is_response=True)
+    return execute(thread, middleware, client.code, time + 1_000, now)
 
 
-def _turn(thread: Thread, request: Request, time: int, *, is_response: bool) -> CallbackInstance:
+def turn(thread: Thread, request: Request, time: int, *, is_response: bool) -> CallbackInstance:
     """What a thread does with what it took, without a callback that is traced."""
     return CallbackInstance(
         None, None, (), None, None, thread.tid, time,
@@ -288,4 +325,10 @@ def write_request(truth: Truth, request: Request) -> None:
             request.request_id, client.name, client.gid, request.sequence_number,
             request.stamp_ns, host, pid, request.answered_tid, request.answered_ns,
             client_host, client_pid, request.received_tid, request.received_ns,
+        )  # fmt: skip
+    goal = request.goal
+    if goal is not None and goal.request is request:
+        truth.goal.add(
+            request.request_id, None if request.answered_ns is None else goal.is_accepted,
+            None if goal.asking is None else goal.asking.request_id,
         )  # fmt: skip

@@ -210,6 +210,12 @@ class Startup:
             symbol = symbols.service_callback(description.name)
             creator.spin_service(creator.service(node, service, symbol))
             yield True
+        for server in description.action_servers:
+            creator.action_server(node, server)
+            yield True
+        for action_client in description.action_clients:
+            creator.action_client(node, action_client)
+            yield True
         for timer in description.timers:
             creator.timer(node, timer)
             yield True

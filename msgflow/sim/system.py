@@ -10,12 +10,17 @@ from dataclasses import dataclass
 from msgflow.errors import UsageError
 from msgflow.sim.entity import (
     SECOND,
+    Action,
+    ActionClient,
+    ActionServer,
     Answer,
     Call,
     Client,
     MessageLink,
     Publish,
     Publisher,
+    Record,
+    SendGoal,
     Service,
     Subscription,
     Timer,
@@ -72,7 +77,8 @@ class Node:
     Attributes:
         name: name without namespace.
         namespace: its namespace.
-        publishers: its publishers; likewise subscriptions, timers, services, clients.
+        publishers: its publishers; likewise subscriptions, timers, services, clients,
+            action_servers, action_clients.
         links: what its messages have to do with each other beyond single callbacks.
         groups: its callback groups besides the default one.
         executor: number of the executor that spins it.
@@ -87,6 +93,8 @@ class Node:
     timers: tuple[Timer, ...] = ()
     services: tuple[Service, ...] = ()
     clients: tuple[Client, ...] = ()
+    action_servers: tuple[ActionServer, ...] = ()
+    action_clients: tuple[ActionClient, ...] = ()
     links: tuple[MessageLink, ...] = ()
     groups: tuple[Group, ...] = ()
     executor: int = 0
@@ -210,6 +218,22 @@ class Scenario:
             _check_executors(process)
         _check_ids(self)
 
+    @property
+    def has_own_events(self) -> bool:
+        """Whether callbacks record events of tracepoints of the user's own."""
+        nodes = (node for process in self.processes for node in process.nodes)
+        return any(isinstance(action, Record) for node in nodes for action in _actions(node))
+
+
+def _actions(node: Node) -> list[Action]:
+    callbacks: tuple[Subscription | Timer | Service | Client, ...] = (
+        *node.subscriptions,
+        *node.timers,
+        *node.services,
+        *node.clients,
+    )
+    return [action for each in callbacks for action in each.does]
+
 
 def _check_ids(scenario: Scenario) -> None:
     """No thread has an id that another one has at the same time."""
@@ -267,7 +291,7 @@ def _check_topics(node: Node) -> None:
         *node.timers,
         *node.services,
     )
-    actions = [action for each in (*callbacks, *node.clients) for action in each.does]
+    actions = _actions(node)
     actions += [action for each in node.subscriptions for action in each.first]
     used = {topic for each in (*callbacks, *node.clients) for topic in each.publishes}
     used |= {action.topic for action in actions if isinstance(action, Publish)}
@@ -281,6 +305,10 @@ def _check_topics(node: Node) -> None:
     answers = {action.service for action in actions if isinstance(action, Answer)}
     if missing := sorted(answers ^ services):
         raise UsageError(f"a service that is answered later has one answer — {missing[0]}")
+    known = {client.action for client in node.action_clients}
+    goals = {action.action for action in actions if isinstance(action, SendGoal)}
+    if missing := sorted(goals - known):
+        raise UsageError(f"no action client of {', '.join(missing)} — node {node.full_name}")
     groups = {"", *(group.name for group in node.groups)}
     if missing := sorted({each.group for each in (*callbacks, *node.clients)} - groups):
         raise UsageError(f"no callback group {missing[0]} — node {node.full_name}")

@@ -92,9 +92,15 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
         service_host=_TEXT, service_pid=_NUMBER, service_tid=_NUMBER, sent_ns=_TIME,
         client_host=_TEXT, client_pid=_NUMBER, client_tid=_NUMBER, taken_ns=_TIME,
     ),
+    "goal": _schema(goal_id=_ID, is_accepted=_FLAG, result_request_id=_ID),
+    "goal_message": _schema(goal_id=_ID, publication_id=_ID),
     "link_call": _schema(
         request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID,
         answered_request_id=_ID,
+    ),
+    "user_event": _schema(
+        user_event_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, name=_TEXT, at_ns=_TIME,
+        callback_instance_id=_ID, frame=_COUNT, score=pa.float64(), label=_TEXT,
     ),
     "lifecycle_transition": _schema(
         host=_TEXT, pid=_NUMBER, tid=_NUMBER, node=_TEXT, at_ns=_TIME, start_state=_TEXT,

@@ -64,7 +64,6 @@ def write_flow_page(
     flow = run_page_query(connection, "flow", asked)
     ((count,),) = connection.execute(_COUNTS[direction], [kind, number]).fetchall()
     bars = flow.group_by(_BAR, use_threads=False).aggregate([])
-    bars = bars.sort_by([(name, "ascending") for name in ("row_key", "start_at", "kind", "id")])
     begin = compute.min(bars["start_at"]).as_py() or 0
     end = compute.max(compute.add(bars["start_at"], bars["length"])).as_py() or 0
     known = compute.is_valid(flow["from_id"])
@@ -72,6 +71,11 @@ def write_flow_page(
     window = Window(extent.origin_ns + begin - 1, extent.origin_ns + end + 1)
     rows = run_page_query(connection, "row", {"run": run.run_id})
     links = pages.links(connection, extent.frame(window), 2**40)
+    events = run_page_query(connection, "event", extent.frame(window))
+    instances = bars.filter(compute.equal(bars["kind"], 0))["id"]
+    events = events.filter(compute.is_in(events["id"], instances))
+    shown = pa.concat_tables([bars, events.select(bars.column_names).cast(bars.schema)])
+    shown = shown.sort_by([(name, "ascending") for name in ("row_key", "start_at", "kind", "id")])
     notes = []
     if count > bars.num_rows:
         notes.append(
@@ -81,13 +85,13 @@ def write_flow_page(
     parts = Parts()
     runs = run_page_query(connection, "run", {})
     parts.add("run", encode(runs.filter(compute.equal(runs["run_id"], run.run_id))))
-    parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], bars["row_key"]))))
+    parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], shown["row_key"]))))
     parts.add("gap?", pages.answer(connection, "gap", params))
     parts.add(
         f"critical?id={number}&kind={kind}",
         critical_path(connection, run, extent.origin_ns, kind, number),
     )
-    parts.add("detail?place=0", encode(bars))
+    parts.add("detail?place=0", encode(shown))
     parts.add("links?place=0", encode(_between(links, bars)))
     parts.add("edge?", encode(edges.rename_columns(["to_kind", "to_id", *edges.column_names[2:]])))
     pages.close()

@@ -302,7 +302,7 @@ class _Maker:
         return run_page_query(self.connection, "edge", self.extent.frame(window))
 
     def rows_on(self, paths: list[int]) -> list[int]:
-        """Return the rows of the timeline on some paths: their objects, timers and executors."""
+        """Return the rows of the timeline on some paths: objects, timers, events, executors."""
         chosen = run_page_query(self.connection, "path", {"run": self.extent.run.run_id})
         chosen = chosen.filter(compute.is_in(chosen["path_id"], pa.array(paths, pa.int64())))
         publishers = {one for several in chosen["publishers"].to_pylist() for one in several}
@@ -315,7 +315,7 @@ class _Maker:
             row["row_key"]
             for row in rows
             if row["row_key"] in keys
-            or (row["kind"] == "timer" and (row["process_id"], row["node"]) in nodes)
+            or (row["kind"] in ("timer", "event") and (row["process_id"], row["node"]) in nodes)
             or (row["kind"] == "thread" and row["process_id"] in processes)
         ]
 

@@ -12,7 +12,7 @@ CREATE OR REPLACE MACRO derive.flow_call(only_run) AS TABLE
 WITH caller AS (
     SELECT i.callback_instance_id, i.take_id
     FROM store.callback_instance AS i
-    SEMI JOIN store.link_request AS l ON i.callback_instance_id = l.callback_instance_id
+    SEMI JOIN derive.certain_request AS l ON i.callback_instance_id = l.callback_instance_id
     WHERE i.run_id = only_run
 ),
 taking AS (
@@ -34,12 +34,8 @@ published AS (
     WHERE l.run_id = only_run
     UNION ALL
     SELECT
-        run_id,
-        coalesce(
-            derive.vertex_key('request', taken_request_id),
-            derive.vertex_key('response', taken_response_id)
-        ),
-        NULL, taken_request_id, taken_response_id, publication_id, publisher_id, 'take_adjacent'
+        run_id, derive.vertex_key(from_kind, from_id), NULL, taken_request_id, taken_response_id,
+        publication_id, publisher_id, 'take_adjacent'
     FROM derive.certain_call
     WHERE run_id = only_run AND publication_id IS NOT NULL
 )

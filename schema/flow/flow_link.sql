@@ -34,8 +34,7 @@ SELECT
     'callback_instance', callback_instance_id,
     'request', request_id,
     'direct'
-FROM store.link_request
-WHERE callback_instance_id IS NOT NULL
+FROM derive.certain_request
 UNION ALL
 SELECT
     run_id,
@@ -63,13 +62,7 @@ WHERE callback_instance_id IS NULL AND request_id IS NOT NULL
 UNION ALL
 SELECT
     run_id,
-    CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END,
-    coalesce(taken_request_id, taken_response_id),
-    CASE
-        WHEN publication_id IS NOT NULL THEN 'publication'
-        WHEN request_id IS NOT NULL THEN 'request'
-        ELSE 'response'
-    END,
-    coalesce(publication_id, request_id, response_id),
+    from_kind, from_id,
+    to_kind, to_id,
     'take_adjacent'
 FROM derive.certain_call

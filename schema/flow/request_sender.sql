@@ -5,14 +5,8 @@
 SELECT
     request_id,
     derive.vertex_key('callback_instance', callback_instance_id) AS sender_key
-FROM store.link_request
-WHERE callback_instance_id IS NOT NULL
+FROM derive.certain_request
 UNION ALL
-SELECT
-    request_id,
-    coalesce(
-        derive.vertex_key('request', taken_request_id),
-        derive.vertex_key('response', taken_response_id)
-    )
+SELECT request_id, derive.vertex_key(from_kind, from_id)
 FROM derive.certain_call
 WHERE request_id IS NOT NULL

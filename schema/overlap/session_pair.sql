@@ -21,7 +21,6 @@ common AS (
     FROM recorded AS l
     JOIN recorded AS r
         ON l.thread = r.thread AND l.tracepoint = r.tracepoint AND l.session < r.session
-    WHERE greatest(l.first_ns, r.first_ns) <= least(l.last_ns, r.last_ns)
 ),
 event AS (
     SELECT

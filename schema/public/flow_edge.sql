@@ -65,7 +65,7 @@ SELECT
     'direct',
     i.start_ns,
     q.sent_ns
-FROM main.link_request AS l
+FROM derive.certain_request AS l
 JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
 JOIN main.request AS q ON l.request_id = q.request_id
 UNION ALL
@@ -109,18 +109,14 @@ WHERE r.callback_instance_id IS NULL
 UNION ALL
 SELECT
     l.run_id,
-    CASE WHEN l.taken_request_id IS NULL THEN 'response' ELSE 'request' END,
-    coalesce(l.taken_request_id, l.taken_response_id),
-    CASE
-        WHEN l.publication_id IS NOT NULL THEN 'publication'
-        WHEN l.request_id IS NOT NULL THEN 'request'
-        ELSE 'response'
-    END,
-    coalesce(l.publication_id, l.request_id, l.response_id),
+    l.from_kind,
+    l.from_id,
+    l.to_kind,
+    l.to_id,
     'take_adjacent',
     coalesce(tq.taken_ns, tr.taken_ns),
     coalesce(b.start_ns, q.sent_ns, r.sent_ns)
-FROM main.link_call AS l
+FROM derive.certain_call AS l
 LEFT JOIN main.request AS tq ON l.taken_request_id = tq.request_id
 LEFT JOIN main.response AS tr ON l.taken_response_id = tr.response_id
 LEFT JOIN main.publication AS b ON l.publication_id = b.publication_id

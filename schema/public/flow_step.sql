@@ -74,20 +74,12 @@ aside AS MATERIALIZED (
     SELECT
         derive.vertex_key('callback_instance', l.callback_instance_id),
         derive.vertex_key('request', l.request_id)
-    FROM store.link_request AS l
+    FROM derive.certain_request AS l
     JOIN store.request AS q ON l.request_id = q.request_id
     JOIN store.client AS c ON q.client_id = c.client_id
     WHERE c.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
     UNION ALL
-    SELECT
-        coalesce(
-            derive.vertex_key('request', l.taken_request_id),
-            derive.vertex_key('response', l.taken_response_id)
-        ),
-        coalesce(
-            derive.vertex_key('publication', l.publication_id),
-            derive.vertex_key('request', l.request_id)
-        )
+    SELECT derive.vertex_key(l.from_kind, l.from_id), derive.vertex_key(l.to_kind, l.to_id)
     FROM derive.certain_call AS l
     LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     LEFT JOIN store.request AS q ON l.request_id = q.request_id
@@ -183,7 +175,12 @@ SELECT
             THEN d.start_ns - f.end_ns
         WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns
     END AS wait_ns,
-    coalesce(lt.candidate_count, lc.candidate_count, ls.candidate_count) AS candidate_count,
+    coalesce(
+        lt.candidate_count,
+        lc.candidate_count,
+        -- What follows from a request or response is followed only if it is certain.
+        CASE WHEN a.link_kind = 'take_adjacent' THEN 1 END
+    ) AS candidate_count,
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
     d.kind,
     d.id,
@@ -210,24 +207,6 @@ LEFT JOIN derive.flow_cause AS lc
     AND a.from_id = coalesce(lc.callback_instance_id, lc.take_id)
     AND a.to_id = lc.publication_id
     AND a.link_kind = lc.kind
-LEFT JOIN (
-    SELECT
-        CASE WHEN taken_request_id IS NULL THEN 'response' ELSE 'request' END AS from_kind,
-        coalesce(taken_request_id, taken_response_id) AS from_id,
-        CASE
-            WHEN publication_id IS NOT NULL THEN 'publication'
-            WHEN request_id IS NOT NULL THEN 'request'
-            ELSE 'response'
-        END AS to_kind,
-        coalesce(publication_id, request_id, response_id) AS to_id,
-        candidate_count
-    FROM derive.certain_call
-) AS ls
-    ON a.link_kind = 'take_adjacent'
-    AND a.from_kind = ls.from_kind
-    AND a.from_id = ls.from_id
-    AND d.kind = ls.to_kind
-    AND a.to_id = ls.to_id
 LEFT JOIN store.thread AS h ON d.thread_id = h.thread_id
 JOIN store.process AS q ON d.process_id = q.process_id
 JOIN store.host AS m ON q.host_id = m.host_id

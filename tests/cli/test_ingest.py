@@ -47,6 +47,24 @@ def test_two_commands_lead_to_the_answer_and_a_trace_is_ingested_once(
     assert "first" in msgflow("info").stdout
 
 
+def test_events_of_ones_own_are_loaded_on_request(msgflow: Msgflow, tmp_path: Path) -> None:
+    trace = simulate("own_events", tmp_path / "robot", factor=0.03).directory
+    mistyped = msgflow("ingest", trace, "--events", "my_pgk:*")
+    assert mistyped.exit_code == 0, mistyped.stderr
+    said = " ".join(mistyped.stderr.split())
+    assert (
+        "user_event_not_loaded (1): patterns that load no event: my_pgk:*; the traces have" in said
+    )
+    assert " my_pkg:frame_done (" in said
+    found = msgflow("ingest", trace, "--replace", "--events", "my_pkg:*", "--events", "*:frame*")
+    assert found.exit_code == 0, found.stderr
+    assert "user_event" not in found.stderr
+    rows = msgflow("sql", "SELECT name, fields->>'$.label' AS label FROM user_event LIMIT 1")
+    assert "my_pkg:frame_done  frame 0" in rows.stdout
+    flow = msgflow("flow", "--topic", "/image", "--at", "50ms")
+    assert "my_pkg:frame_done 2 times, first at +" in flow.stdout
+
+
 def test_options_of_a_query_reach_it(
     msgflow: Msgflow, simulated: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -162,6 +162,7 @@ def older(path: Path) -> dict[int, str]:
         objects.drop(con)
         con.execute("ALTER TABLE store.run DROP COLUMN clock_sync")
         con.execute("ALTER TABLE store.process DROP COLUMN is_ambiguous")
+        con.execute("DROP TABLE store.user_event")
         con.execute("DROP TABLE store.link_call")
         con.execute("ALTER TABLE store.flow_call DROP COLUMN taken_request_id")
         con.execute("ALTER TABLE store.flow_call DROP COLUMN taken_response_id")

@@ -89,6 +89,17 @@ class TestShapes:
         assert json.loads(row["empties"]) == [{}, {}]
         assert int(row["last"]) == 9
 
+    def test_names_that_differ_in_case_alone(
+        self, listing: Listing, listed: Listed, tmp_path: Path
+    ) -> None:
+        """Also beside a number that JSON may not hold, for whose sake each member is read."""
+        real = "floating_point { exp_dig = 8; mant_dig = 24; align = 8; }"
+        path = one_event(
+            tmp_path / "t", f"struct {{ {real} _a; {BYTE} _A; }} _s;", struct.pack("<fB", 0.5, 7)
+        )
+        assert "s={a=0.5, A=7}" in listing(path)
+        assert listed(path)[0]["fields"]["s"] == {"a": 0.5, "A": 7}
+
     def test_many_fields(self, listing: Listing, listed: Listed, tmp_path: Path) -> None:
         fields = "".join(f"{BYTE} _f{n};" for n in range(600))
         inner = "".join(f"{BYTE} _g{n};" for n in range(600))

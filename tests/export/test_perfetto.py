@@ -330,3 +330,33 @@ def test_without_the_package_it_is_said(
 def test_a_trace_is_of_one_run(small_database: Path, tmp_path: Path) -> None:
     with Database(small_database) as database, pytest.raises(UsageError, match="one run"):
         database.export_perfetto(tmp_path / "a.pftrace", run="all")
+
+
+def test_events_of_the_user_are_instants_on_their_thread(
+    simulated: Callable[..., Path], tmp_path: Path
+) -> None:
+    """With their fields as arguments, each of its own type."""
+    protos = pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
+    fields = '{"big":18446744073709551615,"low":-5,"yes":true,"x":0.5,"text":"a","no":null,"l":[1]}'
+    with duckdb.connect(str(path)) as connection:
+        ((begin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
+        connection.executemany(
+            "INSERT INTO store.user_event SELECT ?, 1, trace_id, process_id, thread_id, 0, ?,"
+            " 'my_pkg:done', NULL, ?, false FROM store.trace JOIN store.thread"
+            " USING (run_id) WHERE thread_id = 2 AND trace_id = 1",
+            [(1, begin + 5, fields), (2, begin + 900, "{}")],
+        )
+    with open_db(path) as database:
+        written = database.export_perfetto(tmp_path / "run.pftrace", end=begin + 900)
+    trace = protos.Trace()
+    trace.ParseFromString(written.path.read_bytes())
+    (packet,) = (one for one in trace.packet if "user_event" in one.track_event.categories)
+    event = packet.track_event
+    assert (packet.timestamp, event.track_uuid, event.name) == (begin + 5, 2 * 8 + 2, "my_pkg:done")
+    assert event.type == event.TYPE_INSTANT
+    assert {one.name: getattr(one, one.WhichOneof("value")) for one in event.debug_annotations} == {
+        "user_event_id": 1, "big": 2**64 - 1, "low": -5, "yes": True, "x": 0.5, "text": "a",
+        "no": "null", "l": "[1]",
+    }  # fmt: skip
+    assert written.events == 1

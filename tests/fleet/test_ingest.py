@@ -426,3 +426,12 @@ def test_without_ray_it_is_said_how_to_get_it(
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(UsageError, match="Ray is not installed"):
         fleet_ingest([str(filled.recordings / "r0")], tmp_path / "lake", ray="local")
+
+
+def test_events_of_ones_own_are_in_the_lake(tmp_path: Path) -> None:
+    recording = simulate("own_events", tmp_path / "robot", factor=0.03).directory
+    result = run("ingest", recording, "--lake", tmp_path / "lake", "--events", "my_pkg:*")
+    assert result.exit_code == 0, result.stderr
+    asked = "SELECT DISTINCT name FROM view.user_event"
+    found = run("sql", asked, "--lake", tmp_path / "lake", "--format", "csv")
+    assert found.stdout.split() == ['"name"', '"my_pkg:frame_done"'], found.stderr

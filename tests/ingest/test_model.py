@@ -34,8 +34,8 @@ def read(con: duckdb.DuckDBPyConnection, path: Path) -> None:
     staging.attach(con, None)
     with trace.open([path]) as traces:
         load_traces(
-            con, traces, hostnames={}, ignore=(), may_hold=False, replace=False,
-            interrupts=Interrupts(), progress=None,
+            con, traces, hostnames={}, ignore=(), events=["my_pkg:*"], may_hold=False,
+            replace=False, interrupts=Interrupts(), progress=None,
         )  # fmt: skip
 
 
@@ -77,11 +77,20 @@ def deferring(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return simulate("services", path, factor=0.1, layout="jazzy").directory
 
 
-def test_objects_have_no_row_without_the_tables_of_their_when(lossy: Path, deferring: Path) -> None:
+@pytest.fixture(scope="module")
+def own_events(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A trace with events of the user's own."""
+    path = tmp_path_factory.mktemp("own_events") / "trace"
+    return simulate("own_events", path, factor=0.05).directory
+
+
+def test_objects_have_no_row_without_the_tables_of_their_when(
+    lossy: Path, deferring: Path, own_events: Path
+) -> None:
     assert len(SOMETIMES_EMPTY) >= 3
     shown = {
         path: {header.name for header in SOMETIMES_EMPTY if built(path)[header.name][1]}
-        for path in (lossy, deferring)
+        for path in (lossy, deferring, own_events)
     }
     for header in SOMETIMES_EMPTY:
         path = next(path for path, names in shown.items() if header.name in names)

@@ -394,3 +394,32 @@ links:
     assert applied.annotation_count == 2
     assert rows(database, KINDS) == [("direct", 4)]
     assert rows(database, "SELECT count(*) FROM annotation_firing") == [(0,)]
+
+
+def test_what_follows_from_responses_stays(empty_database: Path, tmp_path: Path) -> None:
+    """Whatever is declared of callbacks: what these publish, the thread does not by itself."""
+    system = RosSystem()
+    asking = Thread(100, name="asking")
+    system.node(asking, 0x1, "asking")
+    system.subscription(asking, 0x11, "/in", callback=0xC1, node=0x1)
+    system.publisher(asking, 0x21, "/out", node=0x1)
+    system.client(asking, 0x31, "/add", gid=7, node=0x1)
+    system.take(asking, 0x11, 1)
+    system.start(asking, 0xC1)
+    system.publish(asking, 0x21, 101)
+    system.end(asking, 0xC1)
+    system.ready(asking)
+    system.take_response(asking, 0x31, 1, stamp=1)
+    system.publish(asking, 0x21, 102)
+    analysis = Analysis(empty_database, tmp_path)
+    analysis.build(system)
+    analysis.close()
+    path = tmp_path / "analysis.duckdb"
+    calls = "SELECT publication_id, candidate_count FROM link_call"
+    ((_, certain),) = before = rows(path, calls)
+    assert certain == 1
+    with Database(path) as opened:
+        text = ANSWERS.replace("direct", "independent").replace("/filter", "/asking")
+        opened.apply_links(write(path, text))
+    assert rows(path, KINDS) == []
+    assert rows(path, calls) == before

@@ -95,6 +95,72 @@ def test_not_across_a_gap(calls: RosSystem, analyse: Analyse) -> None:
     assert analyse(calls).rows(LINKS) == []
 
 
+def test_not_where_a_gap_hides_what_was_taken_last(calls: RosSystem, analyse: Analyse) -> None:
+    """It ends behind the take, and another one lies in it."""
+    respond(calls, 1)
+    taken = respond(calls, 2)
+    published = calls.publish(CLIENT, 0x11, 1)
+    calls.add_packet(0, taken + 5, last_event=taken - 90, discarded=3, cpu=1)
+    calls.add_packet(0, taken - 50, last_event=taken - 60, discarded=3, cpu=2)
+    assert taken + 5 < published
+    assert analyse(calls).rows(LINKS) == []
+
+
+@pytest.mark.parametrize(
+    ("from_taken", "until_taken", "count"), [(-50, 0, 1), (-50, 1, 0), (0, 0, 0), (0, 5, 0)]
+)
+def test_a_gap_that_touches_the_take(
+    calls: RosSystem, analyse: Analyse, from_taken: int, until_taken: int, count: int
+) -> None:
+    """Behind it, or before: from the last event of a packet to its end."""
+    taken = respond(calls)
+    calls.publish(CLIENT, 0x11, 1)
+    calls.ready(CLIENT)
+    calls.add_packet(0, taken + until_taken, last_event=taken + from_taken, discarded=3, cpu=1)
+    assert len(analyse(calls).rows(LINKS)) == count
+
+
+def test_a_gap_behind_what_was_sent(calls: RosSystem, analyse: Analyse) -> None:
+    taken = respond(calls)
+    requested = calls.send_request(CLIENT, 0x12, 1)
+    calls.ready(CLIENT)
+    calls.add_packet(0, requested + 5, last_event=requested, discarded=3, cpu=1)
+    assert analyse(calls).rows(LINKS) == [(requested, taken, True, 1)]
+
+
+def test_gaps_of_other_hosts_hide_nothing(calls: RosSystem, analyse: Analyse) -> None:
+    calls.ready(SERVER)
+    taken = respond(calls)
+    calls.lose(trace=1)
+    calls.publish(CLIENT, 0x11, 1)
+    calls.ready(SERVER)
+    assert analyse(calls).rows(LINKS) == [(1, taken, True, 1)]
+
+
+def test_gaps_of_the_kernel_trace_hide_nothing(calls: RosSystem, analyse: Analyse) -> None:
+    respond(calls)
+    calls.lose()
+    calls.publish(CLIENT, 0x11, 1)
+    connection = analyse(calls).connection
+    count = "SELECT count(*) FROM derive.link_call(1)"
+    assert connection.execute(count).fetchall() == [(0,)]
+    connection.execute("UPDATE store.trace SET domain = 'kernel'")
+    assert connection.execute(count).fetchall() == [(1,)]
+
+
+def test_each_thread_has_turns_of_its_own(calls: RosSystem, analyse: Analyse) -> None:
+    """What another one sends by itself makes nothing doubtful."""
+    other = Thread(100, 101)
+    calls.ready(other)
+    first = calls.take_response(other, 0x10, 1, stamp=1)
+    calls.publish(other, 0x11, 1)
+    calls.ready(other)
+    second = respond(calls, 2)
+    calls.publish(other, 0x11, 2)
+    calls.publish(CLIENT, 0x11, 3)
+    assert analyse(calls).rows(LINKS) == [(1, first, True, 2), (3, second, True, 1)]
+
+
 def test_no_turns_without_an_executor(calls: RosSystem, analyse: Analyse) -> None:
     """In rclpy a timer may have published."""
     python = Thread(300, None, "python3")
@@ -122,6 +188,7 @@ def test_what_is_also_sent_otherwise_is_doubtful(calls: RosSystem, analyse: Anal
     requested = calls.send_request(CLIENT, 0x12, 1)
     calls.ready(CLIENT)
     calls.send_request(CLIENT, 0x12, 2)
+    calls.send_request(CLIENT, 0x12, 3)
     assert analyse(calls).rows(LINKS) == [(2, taken, True, 2), (requested, taken, True, 2)]
 
 
@@ -190,6 +257,28 @@ def test_a_request_with_a_callback(calls: RosSystem, analyse: Analyse) -> None:
     calls.end(SERVER, 0xC2)
     calls.publish(SERVER, 0x21, 1)
     assert analyse(calls).rows(LINKS) == []
+
+
+def test_a_response_that_waited_for_another(calls: RosSystem, analyse: Analyse) -> None:
+    """It is sent in no callback, though one began with its request: before, and on a thread."""
+    calls.service(SERVER, 0x23, "/sum", callback=0xC2)
+    calls.take_request(SERVER, 0x23, 1, gid=7)
+    calls.start(SERVER, 0xC2)
+    calls.end(SERVER, 0xC2)
+    calls.ready(SERVER)
+    first = calls.take_response(SERVER, 0x22, 1, stamp=1)
+    sent = calls.send_response(SERVER, 0x23, 1, gid=7, stamp=2)
+    calls.ready(SERVER)
+    other = Thread(200, 201, trace=1)
+    calls.take_request(other, 0x23, 2, gid=7)
+    calls.start(other, 0xC2)
+    second = calls.take_response(SERVER, 0x22, 2, stamp=3)
+    sent_meanwhile = calls.send_response(SERVER, 0x23, 2, gid=7, stamp=4)
+    calls.end(other, 0xC2)
+    assert analyse(calls).rows(LINKS) == [
+        (sent, first, True, 1),
+        (sent_meanwhile, second, True, 1),
+    ]
 
 
 def test_flows_and_paths_go_on_from_a_response(system: RosSystem, analyse: Analyse) -> None:

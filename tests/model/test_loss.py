@@ -368,6 +368,23 @@ def test_what_opens_a_chunk_shows_that_nothing_was_stopped(
         assert found == ([pause] if pause else []), case
 
 
+def test_each_chunk_is_opened_so(system: RosSystem, analyse: Analyse) -> None:
+    """Silences behind the second and the third one; the latest counts."""
+    opened = 2_000 * MS, 3_000 * MS
+    for trace in range(3):
+        system.add_source(trace, "host", "boot", "recording")
+    bounds = 0, *(at + 35 * MS for at in opened), 4_000 * MS
+    for trace in range(3):
+        end = opened[trace] if trace < 2 else bounds[3]
+        events_at(system, *range(bounds[trace], end, 10 * MS), trace=trace)
+        for cpu in (0, 1):
+            if trace:
+                system.add_packet(*(opened[trace - 1],) * 2, count=0, cpu=cpu, trace=trace)
+            system.add_packet(bounds[trace], end - 10, last_event=end - 20, cpu=cpu, trace=trace)
+    model = analyse(system)
+    assert [gaps_of(model, trace) for trace in range(3)] == [[], [], []]
+
+
 def test_a_recording_is_not_opened_by_an_empty_packet(system: RosSystem, analyse: Analyse) -> None:
     """Another chunk must be before it. Here it was stopped before anything was recorded."""
     for cpu in (0, 1):

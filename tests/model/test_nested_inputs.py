@@ -109,3 +109,78 @@ def test_a_message_that_was_there_before_may_be_the_one(merge: RosSystem, analys
     merge.publish(NODE, 0x21, 12)
     merge.end(NODE, A)
     assert analyse(merge).rows(LINKS) == [(11, 12, 2)]
+
+
+def test_other_firings_may_have_used_what_a_firing_did_not(
+    merge: RosSystem, analyse: Analyse
+) -> None:
+    """It ran nested behind the last publication: a firing on another thread may have seen it."""
+    other = Thread(100, 101)
+    begin(merge, A, 10)
+    begin(merge, B, 11)
+    merge.end(NODE, B)
+    merge.publish(NODE, 0x21, 12)
+    merge.take(other, 0x11, 20)
+    merge.start(other, A)
+    begin(merge, B, 13)
+    merge.end(NODE, B)
+    merge.publish(other, 0x21, 22)
+    merge.end(other, A)
+    merge.end(NODE, A)
+    assert analyse(merge).rows(LINKS) == [(11, 12, 1), (13, 22, 2)]
+
+
+def test_used_by_one_annotation(merge: RosSystem, analyse: Analyse) -> None:
+    """It may be there for the other. And a timer uses nothing."""
+    other = Thread(100, 101)
+    merge.subscription(NODE, 0x13, "/c", callback=0xCD)
+    merge.publisher(NODE, 0x22, "/second")
+    merge.annotate(NODE, "partial_sync", [0x12, 0x13], [0x22])
+    merge.timer(NODE, 0x31, callback=0xCC)
+    merge.take(other, 0x13, 20)
+    merge.start(other, 0xCD)
+    begin(merge, A, 10)
+    begin(merge, B, 11)
+    merge.end(NODE, B)
+    merge.publish(NODE, 0x21, 12)
+    merge.end(NODE, A)
+    merge.publish(other, 0x22, 22)
+    merge.end(other, 0xCD)
+    merge.take(other, 0x13, 30)
+    merge.start(other, 0xCD)
+    merge.start(NODE, 0xCC)
+    begin(merge, B, 33)
+    merge.end(NODE, B)
+    merge.end(NODE, 0xCC)
+    merge.publish(other, 0x22, 32)
+    merge.end(other, 0xCD)
+    assert analyse(merge).rows(LINKS) == [(11, 12, 1), (11, 22, 2), (33, 32, 3)]
+
+
+def test_nested_in_what_is_no_input(merge: RosSystem, analyse: Analyse) -> None:
+    """The message came meanwhile on another thread: that has ended."""
+    other = Thread(100, 101)
+    merge.timer(NODE, 0x31, callback=0xCC)
+    merge.start(NODE, 0xCC)
+    begin(merge, B, 11)
+    merge.take(other, 0x11, 20)
+    merge.start(other, A)
+    merge.end(other, A)
+    merge.publish(NODE, 0x21, 12)
+    merge.end(NODE, B)
+    merge.end(NODE, 0xCC)
+    assert analyse(merge).rows(LINKS) == [(20, 12, 2)]
+
+
+def test_what_another_instance_ran_in_has_ended(merge: RosSystem, analyse: Analyse) -> None:
+    other = Thread(100, 101)
+    begin(merge, B, 11)
+    merge.take(other, 0x11, 20)
+    merge.start(other, A)
+    merge.take(other, 0x12, 21)
+    merge.start(other, B)
+    merge.end(other, B)
+    merge.end(other, A)
+    merge.publish(NODE, 0x21, 12)
+    merge.end(NODE, B)
+    assert analyse(merge).rows(LINKS) == [(20, 12, 2)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 from analysis import Analyse
 from ros_system import WRITER, RosSystem
@@ -246,18 +244,18 @@ def test_layers_of_caret(system: RosSystem, analyse: Analyse) -> None:
 
 
 @pytest.mark.parametrize(
-    ("hook", "stamp"),
+    ("hook", "fields", "stamp"),
     [
-        ({"name": "ros2_caret:dds_write", "message": 0xA}, None),
-        ({"name": "ros2_caret:dds_bind_addr_to_stamp", "source_stamp": 777}, 777),
+        ("ros2_caret:dds_write", {"message": 0xA}, None),
+        ("ros2_caret:dds_bind_addr_to_stamp", {"source_stamp": 777}, 777),
     ],
 )
 def test_a_hook_of_caret_behind_the_last_layer_is_one_more(
-    system: RosSystem, analyse: Analyse, hook: dict[str, Any], stamp: int | None
+    system: RosSystem, analyse: Analyse, hook: str, fields: dict[str, int], stamp: int | None
 ) -> None:
     system.publisher(MAIN, 0x10, "/chatter")
     time = system.publish(MAIN, 0x10)
-    system.add(thread=MAIN, **hook)
+    system.add(hook, MAIN, **fields)
     model = analyse(system)
     assert model.rows("SELECT end_ns, source_timestamp_ns FROM publication") == [
         (time + 3 * STEP_NS, stamp)

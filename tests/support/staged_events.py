@@ -65,9 +65,9 @@ class StagedEvents:
         self._packets: dict[int, list[dict[str, Any]]] = defaultdict(list)
         self.now = 1_000
 
-    def add(self, name: str, thread: Thread, *, ts: int | None = None, **fields: Any) -> int:
+    def add(self, name: str, thread: Thread, /, *, ts: int | None = None, **fields: Any) -> int:
         """Add an event; fields left out are NULL. Returns its time stamp."""
-        known = {field.name for field in load().tracepoints[name].fields}
+        known = {field.name for field in load().staged[name].fields}
         if fields.keys() - known:
             raise ValueError(f"{name} has no field {', '.join(sorted(fields.keys() - known))}")
         self.now = self.now + STEP_NS if ts is None else ts
@@ -173,7 +173,7 @@ class StagedEvents:
         batches = []
         counts: list[tuple[int, str, int]] = []
         for name, events in rows.items():
-            schema = pa.schema([*COMMON_SCHEMA, *load().tracepoints[name].arrow_schema()])
+            schema = pa.schema([*COMMON_SCHEMA, *load().staged[name].arrow_schema()])
             batches.append((name, pa.RecordBatch.from_pylist(events, schema=schema)))
             of_traces = Counter(event["trace_index"] for event in events)
             counts += [(trace, name, count) for trace, count in of_traces.items()]
@@ -207,7 +207,7 @@ class StagedEvents:
             _insert(con, "raw.thread_name", placed.thread_names)
             _insert(con, "raw.cpu_return", placed.cpu_returns)
             for name, batch in placed.batches:
-                _insert(con, f"raw.{load().tracepoints[name].table}", batch)
+                _insert(con, f"raw.{load().staged[name].table}", batch)
         _insert(con, "raw.packet", packets)
 
     def _all_packets(self) -> list[dict[str, Any]]:

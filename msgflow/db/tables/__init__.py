@@ -21,6 +21,7 @@ from msgflow.db.tables import (
     link,
     recording,
     ros_object,
+    user_event,
 )
 from msgflow.db.tables.column import STORE
 
@@ -35,4 +36,5 @@ __all__ = [
     "link",
     "recording",
     "ros_object",
+    "user_event",
 ]

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from msgflow.sim.scenario import (
+    actions,
     annotated,
     autoware,
     bursts,
@@ -19,6 +20,7 @@ from msgflow.sim.scenario import (
     layers,
     lives,
     nested,
+    own_events,
     pipeline,
     rivals,
     robot,
@@ -50,6 +52,7 @@ def scenarios() -> Mapping[str, Scenario]:
         executors.polled(),
         executors.timers(),
         nested.nested(),
+        own_events.own_events(),
         intra_process.intra_process(),
         intra_process.mixed_intra_process(),
         intra_process.container(),
@@ -61,6 +64,7 @@ def scenarios() -> Mapping[str, Scenario]:
         transforms.transforms(),
         services.services(),
         services.calls(),
+        actions.actions(),
         lives.restarts(),
         lives.container_restarts(),
         containers.containers_one_daemon(),

@@ -1,15 +1,16 @@
 -- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
---     and responses of services, from sending to taking, and states of executors.
+--     and responses of services, from sending to taking, states of executors, and events of the
+--     user's own tracepoints, which have no length.
 -- grain: one row per bar
 -- kind: inline
 -- column: run_id BIGINT  Run
 -- column: row_key BIGINT  Row of the timeline, see row.sql; of requests and responses that of the
 --     client, else of the service, else of the process
 -- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; states
---     of an executor: 5 wait, 6 process, 7 execute
+--     of an executor: 5 wait, 6 process, 7 execute; 8 event of the user
 -- column: id BIGINT  Identity of the thing within its kind; of states the first callback instance
---     in it, -1: none
+--     in it, of events the one inside which they happened, -1: none
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
 -- column: flags UTINYINT  1: lost events may hide a part; 2: an end was not seen; 4: called with
@@ -60,3 +61,14 @@ SELECT
     coalesce(callback_instance_id, -1), start_ns, coalesce(end_ns, start_ns),
     (2 * (end_ns IS NULL)::UTINYINT)::UTINYINT
 FROM main.executor_state
+UNION ALL
+SELECT
+    u.run_id, r.row_key, 8, coalesce(u.callback_instance_id, -1), u.at_ns, u.at_ns,
+    u.is_loss_affected::UTINYINT
+FROM main.user_event AS u
+LEFT JOIN main.callback_instance AS i ON u.callback_instance_id = i.callback_instance_id
+LEFT JOIN main.callback AS c ON i.callback_id = c.callback_id
+JOIN event_row AS r
+    ON u.process_id = r.process_id
+    AND c.node_id IS NOT DISTINCT FROM r.node_id
+    AND u.name = r.name

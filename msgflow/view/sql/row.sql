@@ -1,19 +1,22 @@
 -- name: row
 -- title: Rows of the timeline
 -- description: Everything that has a row in the timeline, in its order: by host, process and node;
---     there timers, subscriptions, services, clients and publishers, and below each process the
---     threads of its executors.
+--     there timers, subscriptions, services, clients, publishers and events of the user, and below
+--     each process the threads of its executors.
 -- grain: one row per row of the timeline
 -- param: run BIGINT  Run
--- column: row_key BIGINT  Identity of the row: eight times that of the object, plus its kind
+-- column: row_key BIGINT  Identity of the row: eight times that of the object, plus its kind; of
+--     events see event_row.sql
 -- column: kind VARCHAR  'timer', 'subscription', 'service', 'client', 'publisher', 'callback' (of
---     an unknown kind), 'thread' or 'middleware' (what belongs to no object of a node)
--- column: object_id BIGINT  Identity of the timer, subscription, …; of 'middleware' the process
+--     an unknown kind), 'event' (of the user), 'thread' or 'middleware' (what belongs to no object
+--     of a node)
+-- column: object_id BIGINT  Identity of the timer, subscription, …; of 'middleware' the process, of
+--     'event' the first
 -- column: host VARCHAR  Machine or container
 -- column: process VARCHAR  Name of the process and its pid
 -- column: process_id BIGINT  Identity of the process
 -- column: node VARCHAR  Full name of the node; NULL: none, or not known
--- column: label VARCHAR  Period, topic, service, or thread
+-- column: label VARCHAR  Period, topic, service, name of the event, or thread
 -- column: symbol VARCHAR  Functions registered for its callbacks
 -- column: is_internal BOOLEAN  Infrastructure of ROS
 WITH symbol AS (
@@ -72,6 +75,10 @@ object AS (
                 WHEN 'service' THEN c.service_id
             END
         ) IS NULL
+    UNION ALL
+    SELECT row_key, 'event', -row_key, process_id, node_id, name, NULL, false, 9
+    FROM event_row
+    WHERE run_id = $run
     UNION ALL
     SELECT
         8 * x.thread_id + 6, 'thread', x.thread_id, t.process_id, NULL,

@@ -1,8 +1,9 @@
 // Labels: names that people read, for columns of queries, statistics and kinds.
 
 export const KINDS = [
-  "callback instance", "publication", "take", "request", "response", "wait", "process", "execute",
+  "callback instance", "publication", "take", "request", "response", "wait", "process", "execute", "event",
 ];
+export const EVENT = 8;
 export const KIND_NAMES = ["callback_instance", "publication", "take", "request", "response"];
 
 export const LINKS = {

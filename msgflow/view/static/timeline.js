@@ -2,7 +2,7 @@
 
 import { h, clear } from "./dom.js";
 import { current, go, replace } from "./address.js";
-import { KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
+import { EVENT, KINDS, KIND_NAMES, LINKS, count, duration, moment, partTitle, pathText, wallClock, percent } from "./labels.js";
 import { Renderer, AXIS } from "./renderer.js";
 import { ROW_KINDS, indexBars, layout } from "./timeline_rows.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
@@ -13,6 +13,8 @@ const LEAST_SPAN = 20;
 const MARGIN = 0.5;
 // As many bars as a person can tell apart at once: a longer run opens on so many of it.
 const READABLE = 400;
+// Events of one callback instance that the list of a flow names.
+const MOST_EVENTS = 5;
 
 export class TimelinePage {
   constructor(app, root) {
@@ -106,7 +108,7 @@ export class TimelinePage {
     return h("div", { className: "legend", "aria-label": "colours" },
       item("timer", "timer callback"), item("subscription", "subscription callback"), item("service", "service callback"),
       item("publication", "publication"), item("take", "take"), item("call", "request, response"),
-      item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"),
+      item("execute", "executor: execute"), item("process", "process"), item("wait", "wait"), item("event", "event of your own"),
       item("transport", "publish to take", "stroke"), item("direct", "direct link", "stroke"),
       item("indirect", "indirect link", "stroke dashed"), item("critical", "critical path", "stroke"),
       item("gap", "not recorded"), h("span", { className: "legend-item" }, "low columns: several bars, as high as their share of the time; hatched: lost events may hide a part"));
@@ -140,6 +142,7 @@ export class TimelinePage {
         if (this.rows.kind[row] === "thread" && processes.has(this.rows.process_id[row])) only.add(this.rows.row_key[row]);
       }
     }
+    if (only) for (const { row } of this.eventsOf(flow)) only.add(row);
     const made = layout(this.rows, { ...this.state, only, critical: Boolean(flow?.pieces?.rows) });
     this.renderer.lanes = made.lanes;
     this.renderer.height = made.height;
@@ -150,6 +153,23 @@ export class TimelinePage {
     this.canvas.style.height = `${wanted}px`;
     this.renderer.resize();
     this.scrollTo(this.renderer.scroll);
+  }
+
+  // Events of the user in callback instances of the flow, where they are at hand.
+  eventsOf(flow) {
+    const { bars } = this.renderer;
+    const instances = new Set(flow.vertices.filter((vertex) => vertex.kind === 0).map((vertex) => vertex.id));
+    const found = [];
+    for (let place = 0; bars && place < this.rows.rows; place++) {
+      if (this.rows.kind[place] !== "event") continue;
+      const row = this.rows.row_key[place];
+      const [first, last] = bars.ranges.get(row) ?? [0, 0];
+      for (let at = first; at < last; at++) {
+        const instance = bars.table.id[at];
+        if (instances.has(instance)) found.push({ row, instance, name: this.rows.label[place], at: bars.table.start_at[at] });
+      }
+    }
+    return found.sort((a, b) => a.at - b.at);
   }
 
   scrollTo(y) {
@@ -461,7 +481,8 @@ export class TimelinePage {
       lines.push(h("span", {}, `${count(hit.count, KINDS[hit.kind])} in ${duration(hit.length)}, ${duration(hit.busy)} in all (${percent(hit.busy / hit.length)})`));
     } else {
       const end = hit.flags & 2 ? "end not seen" : duration(hit.length);
-      lines.push(h("span", {}, `${KINDS[hit.kind]}${hit.id >= 0 ? ` ${hit.id}` : ""}: ${end}`));
+      if (hit.kind === EVENT) lines.push(h("span", {}, hit.id >= 0 ? `event in callback instance ${hit.id}` : "event in no callback"));
+      else lines.push(h("span", {}, `${KINDS[hit.kind]}${hit.id >= 0 ? ` ${hit.id}` : ""}: ${end}`));
       if (hit.together > 1) lines.push(h("span", {}, `one of ${hit.together} in this column`));
     }
     lines.push(h("span", {}, `begins at ${moment(hit.at)}`));
@@ -590,6 +611,8 @@ export class TimelinePage {
     const gather = h("input", { type: "checkbox", checked: this.gathered, on: { change: () => { this.gathered = gather.checked; this.relayout(); this.redraw(); } } });
     const executors = h("input", { type: "checkbox", checked: this.withExecutors, on: { change: () => { this.withExecutors = executors.checked; this.relayout(); this.redraw(); } } });
     const { from, to } = extent(flow);
+    const events = new Map();
+    for (const event of this.eventsOf(flow)) events.set(event.instance, [...(events.get(event.instance) ?? []), event]);
     const inward = new Map();
     for (const edge of flow.edges) if (!inward.has(edge.to)) inward.set(edge.to, edge);
     const rows = flow.vertices.map((vertex, place) => {
@@ -602,7 +625,8 @@ export class TimelinePage {
       h("td", { className: "number" }, `+${duration(vertex.at - from)}`),
       h("td", {}, h("button", { type: "button", className: "pick" }, row === undefined ? "?" : this.rows.label[row]),
         h("div", { className: "soft" }, `${KINDS[vertex.kind]} · ${row === undefined ? "" : this.rows.node[row] ?? this.rows.process[row]}`),
-        edge && edge.kind !== "callback" && h("div", { className: "soft" }, `${LINKS[edge.kind]}${lead ? `, after ${duration(lead)}` : ""}`)),
+        edge && edge.kind !== "callback" && h("div", { className: "soft" }, `${LINKS[edge.kind]}${lead ? `, after ${duration(lead)}` : ""}`),
+        vertex.kind === 0 && eventLines(events.get(vertex.id) ?? [], from)),
       h("td", { className: "number" }, vertex.flags & 2 ? "end not seen" : vertex.length ? duration(vertex.length) : ""));
     });
     const causes = flow.vertices.filter((vertex) => vertex.isCause && !vertex.picked).length;
@@ -702,6 +726,12 @@ export class TimelinePage {
     details.addEventListener("toggle", () => { if (details.open) fill(); });
     clear(this.beside, details);
   }
+}
+
+function eventLines(events, from) {
+  const lines = events.slice(0, MOST_EVENTS).map(({ name, at }) => `${name} at +${duration(at - from)}`);
+  if (events.length > MOST_EVENTS) lines.push(`and ${count(events.length - MOST_EVENTS, "more event")}`);
+  return lines.map((line) => h("div", { className: "soft" }, line));
 }
 
 function number(text, fallback) {

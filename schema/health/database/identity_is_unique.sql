@@ -1,7 +1,7 @@
 -- name: finding.identity_is_unique
 -- title: Two rows have one identity
--- description: Publications, takes, callback instances, requests and responses have an identity of
---     their own.
+-- description: Publications, takes, callback instances, requests, responses and events of the user
+--     have an identity of their own.
 -- cause: A mistake in msgflow, or input that it misunderstands.
 -- cure: Report what msgflow db check prints, together with the trace.
 -- grain: one row per run and table
@@ -30,6 +30,11 @@ WITH repeated AS (
     SELECT run_id, 'response'
     FROM store.response
     GROUP BY run_id, response_id
+    HAVING count(*) > 1
+    UNION ALL
+    SELECT run_id, 'user_event'
+    FROM store.user_event
+    GROUP BY run_id, user_event_id
     HAVING count(*) > 1
 )
 SELECT run_id, subject, count(*) AS count, 'identities that several rows have' AS detail

@@ -19,6 +19,16 @@ callback_instance AS (
     SELECT run_id, min(callback_instance_id) AS first_id, max(callback_instance_id) AS last_id
     FROM store.callback_instance
     GROUP BY run_id
+),
+request AS (
+    SELECT run_id, min(request_id) AS first_id, max(request_id) AS last_id
+    FROM store.request
+    GROUP BY run_id
+),
+response AS (
+    SELECT run_id, min(response_id) AS first_id, max(response_id) AS last_id
+    FROM store.response
+    GROUP BY run_id
 )
 SELECT
     l.run_id,
@@ -43,4 +53,31 @@ WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, true)
         l.callback_instance_id IS NOT NULL
     )
     OR coalesce(l.take_id NOT BETWEEN t.first_id AND t.last_id, l.take_id IS NOT NULL)
+GROUP BY l.run_id
+UNION ALL
+SELECT u.run_id, 'user_event', count(*), 'links to a row of another run'
+FROM store.user_event AS u
+LEFT JOIN callback_instance AS i ON u.run_id = i.run_id
+WHERE coalesce(
+    u.callback_instance_id NOT BETWEEN i.first_id AND i.last_id,
+    u.callback_instance_id IS NOT NULL
+)
+GROUP BY u.run_id
+UNION ALL
+SELECT l.run_id, 'link_call', count(*), 'links to a row of another run'
+FROM store.link_call AS l
+LEFT JOIN publication AS b ON l.run_id = b.run_id
+LEFT JOIN request AS q ON l.run_id = q.run_id
+LEFT JOIN response AS r ON l.run_id = r.run_id
+WHERE coalesce(l.publication_id NOT BETWEEN b.first_id AND b.last_id, l.publication_id IS NOT NULL)
+    OR coalesce(
+        least(l.taken_request_id, l.request_id) < q.first_id
+        OR greatest(l.taken_request_id, l.request_id) > q.last_id,
+        coalesce(l.taken_request_id, l.request_id) IS NOT NULL
+    )
+    OR coalesce(
+        least(l.taken_response_id, l.response_id) < r.first_id
+        OR greatest(l.taken_response_id, l.response_id) > r.last_id,
+        coalesce(l.taken_response_id, l.response_id) IS NOT NULL
+    )
 GROUP BY l.run_id

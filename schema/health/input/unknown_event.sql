@@ -3,7 +3,8 @@
 -- description: Events of names that say nothing about ROS 2. They were not loaded.
 -- cause: The session had events of other programs or of the kernel enabled, or those of another
 --     version of ROS 2.
--- cure: None needed; msgflow events TRACE shows them.
+-- cure: None needed; msgflow events TRACE shows them, and msgflow ingest --events loads those of
+--     your own (docs/own-events.md).
 -- grain: one row per trace with such events
 -- severity: info
 SELECT

@@ -18,9 +18,17 @@ WITH waited AS (
     WHERE state = 'wait' AND end_ns - start_ns < 1_000_000
     GROUP BY run_id, executor_id
 ),
+-- Those of clients and action servers are not traced, but what they are called with is.
+run AS (
+    SELECT thread_id FROM store.callback_instance
+    UNION ALL
+    SELECT receiver_thread_id FROM store.request WHERE callback_instance_id IS NULL
+    UNION ALL
+    SELECT receiver_thread_id FROM store.response
+),
 ran AS (
     SELECT x.executor_id, count(*) AS number
-    FROM store.callback_instance AS i
+    FROM run AS i
     JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
     GROUP BY x.executor_id
 )

@@ -61,3 +61,14 @@ JOIN store.callback AS c ON i.callback_id = c.callback_id
 JOIN seen ON NOT has_requests
 WHERE i.run_id = $run_id AND c.kind = 'service'
 HAVING count(*) > 0
+UNION ALL
+-- Callbacks of action servers have no events.
+SELECT $run_id, 'goals', count(*),
+    'action servers published their status ' || derive.counted(count(*), 'time')
+    || ', and no request was seen (rmw_take_request and others, since Kilted): no goals, no flows '
+    || 'through actions'
+FROM store.publication AS b
+JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+JOIN seen ON NOT has_requests
+WHERE b.run_id = $run_id AND p.topic_name LIKE '%/\_action/status' ESCAPE '\'
+HAVING count(*) > 0

@@ -3,7 +3,7 @@
 -- description: The steps of `main.flow_step`, with how long the executor was busy before the
 --     callbacks of takes and requests, and when the thread went on after a publication
 --     (until_ns): writing the message comes after the last event of the call, so that it took until
---     then at most.
+--     then at most. And the events of the user's own tracepoints inside of callback instances.
 -- grain: one row per vertex and link that leads to it
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- param: id BIGINT  Its identity
@@ -30,40 +30,66 @@ sent AS (
     WHERE publication_id IN (SELECT id FROM step WHERE kind = 'publication')
 ),
 next AS (
-    SELECT thread_id, start_event_id AS event_id, start_ns AS at_ns FROM store.publication
+    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns
+    FROM store.publication
     UNION ALL
-    SELECT thread_id, start_event_id, taken_ns FROM store.take WHERE start_event_id IS NOT NULL
+    SELECT run_id, thread_id, start_event_id, taken_ns
+    FROM store.take
+    WHERE start_event_id IS NOT NULL
     UNION ALL
-    SELECT thread_id, start_event_id, start_ns FROM store.callback_instance
+    SELECT run_id, thread_id, start_event_id, start_ns FROM store.callback_instance
     UNION ALL
-    SELECT thread_id, end_event_id, end_ns
+    SELECT run_id, thread_id, end_event_id, end_ns
     FROM store.callback_instance
     WHERE end_event_id IS NOT NULL
     UNION ALL
-    SELECT thread_id, start_event_id, start_ns FROM store.executor_state
+    SELECT run_id, thread_id, start_event_id, start_ns FROM store.executor_state
 ),
 went_on AS (
     SELECT
         s.publication_id,
         derive.corrected_ns(n.at_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS until_ns
     FROM sent AS s
-    ASOF JOIN (SELECT * FROM next WHERE thread_id IN (SELECT thread_id FROM sent)) AS n
+    ASOF JOIN (
+        SELECT thread_id, event_id, at_ns
+        FROM next
+        WHERE run_id = $run_id AND thread_id IN (SELECT thread_id FROM sent)
+    ) AS n
         ON s.thread_id = n.thread_id AND s.end_event_id < n.event_id
     ASOF LEFT JOIN store.thread_break AS b
         ON s.thread_id = b.thread_id AND s.end_event_id < b.resumed_event_id
     JOIN derive.process_clock AS c ON s.process_id = c.process_id
     -- In a gap between the two the thread may have gone on.
     WHERE coalesce(b.resumed_event_id > n.event_id, true)
+),
+named AS (
+    SELECT
+        callback_instance_id, name, count(*) AS event_count, min(at_ns) AS first_ns,
+        min(user_event_id) AS first_id
+    FROM main.user_event
+    WHERE callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
+    GROUP BY callback_instance_id, name
+),
+happened AS (
+    SELECT
+        callback_instance_id,
+        list(
+            {'name': name, 'event_count': event_count, 'first_ns': first_ns}
+            ORDER BY first_ns, first_id
+        ) AS user_events
+    FROM named
+    GROUP BY callback_instance_id
 )
 SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
     s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
     s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
-    w.busy_min_ns, w.busy_max_ns, u.until_ns
+    w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events
 FROM step AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns
     FROM main.executor_wait
     WHERE run_id = $run_id AND since IN ('publication', 'request')
 ) AS w ON s.kind = 'callback_instance' AND s.id = w.callback_instance_id
+LEFT JOIN happened AS v ON s.kind = 'callback_instance' AND s.id = v.callback_instance_id
 LEFT JOIN went_on AS u ON s.kind = 'publication' AND s.id = u.publication_id
 ORDER BY abs(s.depth), s.depth, s.start_ns, s.kind, s.id, s.from_kind, s.from_id, s.link_kind

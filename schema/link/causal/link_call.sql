@@ -16,11 +16,11 @@ WITH taken AS (
         receiver_thread_id AS thread_id, taken_ns, request_id AS taken_request_id,
         NULL::BIGINT AS taken_response_id
     FROM store.request
-    WHERE run_id = only_run AND taken_ns IS NOT NULL AND callback_instance_id IS NULL
+    WHERE run_id = only_run AND callback_instance_id IS NULL
     UNION ALL
     SELECT receiver_thread_id, taken_ns, NULL, response_id
     FROM store.response
-    WHERE run_id = only_run AND taken_ns IS NOT NULL
+    WHERE run_id = only_run
 ),
 -- Threads that take calls, with all that shows what they turn to.
 executing AS MATERIALIZED (
@@ -39,7 +39,7 @@ turn AS (
     FROM taken AS k
     SEMI JOIN executing AS e ON k.thread_id = e.thread_id
     UNION ALL
-    SELECT thread_id, at_ns, NULL, NULL FROM executing WHERE at_ns IS NOT NULL
+    SELECT thread_id, at_ns, NULL, NULL FROM executing
     UNION ALL
     SELECT thread_id, taken_ns, NULL, NULL
     FROM store.take AS t
@@ -53,15 +53,13 @@ sent AS (
         b.publication_id, NULL::BIGINT AS request_id, NULL::BIGINT AS response_id
     FROM store.publication AS b
     SEMI JOIN taken AS k ON b.thread_id = k.thread_id
-    ANTI JOIN (
-        SELECT publication_id FROM store.link_causal WHERE run_id = only_run AND kind = 'direct'
-    ) AS d ON b.publication_id = d.publication_id
+    ANTI JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
     WHERE b.run_id = only_run
     UNION ALL
     SELECT q.sender_thread_id, q.sent_ns, 'client', q.client_id, NULL, q.request_id, NULL
     FROM store.request AS q
     JOIN store.link_request AS l ON q.request_id = l.request_id
-    WHERE q.run_id = only_run AND l.callback_instance_id IS NULL
+    WHERE q.run_id = only_run AND l.run_id = only_run AND l.callback_instance_id IS NULL
     UNION ALL
     SELECT r.sender_thread_id, r.sent_ns, 'service', r.service_id, NULL, NULL, r.response_id
     FROM store.response AS r
@@ -72,9 +70,10 @@ sent AS (
         JOIN store.callback_instance AS i
             ON l.callback_instance_id = i.callback_instance_id
             AND r.sender_thread_id = i.thread_id
-        WHERE r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
+        WHERE l.run_id = only_run
+            AND r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
     ) AS i ON r.response_id = i.response_id
-    WHERE r.run_id = only_run AND r.sent_ns IS NOT NULL
+    WHERE r.run_id = only_run
 ),
 behind AS MATERIALIZED (
     SELECT s.*, t.at_ns, t.taken_request_id, t.taken_response_id

@@ -25,7 +25,7 @@ by_hand AS MATERIALIZED (
     FROM store.take AS t
     ANTI JOIN handled AS h ON t.take_id = h.take_id
     ANTI JOIN buffered AS b ON t.subscription_id = b.subscription_id
-    WHERE t.run_id = only_run AND t.subscription_id IS NOT NULL
+    WHERE t.run_id = only_run
 ),
 run AS MATERIALIZED (
     SELECT
@@ -66,7 +66,7 @@ published AS (
     JOIN store.publication AS b ON d.publication_id = b.publication_id
     WHERE b.run_id = only_run
 ),
-linked AS (
+linked AS MATERIALIZED (
     SELECT
         p.publication_id, p.publisher_id, p.trace_id, p.start_ns, t.take_id, t.taken_ns,
         p.is_loss_affected OR t.is_loss_affected AS is_loss_affected
@@ -75,20 +75,10 @@ linked AS (
         ON p.callback_instance_id = t.callback_instance_id
         AND p.subscription_id = t.subscription_id
         AND p.start_event_id > t.start_event_id
-),
-behind_gap AS (
-    SELECT l.publication_id, l.take_id
-    FROM (
-        SELECT n.publication_id, n.take_id, n.start_ns, n.taken_ns, x.recording_id
-        FROM linked AS n
-        JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
-    ) AS l
-    ASOF JOIN derive.recording_gap AS g
-        ON l.recording_id = g.recording_id AND l.start_ns > g.start_ns
-    WHERE g.start_ns >= l.taken_ns OR g.covered_until_ns > l.taken_ns
 )
 SELECT
     only_run AS run_id, l.take_id, l.publication_id, l.publisher_id,
     l.is_loss_affected
 FROM linked AS l
-ANTI JOIN behind_gap AS g ON l.publication_id = g.publication_id AND l.take_id = g.take_id
+ANTI JOIN derive.take_behind_gap('linked') AS g
+    ON l.publication_id = g.publication_id AND l.take_id = g.take_id

@@ -50,7 +50,7 @@ alone AS (
     ANTI JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
     WHERE b.run_id = only_run AND (b.publisher_id IS NOT NULL OR b.is_loss_affected)
 ),
-adjacent AS (
+adjacent AS MATERIALIZED (
     SELECT
         a.run_id, a.thread_id, t.take_id, t.subscription_id, t.taken_ns, a.publication_id,
         a.publisher_id, a.trace_id, a.start_event_id, a.start_ns
@@ -60,17 +60,6 @@ adjacent AS (
         AND a.thread_id = t.thread_id
         AND a.start_event_id > t.event_id
     WHERE t.take_id IS NOT NULL
-),
-behind_gap AS (
-    SELECT a.publication_id
-    FROM (
-        SELECT n.publication_id, n.start_ns, n.taken_ns, x.recording_id
-        FROM adjacent AS n
-        JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
-    ) AS a
-    ASOF JOIN derive.recording_gap AS g
-        ON a.recording_id = g.recording_id AND a.start_ns > g.start_ns
-    WHERE g.start_ns >= a.taken_ns OR g.covered_until_ns > a.taken_ns
 ),
 -- Requests and responses that the thread took. Only their times are stored, not their events.
 called AS (
@@ -95,5 +84,5 @@ SELECT
     a.run_id, a.thread_id, a.take_id, a.subscription_id, a.taken_ns, a.publication_id,
     a.publisher_id, a.start_event_id, a.start_ns
 FROM adjacent AS a
-ANTI JOIN behind_gap AS g ON a.publication_id = g.publication_id
+ANTI JOIN derive.take_behind_gap('adjacent') AS g ON a.publication_id = g.publication_id
 ANTI JOIN behind_call AS c ON a.publication_id = c.publication_id

@@ -12,6 +12,8 @@ next_call AS (
     SELECT u.start_event_id, min(e.event_id) AS event_id, min(e.ts_ns) AS ts_ns
     FROM staging.predecessor AS e
     JOIN unstamped AS u ON e.previous_event_id = u.end_event_id
+    -- What the user's own code records may be inside the call.
+    ANTI JOIN raw.user_event AS o ON e.event_id = o.event_id
     WHERE e.sequence = 'call'
     GROUP BY u.start_event_id
 ),

@@ -1,0 +1,71 @@
+"""Events of the user's own programs: which ones to load, and their rows with fields as JSON."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from msgflow.ingest.catalogue import load
+from msgflow.ingest.event_patterns import is_match
+from msgflow.sql.json_fields import column_name, json_fields
+from msgflow.trace import COMMON_SCHEMA
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import duckdb
+
+    from msgflow.trace import TraceInfo
+
+_SCHEMA = pa.schema([*COMMON_SCHEMA, ("name", pa.string()), ("fields", pa.string())])
+_BATCH = "user_event_batch"
+
+
+def names_of(patterns: Sequence[str], traces: Sequence[TraceInfo]) -> frozenset[str]:
+    """Return the names of events to load, of those that the traces declare.
+
+    They match a pattern, msgflow does not read them in any case, and their traces say of each
+    event which process and thread it comes from (the kernel's do not).
+
+    Args:
+        patterns: patterns of event names, such as 'my_pkg:*'.
+        traces: what the traces declare.
+    """
+    known = load().in_traces
+    return frozenset(
+        name
+        for trace in traces
+        if trace.domain != "kernel" and trace.has_process_context
+        for name in trace.event_names
+        if name not in known and is_match(name, patterns)
+    )
+
+
+def user_rows(con: duckdb.DuckDBPyConnection, name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
+    """Return events with `COMMON_SCHEMA`, their name, and their fields as one column of JSON.
+
+    Args:
+        con: connection that nothing else uses meanwhile.
+        name: of all these events.
+        batch: the events, with a column for each field.
+    """
+    common = len(COMMON_SCHEMA)
+    # By position: a field may have the name of a common column, or of another in upper case.
+    payload = pa.schema(list(batch.schema)[common:])
+    columns = [column_name(position) for position in range(len(payload))]
+    if columns:
+        con.register(_BATCH, pa.RecordBatch.from_arrays(batch.columns[common:], names=columns))
+        try:
+            found = con.sql(f"SELECT CAST({json_fields(payload)} AS VARCHAR) FROM {_BATCH}")
+            fields = found.to_arrow_table().column(0).combine_chunks()
+        finally:
+            con.unregister(_BATCH)
+    else:
+        fields = _repeated("{}", batch.num_rows)
+    named = _repeated(name, batch.num_rows)
+    return pa.RecordBatch.from_arrays([*batch.columns[:common], named, fields], schema=_SCHEMA)
+
+
+def _repeated(text: str, count: int) -> pa.Array:
+    return pa.repeat(pa.scalar(text), count)

@@ -1,0 +1,67 @@
+"""SQL expressions that turn the fields of events into JSON.
+
+Names of fields come from traces: they stand in SQL only as quoted literals.
+"""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from msgflow.sql.quoting import literal
+
+MOST_LAMBDAS = 2
+"""DuckDB needs ten times as long to bind each further lambda inside a lambda."""
+
+
+def column_name(position: int) -> str:
+    """Return the name in SQL of the payload column at this position."""
+    return f"payload_{position}"
+
+
+def json_fields(payload: pa.Schema) -> str:
+    """Return the SQL of a JSON object with all fields, over the columns `column_name` names."""
+    members = (
+        f"{literal(field.name)}, {exact(column_name(position), field.type)}"
+        for position, field in enumerate(payload)
+    )
+    return f"json_object({', '.join(members)})"
+
+
+def exact(expression: str, data_type: pa.DataType, lambdas: int = 0) -> str:
+    """Return the SQL of a value that JSON can hold: NaN and infinities become NULL.
+
+    Arrays of arrays of arrays of floating point numbers become text.
+
+    Args:
+        expression: SQL of the value.
+        data_type: of the value.
+        lambdas: lists around the value.
+    """
+    types = pa.types
+    if not _has_floats(data_type):
+        return expression
+    if types.is_floating(data_type):
+        return f"CASE WHEN isfinite({expression}) THEN {expression} END"
+    if types.is_list(data_type):
+        if lambdas == MOST_LAMBDAS:
+            return f"CAST({expression} AS VARCHAR)"
+        element = exact("element", data_type.value_type, lambdas + 1)
+        return f"list_transform({expression}, lambda element: {element})"
+    members = ", ".join(
+        f"{literal(field.name)}, {exact(member(expression, place), field.type, lambdas)}"
+        for place, field in enumerate(data_type)
+    )
+    return f"CASE WHEN {expression} IS NOT NULL THEN json_object({members}) END"
+
+
+def member(expression: str, place: int) -> str:
+    """Return the SQL of a member of a structure; names may differ in case alone."""
+    return f"struct_extract_at({expression}, {place + 1})"
+
+
+def _has_floats(data_type: pa.DataType) -> bool:
+    if pa.types.is_list(data_type):
+        return _has_floats(data_type.value_type)
+    if pa.types.is_struct(data_type):
+        return any(_has_floats(field.type) for field in data_type)
+    return bool(pa.types.is_floating(data_type))

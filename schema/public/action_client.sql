@@ -1,0 +1,32 @@
+-- name: main.action_client
+-- description: Action clients: three clients of services and two subscriptions (action_server).
+-- grain: one row per action client
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: action_client_id BIGINT  Identity of the action client: that of its client of send_goal
+-- column: process_id BIGINT  Process it lives in
+-- column: node_id BIGINT  Node it belongs to
+-- column: action_name VARCHAR  Name of the action
+-- column: cancel_client_id BIGINT  Its client of cancel_goal
+-- column: result_client_id BIGINT  Its client of get_result
+-- column: feedback_subscription_id BIGINT  Its subscription to feedback, of the goals of all
+--     clients
+-- column: status_subscription_id BIGINT  Its subscription to the states of all goals
+-- column: created_ns BIGINT [epoch ns]  When it was created
+-- column: goal_count BIGINT  Goals that it sent; NULL: the run has no events of requests (before
+--     Kilted)
+WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
+sent AS (
+    SELECT client_id, count(DISTINCT sequence_number) AS number
+    FROM store.request
+    GROUP BY client_id
+)
+SELECT
+    a.run_id, a.action_client_id, a.process_id, a.node_id, a.action_name, a.cancel_client_id,
+    a.result_client_id, a.feedback_subscription_id, a.status_subscription_id,
+    c.created_ns,
+    CASE
+        WHEN a.run_id IN (SELECT run_id FROM store.request) THEN coalesce(q.number, 0)
+    END AS goal_count
+FROM derive.action_client('endpoint') AS a
+JOIN main.client AS c ON a.action_client_id = c.client_id
+LEFT JOIN sent AS q ON a.action_client_id = q.client_id

@@ -1,0 +1,47 @@
+-- name: main.action_server
+-- description: Action servers. An action is three services and two topics: NAME/_action/send_goal,
+--     cancel_goal and get_result, NAME/_action/feedback and status.
+-- grain: one row per action server
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: action_server_id BIGINT  Identity of the action server: that of its service send_goal
+-- column: process_id BIGINT  Process it lives in
+-- column: node_id BIGINT  Node it belongs to
+-- column: action_name VARCHAR  Name of the action
+-- column: cancel_service_id BIGINT  Its service cancel_goal
+-- column: result_service_id BIGINT  Its service get_result
+-- column: feedback_publisher_id BIGINT  Its publisher of feedback
+-- column: status_publisher_id BIGINT  Its publisher of the states of its goals
+-- column: created_ns BIGINT [epoch ns]  When it was created
+-- column: goal_count BIGINT  Goals that it took; NULL: the run has no events of requests (before
+--     Kilted)
+-- column: feedback_count BIGINT  Feedback messages that it published, of all goals
+-- column: status_count BIGINT  Status messages that it published
+WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
+taken AS (
+    SELECT service_id, count(*) AS number
+    FROM store.request
+    WHERE taken_ns IS NOT NULL
+    GROUP BY service_id
+),
+published AS (
+    SELECT publisher_id, count(*) AS number
+    FROM store.publication
+    WHERE publisher_id IN (
+        SELECT object_id FROM endpoint WHERE kind = 'publisher'
+    )
+    GROUP BY publisher_id
+)
+SELECT
+    a.run_id, a.action_server_id, a.process_id, a.node_id, a.action_name, a.cancel_service_id,
+    a.result_service_id, a.feedback_publisher_id, a.status_publisher_id,
+    s.created_ns,
+    CASE
+        WHEN a.run_id IN (SELECT run_id FROM store.request) THEN coalesce(q.number, 0)
+    END AS goal_count,
+    coalesce(f.number, 0) AS feedback_count,
+    coalesce(t.number, 0) AS status_count
+FROM derive.action_server('endpoint') AS a
+JOIN main.service AS s ON a.action_server_id = s.service_id
+LEFT JOIN taken AS q ON a.action_server_id = q.service_id
+LEFT JOIN published AS f ON a.feedback_publisher_id = f.publisher_id
+LEFT JOIN published AS t ON a.status_publisher_id = t.publisher_id

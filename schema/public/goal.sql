@@ -1,0 +1,133 @@
+-- name: main.goal
+-- description: Goals of actions, from sending to result, as far as services and topics of the
+--     action show it (events of requests: Kilted and later). The identity that ROS gives to a goal
+--     is not in the trace, and neither is how it ended: succeeded, aborted or cancelled. So a
+--     result is known to be of a goal if the client asked for it in the callback of the answer, or
+--     if no other accepted goal of that client was open. Feedback and requests to cancel are known
+--     to be of it if the server was concerned with no other goal at that time.
+-- grain: one row per goal and action server that took it; one per goal that none took
+-- column: run_id BIGINT  Run that the row belongs to
+-- column: goal_id BIGINT  Identity of the goal: that of the request that sent it
+-- column: action_name VARCHAR  Name of the action
+-- column: action_client_id BIGINT  Action client that sent it; NULL: not traced
+-- column: action_server_id BIGINT  Action server that took it; NULL: none was seen to
+-- column: sent_ns BIGINT [epoch ns]  The client sent it
+-- column: taken_ns BIGINT [epoch ns]  The server took it
+-- column: answered_ns BIGINT [epoch ns]  The server said whether it accepts it; where it does,
+--     from then on it may execute it
+-- column: answer_taken_ns BIGINT [epoch ns]  The client took that answer
+-- column: is_accepted BOOLEAN  Whether the server accepted it: it published its status right after
+--     its answer, or the client asked for the result; NULL: not known
+-- column: result_asked_ns BIGINT [epoch ns]  The client asked for the result
+-- column: result_sent_ns BIGINT [epoch ns]  The server sent the result: when there was one, and
+--     the client had asked
+-- column: result_taken_ns BIGINT [epoch ns]  The client took the result
+-- column: result_request_id BIGINT  Request for the result
+-- column: result_candidate_count BIGINT  0: nobody asked for the result; 1: its request is known;
+--     more: so many goals that the requests of the client may be for, and what is about the result
+--     is NULL; NULL: not accepted, or the client got no answer
+-- column: feedback_count BIGINT  Feedback messages published while the server was concerned with
+--     no other goal; NULL: it was at no time known to be
+-- column: first_feedback_ns BIGINT [epoch ns]  The first of them; NULL: none, or another goal was
+--     open meanwhile
+-- column: last_feedback_ns BIGINT [epoch ns]  The last of them, likewise
+-- column: is_overlapping BOOLEAN  The server was concerned with another goal for a part of the
+--     time: some feedback and requests to cancel may not be known
+-- column: cancel_asked_ns BIGINT [epoch ns]  A client asked to cancel it, and the server accepted
+--     that
+-- column: cancel_accepted_ns BIGINT [epoch ns]  The server published that it cancels it
+-- column: accept_latency_ns BIGINT [ns]  From sending it to the take of the answer, on the client's
+--     clock
+-- column: execution_ns BIGINT [ns]  From the answer to the sending of the result, on the server's
+--     clock; clients that ask late make it longer
+-- column: first_feedback_latency_ns BIGINT [ns]  From the answer to the first feedback, on the
+--     server's clock
+-- column: latency_ns BIGINT [ns]  From sending it to the take of its result, on the client's clock
+-- column: is_loss_affected BOOLEAN  A gap of a trace lies between the first and the last of these
+--     moments: what is missing may have happened
+WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
+server AS MATERIALIZED (FROM derive.action_server('endpoint')),
+client AS MATERIALIZED (FROM derive.action_client('endpoint')),
+answered AS MATERIALIZED (FROM derive.goal_answer('server')),
+request AS MATERIALIZED (FROM derive.goal_request('server', 'client', 'answered')),
+paired AS MATERIALIZED (FROM derive.goal_result('server', 'client', 'request')),
+span AS MATERIALIZED (FROM derive.goal_span('server', 'request', 'paired')),
+alone AS MATERIALIZED (FROM derive.goal_alone('span')),
+answer AS (
+    SELECT request_id, min(sent_ns) AS sent_ns, min(taken_ns) AS taken_ns
+    FROM main.response
+    WHERE request_id IS NOT NULL
+    GROUP BY request_id
+),
+result AS (
+    SELECT p.goal_id, p.request_id, q.sent_ns AS asked_ns, a.sent_ns, a.taken_ns
+    FROM paired AS p
+    JOIN main.request AS q ON p.request_id = q.request_id
+    LEFT JOIN answer AS a ON p.request_id = a.request_id
+    WHERE p.candidate_count = 1
+),
+possible AS (
+    SELECT goal_id, any_value(candidate_count) AS candidate_count
+    FROM paired
+    GROUP BY goal_id
+),
+told AS (
+    SELECT
+        f.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
+    FROM derive.goal_feedback('server', 'alone') AS f
+    JOIN main.publication AS b ON f.publication_id = b.publication_id
+    GROUP BY f.goal_id
+),
+cancelled AS (
+    SELECT c.goal_id, min(q.sent_ns) AS asked_ns, min(b.start_ns) AS accepted_ns
+    FROM derive.goal_cancel('server', 'alone') AS c
+    JOIN main.request AS q ON c.request_id = q.request_id
+    JOIN main.publication AS b ON c.publication_id = b.publication_id
+    GROUP BY c.goal_id
+),
+timed AS (
+    SELECT
+        g.run_id, g.goal_id, g.action_name, g.action_client_id, g.action_server_id,
+        q.sent_ns, q.taken_ns, a.sent_ns AS answered_ns, a.taken_ns AS answer_taken_ns,
+        coalesce(g.is_accepted, CASE WHEN r.goal_id IS NOT NULL THEN true END) AS is_accepted,
+        r.asked_ns AS result_asked_ns, r.sent_ns AS result_sent_ns,
+        r.taken_ns AS result_taken_ns, r.request_id AS result_request_id,
+        p.candidate_count AS result_candidate_count,
+        CASE WHEN s.is_end_certain THEN coalesce(t.number, 0) END AS feedback_count,
+        CASE WHEN NOT s.is_overlapping THEN t.first_ns END AS first_feedback_ns,
+        CASE WHEN NOT s.is_overlapping THEN t.last_ns END AS last_feedback_ns,
+        coalesce(s.is_overlapping, false) AS is_overlapping,
+        c.asked_ns AS cancel_asked_ns, c.accepted_ns AS cancel_accepted_ns
+    FROM request AS g
+    JOIN main.request AS q ON g.goal_id = q.request_id
+    LEFT JOIN answer AS a ON g.goal_id = a.request_id
+    LEFT JOIN result AS r ON g.goal_id = r.goal_id
+    LEFT JOIN possible AS p ON g.goal_id = p.goal_id
+    LEFT JOIN span AS s ON g.goal_id = s.goal_id
+    LEFT JOIN told AS t ON g.goal_id = t.goal_id
+    LEFT JOIN cancelled AS c ON g.goal_id = c.goal_id
+),
+torn AS (
+    SELECT DISTINCT t.goal_id
+    FROM timed AS t
+    JOIN main.gap AS l ON t.run_id = l.run_id
+    JOIN store.trace AS x ON l.trace_id = x.trace_id
+    WHERE x.domain IS DISTINCT FROM 'kernel'
+        AND l.end_ns >= least(t.sent_ns, t.taken_ns)
+        AND l.start_ns <= greatest(
+            t.sent_ns, t.taken_ns, t.answered_ns, t.answer_taken_ns, t.result_asked_ns,
+            t.result_sent_ns, t.result_taken_ns, t.last_feedback_ns
+        )
+)
+SELECT
+    run_id, goal_id, action_name, action_client_id, action_server_id,
+    sent_ns, taken_ns, answered_ns, answer_taken_ns, is_accepted,
+    result_asked_ns, result_sent_ns, result_taken_ns, result_request_id, result_candidate_count,
+    feedback_count, first_feedback_ns, last_feedback_ns, is_overlapping,
+    cancel_asked_ns, cancel_accepted_ns,
+    answer_taken_ns - sent_ns AS accept_latency_ns,
+    result_sent_ns - answered_ns AS execution_ns,
+    first_feedback_ns - answered_ns AS first_feedback_latency_ns,
+    result_taken_ns - sent_ns AS latency_ns,
+    goal_id IN (FROM torn) AS is_loss_affected
+FROM timed

@@ -1,0 +1,47 @@
+-- name: derive.goal_span
+-- kind: macro
+-- description: From when to when an action server was concerned with a goal that it accepted, or
+--     may have: from its answer until it sent the result; without an end if nobody asked for that.
+--     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are
+--     those of all, in some order. A result of which nothing else is in the trace is of a goal that
+--     began in the gap before, or before the recording.
+-- grain: one row per goal that a server took and is not known to have rejected; one without a goal
+--     per result of an unknown goal
+-- param: servers VARCHAR  Name of the rows of derive.action_server
+-- param: goals VARCHAR  Name of the rows of derive.goal_request
+-- param: results VARCHAR  Name of the rows of derive.goal_result
+CREATE OR REPLACE MACRO derive.goal_span(servers, goals, results) AS TABLE
+WITH span AS (
+    SELECT
+        g.run_id,
+        g.goal_id,
+        g.action_server_id,
+        coalesce(g.answered_ns, g.taken_ns) AS start_ns,
+        min(r.sent_ns) AS end_ns,
+        coalesce(any_value(p.candidate_count), 0) <= 1 AS is_end_certain
+    FROM query_table(goals) AS g
+    LEFT JOIN query_table(results) AS p ON g.goal_id = p.goal_id
+    LEFT JOIN store.response AS r ON p.request_id = r.request_id
+    WHERE g.taken_ns IS NOT NULL AND g.is_accepted IS DISTINCT FROM false
+    GROUP BY g.run_id, g.goal_id, g.action_server_id, g.answered_ns, g.taken_ns
+    UNION ALL
+    SELECT r.run_id, NULL, s.action_server_id, coalesce(l.start_ns, 0), r.sent_ns, false
+    FROM store.response AS r
+    JOIN query_table(servers) AS s ON r.service_id = s.result_service_id
+    ASOF LEFT JOIN store.gap AS l ON r.run_id = l.run_id AND r.sent_ns >= l.start_ns
+    WHERE r.request_id IS NULL
+)
+SELECT
+    *,
+    coalesce(bool_or(end_ns IS NULL) OVER before OR max(end_ns) OVER before > start_ns, false)
+    OR (
+        lead(start_ns) OVER ordered IS NOT NULL
+        AND coalesce(lead(start_ns) OVER ordered < end_ns, true)
+    ) AS is_overlapping
+FROM span
+WINDOW
+    ordered AS (PARTITION BY action_server_id ORDER BY start_ns, goal_id),
+    before AS (
+        PARTITION BY action_server_id ORDER BY start_ns, goal_id
+        ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+    )

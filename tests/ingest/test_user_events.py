@@ -1,0 +1,259 @@
+"""Events of the user's own tracepoints: which are loaded, and their fields as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from uuid import UUID
+
+import duckdb
+import pytest
+from ctf_writer import Event, Packet, TraceContent, write_trace
+from ingested import rows
+
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
+from msgflow.trace import open as open_traces
+
+Make = Callable[..., Path]
+# What makes it a trace of ROS 2.
+ROS = {"ros2:rcl_init": {"context_handle": "u64", "version": "str"}}
+FIELDS = {
+    **ROS,
+    "ros2:callback_start": {"callback": "u64", "is_intra_process": "i32"},
+    "ros2:callback_end": {"callback": "u64"},
+    "my_pkg:done": {"x": "i32"},
+    "my_pkg:started": {},
+    "other:thing": {"x": "i32"},
+}
+EVENTS = [
+    ("ros2:rcl_init", (1, b"8.2.3")),
+    ("my_pkg:started", ()),
+    ("ros2:callback_start", (0xC1, 0)),
+    ("my_pkg:done", (1,)),
+    ("ros2:callback_end", (0xC1,)),
+    ("my_pkg:done", (2,)),
+    ("other:thing", (3,)),
+]
+READERS = ["msgflow", "bt2"]
+LOADED = (
+    "SELECT name, fields, callback_instance_id IS NOT NULL FROM user_event ORDER BY user_event_id"
+)
+
+
+def findings(report: Any, name: str) -> list[tuple[str, int, str]]:
+    return [(f.severity, f.count, f.detail) for f in report.findings if f.name == name]
+
+
+def fields_of(database: Path) -> list[dict[str, Any]]:
+    found = rows(database, "SELECT fields FROM user_event ORDER BY user_event_id")
+    return [json.loads(text) for (text,) in found]
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_events_that_match_a_pattern_are_loaded(
+    make_trace: Make, new_database: Path, reader: str
+) -> None:
+    trace = make_trace(FIELDS, EVENTS)
+    report = ingest([trace], new_database, events=["my_pkg:*"], reader=reader)
+    assert rows(new_database, LOADED) == [
+        ("my_pkg:started", "{}", False),
+        ("my_pkg:done", '{"x":1}', True),
+        ("my_pkg:done", '{"x":2}', False),
+    ]
+    (unknown,) = findings(report, "unknown_event")
+    assert unknown[1:] == (
+        1, "events that are not in the catalogue and were not loaded: other:thing (1)"
+    )  # fmt: skip
+    assert findings(report, "user_event_not_loaded") == []
+    assert [f for f in report.findings if f.phase == "database"] == []
+
+
+def test_none_is_loaded_unless_asked_for(make_trace: Make, new_database: Path) -> None:
+    report = ingest([make_trace(FIELDS, EVENTS)], new_database)
+    assert rows(new_database, LOADED) == []
+    ((_, count, _),) = findings(report, "unknown_event")
+    assert count == 4
+
+
+def test_patterns_that_load_nothing_are_told(make_trace: Make, new_database: Path) -> None:
+    """With what the trace has; what a pattern loads besides is loaded."""
+    report = ingest(
+        [make_trace(FIELDS, EVENTS)],
+        new_database,
+        events=["my_pgk:*", "ros2:*", "*:done", "my_pgk:*"],
+    )
+    assert [name for name, *_ in rows(new_database, LOADED)] == ["my_pkg:done", "my_pkg:done"]
+    assert findings(report, "user_event_not_loaded") == [
+        (
+            "warning",
+            2,
+            "patterns that load no event: my_pgk:*, ros2:* (read in any case); the traces have"
+            " my_pkg:started (1), other:thing (1)",
+        )
+    ]
+
+
+def test_all_that_msgflow_does_not_read_is_loaded_by_a_star(
+    make_trace: Make, new_database: Path
+) -> None:
+    """And what msgflow reads is not read twice."""
+    report = ingest([make_trace(FIELDS, EVENTS)], new_database, events=["*"])
+    assert [name for name, *_ in rows(new_database, LOADED)] == [
+        "my_pkg:started", "my_pkg:done", "my_pkg:done", "other:thing"
+    ]  # fmt: skip
+    assert findings(report, "unknown_event") == []
+    assert findings(report, "user_event_not_loaded") == []
+    assert rows(new_database, "SELECT count(*) FROM callback_instance") == [(1,)]
+
+
+def test_nothing_else_to_load_is_told(make_trace: Make, new_database: Path) -> None:
+    report = ingest([make_trace(ROS, EVENTS[:1])], new_database, events=["my_pkg:*"])
+    ((_, _, detail),) = findings(report, "user_event_not_loaded")
+    assert detail.endswith("no others than those that are read in any case")
+
+
+def test_what_is_ignored_is_not_loaded(make_trace: Make, new_database: Path) -> None:
+    report = ingest(
+        [make_trace(FIELDS, EVENTS)], new_database, events=["my_pkg:*"], ignore=["*:started"]
+    )
+    assert {name for name, *_ in rows(new_database, LOADED)} == {"my_pkg:done"}
+    assert findings(report, "user_event_not_loaded") == []
+
+
+def test_events_of_the_kernel_are_of_no_thread(make_trace: Make, new_database: Path) -> None:
+    """They have no process either, in which a row could be."""
+    kernel = make_trace(
+        {"block_rq": {"x": "i32"}},
+        [("block_rq", (1,))],
+        name="kernel",
+        contexts={},
+        environment={"hostname": "robot", "domain": "kernel", "tracer_name": "lttng-modules"},
+        trace_uuid=UUID(int=7),
+    )
+    report = ingest([make_trace(FIELDS, EVENTS), kernel], new_database, events=["block*", "my*"])
+    assert {name for name, *_ in rows(new_database, LOADED)} == {"my_pkg:started", "my_pkg:done"}
+    ((_, count, detail),) = findings(report, "user_event_not_loaded")
+    assert count == 1
+    assert detail.startswith("patterns that load no event: block* (of no thread); the traces have")
+
+
+MANY_TYPES = {
+    **{f"u{bits}": f"u{bits}" for bits in (8, 16, 32, 64)},
+    **{f"i{bits}": f"i{bits}" for bits in (8, 16, 32, 64)},
+    "address": "x64",
+    "single": "f32",
+    "double": "f64",
+    "text": "str",
+    "letters": "text[8]",
+    "fixed": "i16[3]",
+    "any": "u64[]",
+    "bytes": "u8[]",
+    "ratios": "f64[2]",
+    # Names that msgflow's own columns have, and two that differ in case alone.
+    "event_id": "i32",
+    "ts_ns": "i32",
+    "name": "str",
+    "Name": "str",
+    "payload_0": "i8",
+}
+LOW = {f"i{bits}": -(1 << (bits - 1)) for bits in (8, 16, 32, 64)}
+HIGH = {f"u{bits}": (1 << bits) - 1 for bits in (8, 16, 32, 64)}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_every_type_of_field_becomes_json(tmp_path: Path, reader: str) -> None:
+    """Integers to the last digit; bytes that are no UTF-8 get replacement characters."""
+    values: dict[str, Any] = {
+        **LOW, **HIGH, "address": 0xFFFF_FFFF_FFFF_FFFF, "single": 0.5, "double": 1e-310,
+        "text": b'\xff"\\\n\xc3\xa4', "letters": b"abc", "fixed": (-1, 0, 1),
+        "any": (1 << 63, 0), "bytes": (0, 255), "ratios": (0.25, math.nan), "event_id": -7,
+        "ts_ns": 8, "name": b"", "Name": b"N", "payload_0": 3,
+    }  # fmt: skip
+    odd = {**values, "double": math.inf, "single": -math.inf, "any": (), "bytes": ()}
+    made = [
+        Event(1_000 + number, "my_pkg:all", [given[name] for name in MANY_TYPES])
+        for number, given in enumerate((values, odd))
+    ]
+    made.insert(0, Event(900, "ros2:rcl_init", (1, b"8.2.3")))
+    trace = write_trace(
+        tmp_path / "trace",
+        TraceContent({**ROS, "my_pkg:all": MANY_TYPES}, {0: [Packet(made, begin=900)]}),
+    )
+    ingest([trace], tmp_path / "run.duckdb", events=["my_pkg:*"], reader=reader)
+    first, second = fields_of(tmp_path / "run.duckdb")
+    expected = {
+        **{name: values[name] for name in MANY_TYPES},
+        "text": '\N{REPLACEMENT CHARACTER}"\\\nä', "letters": "abc", "fixed": [-1, 0, 1],
+        "any": [1 << 63, 0], "bytes": [0, 255], "ratios": [0.25, None], "name": "", "Name": "N",
+    }  # fmt: skip
+    lengths = {name for name in first if name.endswith("_length")}
+    assert {name: value for name, value in first.items() if name not in lengths} == expected
+    assert second | {"text": None, "letters": None} == first | {
+        "double": None, "single": None, "any": [], "bytes": [], "text": None, "letters": None,
+        **dict.fromkeys(lengths, 0),
+    }  # fmt: skip
+
+
+def test_both_readers_give_the_same(tmp_path: Path) -> None:
+    trace = simulate("own_events", tmp_path / "trace", factor=0.05).directory
+    tables = []
+    for reader in READERS:
+        path = tmp_path / f"{reader}.duckdb"
+        ingest([trace], path, events=["my_pkg:*"], reader=reader)
+        with duckdb.connect(str(path), read_only=True) as con:
+            tables.append(con.execute("FROM store.user_event ORDER BY user_event_id").fetchall())
+    assert tables[0] == tables[1] != []
+
+
+def test_all_other_tables_stay_as_they_are(tmp_path: Path) -> None:
+    """But that threads are there which no event of ROS 2 was of, and were seen longer."""
+    trace = simulate("own_events", tmp_path / "trace", factor=0.05).directory
+    contents = []
+    for number, events in enumerate(([], ["my_pkg:*"])):
+        path = tmp_path / f"{number}.duckdb"
+        ingest([trace], path, events=events)
+        with duckdb.connect(str(path), read_only=True) as con:
+            names = [name for (name,) in con.execute(
+                "SELECT table_name FROM duckdb_tables() WHERE schema_name = 'store'"
+            ).fetchall()]  # fmt: skip
+            same = {"run", "user_event", "finding", "process", "thread", "definition"}
+            contents.append(
+                {
+                    name: con.execute(f"FROM store.{name} ORDER BY ALL").fetchall()
+                    for name in names
+                    if name not in same
+                }
+            )
+    assert contents[0] == contents[1]
+
+
+def test_an_event_that_two_sessions_recorded_is_loaded_once(tmp_path: Path) -> None:
+    """Each name for itself: what only one of the sessions has enabled is not lost."""
+    trace = simulate("own_events", tmp_path / "once" / "first", factor=0.05).directory
+    shutil.rmtree(trace / "truth")
+    twice = tmp_path / "twice"
+    for name in ("first", "second"):
+        shutil.copytree(trace, twice / name)
+    (metadata,) = (twice / "second").rglob("metadata")
+    with open_traces([trace]) as traces:
+        uuid = UUID(traces.traces[0].uuid)
+    other = UUID(int=0x2A)
+    for file in (twice / "second").rglob("*"):
+        if file.is_file():
+            content = file.read_bytes().replace(uuid.bytes, other.bytes)
+            content = content.replace(str(uuid).encode(), str(other).encode())
+            if file == metadata:
+                # The second session calls it otherwise: another event, which only it has.
+                content = content.replace(b"my_pkg:frame_done", b"my_pkg:frame_DONE")
+            file.write_bytes(content)
+    ingest([trace], tmp_path / "once.duckdb", events=["my_pkg:*"])
+    ingest([twice], tmp_path / "twice.duckdb", events=["my_pkg:*"])
+    ((count,),) = rows(tmp_path / "once.duckdb", "SELECT count(*) FROM user_event")
+    assert rows(
+        tmp_path / "twice.duckdb", "SELECT name, count(*) FROM user_event GROUP BY ALL ORDER BY 1"
+    ) == [("my_pkg:frame_DONE", count), ("my_pkg:frame_done", count)]

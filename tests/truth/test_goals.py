@@ -1,0 +1,47 @@
+"""Goals of actions: a simulated system, and real nodes of rclpy that were recorded once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ingested import ingest_one
+from scoring import Score, compare_real, compare_simulated
+
+from msgflow.ingest import ingest
+from msgflow.sim import simulate
+
+# Kilted, Fast DDS: a server with four threads executes goals of two actions of one client.
+REAL = Path(__file__).parent / "real_actions"
+KINDS = {"goal_accepted", "goal_rejected", "goal_result", "goal_message"}
+
+
+def test_goals_of_a_simulation(tmp_path: Path) -> None:
+    simulation = simulate("actions", tmp_path / "trace", factor=0.5)
+    ingest([simulation.directory], tmp_path / "run.duckdb")
+    scores, _ = compare_simulated(tmp_path / "run.duckdb", simulation.truth)
+    assert_right(scores)
+
+
+def test_goals_of_real_nodes(tmp_path: Path) -> None:
+    ingest([REAL / "trace.tar.xz"], tmp_path / "run.duckdb")
+    assert_right(compare_real(tmp_path / "run.duckdb", REAL / "truth.jsonl.gz"))
+
+
+def assert_right(scores: list[Score]) -> None:
+    by_kind = {score.kind: score for score in scores}
+    assert by_kind.keys() >= KINDS
+    assert all(by_kind[kind].found > 5 for kind in KINDS)
+    assert not [score for score in scores if score.wrong or score.missing or score.doubted]
+
+
+def test_what_is_known_of_goals_before_kilted(tmp_path: Path) -> None:
+    simulation = simulate("actions", tmp_path / "trace", factor=0.1, layout="jazzy")
+    ingested = ingest_one(simulation.directory, tmp_path / "run.duckdb")
+    assert ingested.rows("FROM goal") == []
+    assert ingested.rows(
+        "SELECT action_name, goal_count, feedback_count > 0, status_count > 0 FROM action_server "
+        "ORDER BY ALL"
+    ) == [("/dock", None, True, True), ("/move", None, True, True)]
+    assert ingested.rows("SELECT DISTINCT goal_count FROM action_client") == [(None,)]
+    assert ingested.rows("SELECT subject FROM finding WHERE name = 'missing_layer'") == [("goals",)]
+    ingested.connection.close()
