@@ -216,21 +216,21 @@ asked AS (
         t.publication_id, t.take_id, t.publication_host,
         CASE
             WHEN t.method = 'ring_buffer' THEN 'derive.link_transport_ring_buffer'
-            WHEN is_rmw_stamped OR is_dds_stamped THEN 'derive.link_transport_exact'
+            WHEN u.is_stamped THEN 'derive.link_transport_exact'
             ELSE 'derive.link_transport_nearest'
         END AS needs,
         CASE
             -- A message that was kept for late subscriptions has no other event on its way there.
             WHEN t.method = 'ring_buffer' THEN p.is_intra AND r.is_dequeue AND NOT t.is_replay
-            WHEN is_rmw_stamped THEN p.is_rmw_publish AND r.is_rmw_take
-            WHEN is_dds_stamped THEN p.is_dds_write AND r.is_rmw_take
-            ELSE p.is_rmw_publish AND r.is_rmw_take
+            WHEN u.is_stamped AND is_rmw_stamped THEN p.is_rmw_publish AND r.is_rmw_take
+            WHEN u.is_stamped THEN p.is_dds_write AND r.is_rmw_take
+            ELSE p.is_whole AND r.is_rmw_take
         END
         AND (
             CASE
                 WHEN t.method = 'ring_buffer' THEN
                     t.take_id NOT IN (SELECT take_id FROM doubtful_buffer)
-                WHEN is_rmw_stamped OR is_dds_stamped THEN
+                WHEN u.is_stamped THEN
                     t.publication_id NOT IN (SELECT publication_id FROM twin WHERE is_equal)
                     AND (t.publication_host, t.publication_pid)
                         NOT IN (SELECT (host, pid) FROM mixed_process)
@@ -251,7 +251,6 @@ asked AS (
                         NOT IN (SELECT (host, pid) FROM unknown_process)
                     AND t.publication_host NOT IN (FROM far_host)
                     AND t.publication_id NOT IN (FROM torn_stamp)
-                    AND p.is_whole
             END
         ) AS is_decided
     FROM simulated_transport AS t
@@ -259,6 +258,12 @@ asked AS (
     JOIN recorded AS p ON p.kind = 'publication' AND t.publication_id::VARCHAR = p.id
     JOIN recorded AS r ON r.kind = 'take' AND t.take_id::VARCHAR = r.id
     JOIN simulated_publication AS s ON t.publication_id = s.publication_id
+    -- A message that was written to channels has no rmw_publish, and no stamp in the trace.
+    CROSS JOIN LATERAL (
+        SELECT
+            (is_rmw_stamped OR is_dds_stamped) AND (s.rmw_ns IS NOT NULL OR s.rcl_ns IS NULL)
+                AS is_stamped
+    ) AS u
 ),
 -- Time alone joins messages in groups: fewer messages of a host than these may agree by chance.
 message AS (

@@ -106,6 +106,8 @@ class Publisher:
         intra_process: subscriptions of the process that want it get messages without DDS.
         transient_local: the last `depth` messages are kept for subscriptions that come late.
         lifespan_ns: a message that waits for longer cannot be taken any more.
+        is_buffer_aware: its messages go to the channels of its subscriptions, in releases that
+            have these, unless one of them has no channel.
     """
 
     topic: str
@@ -115,6 +117,7 @@ class Publisher:
     intra_process: bool = False
     transient_local: bool = False
     lifespan_ns: int | None = None
+    is_buffer_aware: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +142,8 @@ class Subscription:
         created_ns: when a thread of the user creates it, after the begin of tracing; None: with
             the other objects of the node.
         destroyed_ns: when that thread destroys it; its addresses are free then.
+        channel: of publishers that are aware of buffers: 'own', 'shared' with the other
+            subscriptions of the topic that say so, or none.
     """
 
     topic: str
@@ -157,6 +162,7 @@ class Subscription:
     polled: bool = False
     created_ns: int | None = None
     destroyed_ns: int | None = None
+    channel: str = ""
 
 
 @dataclass(frozen=True, slots=True)

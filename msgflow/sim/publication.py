@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.sim.objects import Message
-from msgflow.sim.rmw import write
+from msgflow.sim.rmw import write, write_to_channels
 
 if TYPE_CHECKING:
     from msgflow.sim.callback_instance import CallbackInstance
@@ -50,9 +50,17 @@ def publish(
         rcl += int((250 + int(random() * 900)) * pace)
     emit(tracepoints.rcl_publish, rcl, context, publisher.handle, publisher.message)
     size_bytes = publisher.description.size_bytes
+    message.rcl_ns = rcl + epoch
+    if (channels := publisher.channels(rcl)) is not None:
+        message.rmw = rcl
+        message.stamps, end = write_to_channels(thread, channels, rcl, size_bytes)
+        message.stamp_ns = min(message.stamps.values(), default=None)
+        write_publication(thread, publisher, message, instance)
+        middleware.send(end, message)
+        return end + int((3_000 + int(random() * 6_000)) * pace)
     written = write(thread, publisher.rmw_handle, publisher.message, rcl, size_bytes)
     rmw, message.stamp_ns = written.rmw, written.stamp_ns
-    message.rcl_ns, message.rmw, message.rmw_ns = rcl + epoch, rmw, rmw + epoch
+    message.rmw, message.rmw_ns = rmw, rmw + epoch
     written.add_to_truth(thread, message.publication_id)
     write_publication(thread, publisher, message, instance)
     middleware.send(written.end, message)

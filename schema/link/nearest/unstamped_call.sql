@@ -1,0 +1,28 @@
+-- name: derive.unstamped_call
+-- kind: macro
+-- description: publish() calls whose message can only be found by time: those of processes that
+--     never show the stamp of a message, and those that the middleware has no event for though
+--     nothing was lost (rmw_zenoh with channels for buffers). Any other call without a stamp has
+--     lost an event.
+-- grain: one row per such call
+-- param: only_run BIGINT  Run to look at
+CREATE OR REPLACE MACRO derive.unstamped_call(only_run) AS TABLE
+WITH unstamped_process AS (
+    SELECT process_id
+    FROM store.publication
+    WHERE run_id = only_run
+    GROUP BY process_id
+    HAVING count(source_timestamp_ns) = 0
+)
+SELECT
+    run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns,
+    coalesce(rmw_ns, rcl_ns) AS written_ns,
+    rmw_ns IS NULL AS is_without_event
+FROM store.publication
+WHERE run_id = only_run
+    AND source_timestamp_ns IS NULL
+    AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
+    AND (
+        process_id IN (FROM unstamped_process)
+        OR (rmw_ns IS NULL AND dds_ns IS NULL AND NOT is_loss_affected)
+    )
