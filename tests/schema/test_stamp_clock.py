@@ -289,6 +289,49 @@ def test_where_nothing_is_told_a_clock_that_stood_stands(
     assert len({(difference, segment) for _, difference, segment in rows}) == 1
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_stretches_that_tell_nothing_between_two_in_which_a_clock_stood_alike(
+    rules: duckdb.DuckDBPyConnection, count: int
+) -> None:
+    """There the timer is never late, and its messages waited: they may be those of later ones."""
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) SELECT n, written_ns, "
+        "written_ns + 2000 FROM (SELECT n, n * $period + CASE WHEN n BETWEEN 150 AND $last "
+        "OR n IN (0, $count - 1) THEN 0 ELSE hash(n) % 80000 END AS written_ns "
+        "FROM range($count) AS r(n))",
+        {"period": PERIOD_NS, "count": COUNT, "last": 149 + 50 * count},
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns) "
+        "SELECT written_ns + 500 + (hash(publication_id, 7) % 1000)::BIGINT, written_ns + CASE "
+        "WHEN publication_id BETWEEN 150 AND $last THEN 25000000 ELSE 200000 END FROM published",
+        {"last": 149 + 50 * count},
+    )
+    rows = rules.execute(
+        "SELECT message_count > 0, difference_ns, segment FROM derive.stamp_clock(1)"
+    ).fetchall()
+    assert len(rows) == 8
+    assert {known for known, *_ in rows} == {True}
+    assert len({(difference, segment) for _, difference, segment in rows}) == 1
+
+
+HOURS_NS = 3 * 3_600 * SECOND
+
+
+@pytest.mark.parametrize("by_ns", [HOURS_NS, -HOURS_NS])
+@pytest.mark.parametrize("apart_ns", [0, HOURS_NS])
+def test_a_clock_that_is_set_by_hours_while_only_others_take_its_messages(
+    rules: duckdb.DuckDBPyConnection, by_ns: int, apart_ns: int
+) -> None:
+    """When they were taken tells when they were published, however far the clocks are apart."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    rules.execute("UPDATE message SET clock_id = 2, taken_ns = taken_ns + ?", [apart_ns])
+    rows = step(rules, 4 * STRETCH_NS, by_ns)
+    found = [(round(difference / SECOND), segment) for _, _, difference, _, segment in rows]
+    assert set(found) == {(0, 0), (by_ns // SECOND, 1)}
+    assert [row[0] for row in rows if row[4] == 1][0] <= 4 * STRETCH_NS
+
+
 @pytest.mark.parametrize(("here", "is_known"), [(10, True), (7, True), (6, False), (0, False)])
 def test_messages_of_a_stretch_are_taken_where_half_of_them_are(
     rules: duckdb.DuckDBPyConnection, here: int, *, is_known: bool
