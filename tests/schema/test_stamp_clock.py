@@ -101,6 +101,24 @@ def test_which_publications_a_message_may_be_of(
     assert rows == [(count,)]
 
 
+def test_a_message_that_waited_on_another_clock_is_near_its_stamp(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) "
+        "SELECT n, n * 1000000, n * 1000000 + 2000 FROM range(200) AS r(n)"
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns, clock_id) "
+        "VALUES (500, 200500, 2), (100000500, 180200000, 2)"
+    )
+    rows = rules.execute(
+        "SELECT min(written_ns), max(written_ns) FROM derive.stamp_pair(1) "
+        "WHERE written_ns + greatest_ns = 100000500"
+    ).fetchall()
+    assert rows == [(76_000_000, 124_000_000)]
+
+
 @pytest.mark.parametrize(
     ("least", "greatest", "difference"), [(0, 6_000, 3_000), (0, 8_002, 4_002), (0, 90_000, 86_000)]
 )

@@ -112,9 +112,7 @@ placed AS (
         CASE
             WHEN standing_ns IS NOT NULL OR before_span = after_span OR is_alone THEN later_ns
         END AS standing_ns,
-        CASE
-            WHEN standing_ns IS NOT NULL OR before_span = after_span OR is_alone THEN after_span
-        END AS span
+        CASE WHEN standing_ns IS NOT NULL OR is_alone THEN after_span END AS span
     FROM (
         SELECT
             f.clock_id, f.stretch, f.difference_ns, f.message_count, f.segment,
