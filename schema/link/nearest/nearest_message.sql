@@ -31,6 +31,7 @@ WITH observed AS (
     WHERE run_id = only_run
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 ),
+-- Before a stretch that is not known, the clock may have been set already.
 course AS (
     SELECT
         clock_id, at_ns, start_ns, drift_ppb, state, row_number() OVER on_clock = 1 AS is_first,
@@ -44,9 +45,11 @@ course AS (
                 difference_ns := CASE WHEN is_between THEN between_ns ELSE difference_ns END,
                 segment := segment,
                 is_sharp := coalesce(is_sharp, true),
-                is_known := message_count > 0 OR is_between
+                is_known := (message_count > 0 OR is_between)
+                    AND coalesce(lead(message_count > 0 OR is_between) OVER on_clock, true)
             ) AS state
         FROM observed
+        WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
     )
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 ),
