@@ -78,14 +78,16 @@ located AS (
     ) AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
 ),
 -- Around a jump of the clock, a publication may be before or after it. A message that fits
--- publications on both sides is ambiguous.
+-- publications on both sides is ambiguous. Where the clock was set back, stamps from before and
+-- after the jump mix: one side is not to hide the other.
 sided AS (
-    SELECT 'now' AS side, *, difference_ns AS then_ns FROM located WHERE state.is_known
+    SELECT state.segment % 3 AS side, *, difference_ns AS then_ns FROM located
+    WHERE state.is_known
     UNION ALL
-    SELECT 'before', *, before.difference_ns FROM located
+    SELECT before.segment % 3, *, before.difference_ns FROM located
     WHERE before.segment < state.segment AND before.is_known
     UNION ALL
-    SELECT 'after', *, after.difference_ns FROM located
+    SELECT after.segment % 3, *, after.difference_ns FROM located
     WHERE after.segment > state.segment AND after.is_known
 ),
 published AS MATERIALIZED (
