@@ -455,15 +455,18 @@ def test_or_half_of_all_messages(
 
 
 def test_where_the_clocks_are_not_known_nothing_is_told(rules: duckdb.DuckDBPyConnection) -> None:
-    clock(rules, (0, 100, 0), (0, 0, 0))
+    """Nor in the stretch before: in its last part, the clock may have been set already."""
+    clock(rules, (0, 100, 0), (0, 100, 0), (0, 0, 0))
     publish(rules, 1, 0, MILLISECOND)
     publish(rules, 2, SECOND, SECOND + MILLISECOND)
     publish(rules, 3, -SECOND, MILLISECOND - SECOND)
-    take(rules, MICROSECOND - SECOND, MICROSECOND, SECOND + MICROSECOND)
+    publish(rules, 4, 2 * SECOND, 2 * SECOND + MILLISECOND)
+    take(rules, *(n * SECOND + MICROSECOND for n in (-1, 0, 1, 2)))
     assert nearest(rules) == {
         MICROSECOND - SECOND: (3, 1),
         MICROSECOND: (1, 1),
         SECOND + MICROSECOND: (None, 0),
+        2 * SECOND + MICROSECOND: (None, 0),
     }
 
 
@@ -509,6 +512,22 @@ def test_a_publication_beside_a_jump_is_on_either_side(
     stamp = written + difference + MICROSECOND
     take(rules, stamp)
     assert nearest(rules) == {stamp: (1, 1)}
+
+
+@pytest.mark.parametrize("segments", [(0, 1), (1, 2), (2, 3)])
+def test_after_a_clock_was_set_back_publications_of_one_side_do_not_hide_others(
+    rules: duckdb.DuckDBPyConnection, segments: tuple[int, int]
+) -> None:
+    """What was written 40 ms later got the same stamp, and was taken later."""
+    back = 40 * MILLISECOND
+    clock(rules, (0, 100, segments[0]), (-back, 100, segments[1]))
+    early = SECOND - 20 * MILLISECOND
+    publish(rules, 1, early, early + MILLISECOND)
+    publish(rules, 2, early + back + 300, early + back + MILLISECOND)
+    take(rules, early + 500, taken=early + MILLISECOND)
+    take(rules, early + 900, taken=early + back + MILLISECOND)
+    found = nearest(rules)
+    assert (found[early + 500], found[early + 900]) == ((1, 1), (2, 1))
 
 
 def test_an_unknown_side_of_a_jump_tells_nothing(rules: duckdb.DuckDBPyConnection) -> None:
