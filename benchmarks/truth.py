@@ -125,6 +125,8 @@ RECORDINGS = {
     "behind": Recording(realtime_offset_ns=-200_000, slew_ppm=-20),
     # The clock that makes stamps is set, to and fro; one step is as long as bursts are apart.
     "steps": Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))),
+    # As a host without a clock of its own does when it learns the time.
+    "set_by_hours": Recording(realtime_steps=((SECOND // 3, 3 * 3_600 * SECOND),)),
     "far": Recording(realtime_offset_ns=7_000_000),
     "everything": Recording(
         start_ns=SECOND // 20,
@@ -142,6 +144,8 @@ FAULTY_LAYOUTS = ("jazzy", "humble", "humble-fastdds")
 FAULTY_SYSTEMS = ("pipeline", "two_hosts")
 # What every system is recorded with once, since what it costs depends on what the system does.
 EVERY_LAYOUT = "jazzy"
+# Only this one has channels.
+CHANNEL_LAYOUT = "rolling"
 EVERY_FAULT = ("loss", "packets", "truncated", "rotated", "chunk_missing")
 # Where losses meet threads that move, and messages that come twice.
 GAP_SYSTEMS = ("container", "container_multi_threaded")
@@ -209,7 +213,7 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                     or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
                     or (system in TIMED_SYSTEMS and layout in TIMED_LAYOUTS)
                     or (
-                        layout == EVERY_LAYOUT
+                        layout == (CHANNEL_LAYOUT if system == "channels" else EVERY_LAYOUT)
                         and recording in EVERY_FAULT
                         and system not in ONE_NAME
                     )
