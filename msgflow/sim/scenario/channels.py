@@ -58,9 +58,7 @@ def channels() -> Scenario:
     echo = Node(
         "echo",
         subscriptions=(
-            Subscription(
-                "/image", created_ns=250 * MILLISECOND, destroyed_ns=350 * MILLISECOND
-            ),
+            Subscription("/image", created_ns=250 * MILLISECOND, destroyed_ns=350 * MILLISECOND),
         ),
     )
     return Scenario(

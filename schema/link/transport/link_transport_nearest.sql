@@ -15,7 +15,7 @@ WITH received AS (
     JOIN store.take AS t
         ON s.subscription_id = t.subscription_id
         AND m.source_timestamp_ns = t.source_timestamp_ns
-    WHERE m.run_id = only_run AND t.run_id = only_run AND m.publication_id IS NOT NULL
+    WHERE m.run_id = only_run AND t.run_id = only_run
     QUALIFY row_number() OVER (
         PARTITION BY t.subscription_id, t.source_timestamp_ns ORDER BY t.take_id
     ) = 1
