@@ -101,7 +101,7 @@ def write_to_channels(
     Returns the source stamps by subscription, and the time at which the call returns.
     """
     scheduler, machine = thread.scheduler, thread.machine
-    stamps = {}
+    stamps: dict[SubscriptionObject, int] = {}
     for channel in channels:
         time += 400 + int(scheduler.random() * 800)
         time += int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * scheduler.random()))
