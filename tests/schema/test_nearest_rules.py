@@ -240,6 +240,18 @@ def test_a_publication_may_have_a_message_for_each_subscription(
     assert 900_000 not in found
 
 
+def test_what_is_usual_counts_each_subscription(rules: duckdb.DuckDBPyConnection) -> None:
+    """The second channel is written later than the first."""
+    clock(rules, (0, 100, 0))
+    for n in range(10):
+        publish(rules, n, n * PERIOD, n * PERIOD + MILLISECOND)
+        take_alone(rules, 5, n * PERIOD + 10_000)
+        take_alone(rules, 6, n * PERIOD + 200_000)
+    publish(rules, 999, SECOND, None)
+    take_alone(rules, 6, SECOND + 400_000)
+    assert nearest(rules)[SECOND + 400_000] == (999, 1)
+
+
 def test_what_one_subscription_has_is_no_rival_for_another(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:

@@ -313,8 +313,8 @@ matched AS (
 ),
 placed AS (
     SELECT
-        m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, m.publisher_id,
-        p.clock_id, coalesce(g.segment, 0) AS segment, coalesce(g.is_known, true) AS is_known
+        m.run_id, m.topic_name, m.source_timestamp_ns, m.publisher_id, p.clock_id,
+        coalesce(g.segment, 0) AS segment, coalesce(g.is_known, true) AS is_known
     FROM message AS m
     JOIN publisher AS p ON m.publisher_id = p.publisher_id
     ASOF LEFT JOIN segment AS g
@@ -367,8 +367,6 @@ SELECT
 FROM placed AS p
 JOIN trusted AS t ON p.clock_id = t.clock_id AND p.segment = t.segment
 LEFT JOIN matched AS x
-    ON p.publisher_id = x.publisher_id
-    AND p.source_timestamp_ns = x.source_timestamp_ns
-    AND p.only_subscription_id = x.only_subscription_id
+    ON p.publisher_id = x.publisher_id AND p.source_timestamp_ns = x.source_timestamp_ns
 GROUP BY p.run_id, p.topic_name, p.source_timestamp_ns
 HAVING count(x.publication_id) > 0 OR bool_or(NOT t.is_trusted)
