@@ -291,6 +291,27 @@ def test_clocks_stood_where_one_difference_explains_what_several_do(
     assert rows == ([(4_000,)] * stretches if stands else [])
 
 
+@pytest.mark.parametrize(("jumps_at", "count"), [(3, 2), (6, 1)])
+def test_a_clock_that_has_jumped_does_not_stand_as_before(
+    rules: duckdb.DuckDBPyConnection, jumps_at: int, count: int
+) -> None:
+    """Even if the ranges of the differences overlap."""
+    rules.execute(
+        "CREATE TABLE pairs AS SELECT 1 AS clock_id, stretch, 0 AS least_ns, 8000 AS greatest_ns "
+        "FROM range(6) AS s(stretch), range(100) AS r(n)"
+    )
+    rules.execute(
+        "CREATE TABLE chosen AS SELECT 1 AS clock_id, stretch // ? AS place, stretch, "
+        "stretch * 1000000000 AS at_ns, 0 AS offset_ns, 0 AS least_ns, 8000 AS greatest_ns, "
+        "100 AS most_count FROM range(6) AS s(stretch)",
+        [jumps_at],
+    )
+    rows = rules.execute(
+        "SELECT span FROM derive.standing_difference('pairs', 'chosen')"
+    ).fetchall()
+    assert (len(rows), len(set(rows))) == (6, count)
+
+
 def test_where_nothing_is_told_a_clock_that_stood_stands(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:

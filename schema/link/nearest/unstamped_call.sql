@@ -32,7 +32,6 @@ SELECT
     rmw_ns IS NULL AS is_without_event
 FROM store.publication
 WHERE run_id = only_run
-    AND source_timestamp_ns IS NULL
     AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
     AND (
         process_id IN (FROM unstamped_process) OR publication_id IN (FROM channelled)
