@@ -62,9 +62,6 @@ LOWEST_RECALL |= dict.fromkeys(
 # Likewise of recordings: around a step of the clock, messages may be on either side; two in a
 # second leave little time without one.
 LOWEST_RECALL |= {"steps": 0.93}
-# Of a timer that is hardly ever late, the little that a second of it has to say is too little to tell
-# its periods apart, if only another host takes its messages.
-LOWEST_RECALL |= {"set_by_hours": 0.6}
 # Recorded with losses: their truth says which events are missing, but not where others might be. A
 # link over such a place is not decided, and a publication may be torn in two. Precision is judged.
 LOSSY_RECORDINGS = {"intra_lost", "lossy_intra", "lossy_intra_mt"}
@@ -128,8 +125,6 @@ RECORDINGS = {
     "behind": Recording(realtime_offset_ns=-200_000, slew_ppm=-20),
     # The clock that makes stamps is set, to and fro; one step is as long as bursts are apart.
     "steps": Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))),
-    # As a host without a clock of its own does when it learns the time.
-    "set_by_hours": Recording(realtime_steps=((SECOND // 3, 3 * 3_600 * SECOND),)),
     "far": Recording(realtime_offset_ns=7_000_000),
     "everything": Recording(
         start_ns=SECOND // 20,
