@@ -446,13 +446,18 @@ SELECT
     'transport', 'publication', publication_id::VARCHAR, 'take', take_id::VARCHAR, is_decided, needs
 FROM message
 UNION ALL
+-- Where it is known that a filter published the message, its trigger is no cause.
 SELECT
-    c.kind, 'callback_instance', c.callback_instance_id::VARCHAR, 'publication',
-    c.publication_id::VARCHAR,
+    CASE c.kind WHEN 'triggered' THEN 'direct' ELSE c.kind END, 'callback_instance',
+    c.callback_instance_id::VARCHAR, 'publication', c.publication_id::VARCHAR,
     w.id IS NOT NULL
     AND p.is_whole
     AND (
-        c.kind NOT IN ('periodic_async', 'partial_sync')
+        c.kind <> 'triggered'
+        OR 'ros2:message_link_approximate_sync' NOT IN (SELECT event FROM simulated_declared)
+    )
+    AND (
+        c.kind NOT IN ('periodic_async', 'partial_sync', 'approximate_sync')
         OR 'ros2:message_link_' || c.kind IN (SELECT event FROM simulated_declared)
         AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM untold_process)
         AND (c.callback_instance_id, c.publication_id) NOT IN (

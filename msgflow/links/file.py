@@ -49,8 +49,9 @@ class DeclaredLink:
     """One entry of the file.
 
     Attributes:
-        kind: 'periodic_async', 'partial_sync' or 'approximate_sync'; 'direct': the node publishes on the outputs
-            because of the message before; 'independent': not because of messages of the inputs.
+        kind: 'periodic_async', 'partial_sync' or 'approximate_sync'; 'direct': the node publishes
+            on the outputs because of the message before; 'independent': not because of messages of
+            the inputs.
         node: full name of a node, or a pattern.
         inputs: topics that the node receives, or patterns.
         inputs_of: name or pattern of another node of its process that receives the inputs for it.

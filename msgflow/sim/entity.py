@@ -172,7 +172,8 @@ class MessageLink:
     Attributes:
         kind: 'periodic_async': each input is kept until a newer one comes, and what is published
             is made of what is kept; 'partial_sync': callbacks of inputs publish only once there is
-            a message of every input, and use each up.
+            a message of every input, and use each up; 'approximate_sync': they do so with the sets
+            that `ApproximateTime` makes, once for each.
         inputs: topics of subscriptions of the node, or of the one that `inputs_of` names.
         outputs: topics of its publishers.
         is_late: a callback puts its message into the cache, and looks at the others, only when it
@@ -188,9 +189,10 @@ class MessageLink:
     inputs_of: str = ""
 
     def __post_init__(self) -> None:
-        if self.kind not in {"periodic_async", "partial_sync"}:
+        if self.kind not in {"periodic_async", "partial_sync", "approximate_sync"}:
             raise UsageError(
-                f"no such kind of link — {self.kind}", "choose periodic_async or partial_sync"
+                f"no such kind of link — {self.kind}",
+                "choose periodic_async, partial_sync or approximate_sync",
             )
         if not self.inputs or not self.outputs:
             raise UsageError("a link has inputs and outputs — one of them is missing")

@@ -201,11 +201,16 @@ _KILTED = replace(
     has_end_of_deferred=True,
 )
 
+# The last one is no tracepoint of ROS 2: applications that use message_filters declare it so.
+_MESSAGE_LINKS = (
+    "message_link_periodic_async", "message_link_partial_sync", "message_link_approximate_sync",
+)  # fmt: skip
+
 _ROLLING = replace(
     _KILTED,
     name="rolling",
     version="8.10.1",
-    events=_events(_KILTED.having("message_link_periodic_async", "message_link_partial_sync")),
+    events=_events(_KILTED.having(*_MESSAGE_LINKS)),
     has_channels=True,
 )
 
@@ -272,8 +277,7 @@ def _with_early_cyclone_dds(layout: Layout) -> Layout:
 
 def _with_message_links(layout: Layout) -> Layout:
     """The branch for annotations, which users of the instrumented DDS also use."""
-    events = layout.having("message_link_periodic_async", "message_link_partial_sync")
-    return replace(layout, events=_events(events))
+    return replace(layout, events=_events(layout.having(*_MESSAGE_LINKS)))
 
 
 @cache

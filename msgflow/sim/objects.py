@@ -28,6 +28,7 @@ class Message:
 
     Attributes:
         origins: the flows that lead to it, as far as they began in timers.
+        header_ns: stamp in its header; None: published in no callback.
         rmw: time of rmw_publish, or of the last event without one; `intra` that of
             rclcpp_intra_publish.
         stamp_ns: its source stamp, the first one if it was written several times.
@@ -35,8 +36,8 @@ class Message:
     """
 
     __slots__ = (
-        "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns", "rclcpp_ns", "rmw",
-        "rmw_ns", "stamp_ns", "stamps", "tid",
+        "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns",
+        "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
     )  # fmt: skip
 
     def __init__(
@@ -53,8 +54,10 @@ class Message:
         self.publisher = publisher
         self.tid = tid
         self.origins: tuple[Origin, ...] = ()
+        self.header_ns: int | None = None
         if instance is not None:
             self.origins = origins_on(instance, publisher.topic)
+            self.header_ns = instance.header_ns
         self.intra = intra
         self.intra_ns = intra_ns
         self.rclcpp_ns: int | None = None

@@ -90,7 +90,7 @@ def write_publication(
         return
     truth.causal.add(
         instance.callback_instance_id, message.publication_id, hostname, pid, tid,
-        "take_adjacent" if instance.callback_instance_id is None else "direct",
+        _kind(instance),
         instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
         message.rcl_ns, message.rmw_ns, is_internal, False,
     )  # fmt: skip
@@ -106,3 +106,10 @@ def write_publication(
             cause.kind, used.start_ns, used.take_id, used.take_rmw_ns, topic,
             message.rcl_ns, message.rmw_ns, is_internal, cause.is_reuse,
         )  # fmt: skip
+
+
+def _kind(instance: CallbackInstance) -> str:
+    """How a publication follows from the message of the instance itself."""
+    if instance.callback_instance_id is None:
+        return "take_adjacent"
+    return "triggered" if instance.is_filtered else "direct"

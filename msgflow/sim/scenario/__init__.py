@@ -79,6 +79,7 @@ def scenarios() -> Mapping[str, Scenario]:
         layers.polling(),
         annotated.periodic_async(),
         annotated.partial_sync(),
+        annotated.approximate_sync(),
         annotated.reentrant(),
         autoware.autoware(),
         autoware.autoware_two_threads(),
