@@ -326,6 +326,23 @@ doubtful AS (
     WHERE c.kind IN ('periodic_async', 'partial_sync')
         AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
 ),
+-- A message that is missing may change a set, and the set after it.
+doubtful_set AS (
+    SELECT DISTINCT c.publication_id
+    FROM (
+        SELECT
+            host, pid, publication_id, max(coalesce(publication_rmw_ns, publication_rcl_ns)) AS end_ns,
+            lag(min(callback_start_ns), 4) OVER (
+                PARTITION BY host, pid, topic_name ORDER BY publication_id
+            ) AS start_ns
+        FROM simulated_causal
+        WHERE kind = 'approximate_sync'
+        GROUP BY host, pid, topic_name, publication_id
+    ) AS c
+    JOIN truth_hole AS h
+        ON c.host = h.host AND coalesce(c.pid = h.pid, true)
+        AND coalesce(c.start_ns < h.end_ns, true) AND c.end_ns > h.begin_ns
+),
 -- What threads sent after they took a request or response, in no callback.
 call AS (
     SELECT
@@ -462,6 +479,10 @@ SELECT
         AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM untold_process)
         AND (c.callback_instance_id, c.publication_id) NOT IN (
             SELECT (callback_instance_id, publication_id) FROM doubtful
+        )
+        AND NOT (
+            c.kind = 'approximate_sync'
+            AND c.publication_id IN (SELECT publication_id FROM doubtful_set)
         )
         AND (c.callback_instance_id, c.publication_id) NOT IN (
             SELECT (callback_instance_id, publication_id)

@@ -8,7 +8,8 @@
 --     `proof_event_id`, the callback instance of an input begins that showed it. It looks only when
 --     the input has come that it waits for, the one with the oldest of the messages before the
 --     pivot. `is_close`: another set is better if the stamps in the headers are older, as
---     derive.approximate_message says.
+--     derive.approximate_message says, or the stamps of an input are not in the order in which its
+--     messages came.
 -- grain: one row per annotation, pivot of a set that was proven, and input
 -- param: only_run BIGINT  Run to look at
 -- param: messages VARCHAR  Name of the rows of derive.approximate_message
@@ -141,6 +142,9 @@ close AS (
     ) AS a
         ON p.annotation_id = a.annotation_id AND p.pivot_id = a.pivot_id
     WHERE coalesce(p.cost - n.cost <= (11 + 10) * a.age_ns, true)
+    UNION
+    -- The clock of the stamps was set back: the filter has its messages in another order.
+    SELECT annotation_id, pivot_id FROM around WHERE next_event_id < last_event_id
 )
 SELECT
     m.annotation_id, m.pivot_id, p.pivot_ns, p.proof_event_id, p.since_ns,

@@ -8,6 +8,7 @@
 --     leave one set. It has two if nothing became complete at the firing but earlier, if the firing
 --     before leaves several, if a publisher published more than once, which may be a second set, or
 --     if headers that are older than the publication would make another set.
+--     `since_ns`: from when on a message that is missing might have changed the choice.
 -- grain: one row per annotation, publication of a firing, and input
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.link_causal_approximate(only_run) AS TABLE
@@ -50,13 +51,14 @@ made AS MATERIALIZED (
 complete AS MATERIALIZED (
     SELECT
         f.annotation_id, f.cut_event_id, f.previous_event_id, m.proof_event_id,
-        m.first_pivot_id, m.set_count
+        m.first_pivot_id, m.set_count, m.since_ns
     FROM firing AS f
     ASOF JOIN (
         SELECT
             annotation_id, proof_event_id,
             arg_min(pivot_id, (pivot_ns, pivot_id)) AS first_pivot_id,
-            count(DISTINCT message_ids) AS set_count
+            count(DISTINCT message_ids) AS set_count,
+            min(since_ns) AS since_ns
         FROM made
         GROUP BY annotation_id, proof_event_id
     ) AS m
@@ -105,6 +107,7 @@ chosen AS MATERIALIZED (
     SELECT
         c.annotation_id, c.cut_event_id,
         coalesce(d.pivot_id, c.first_pivot_id) AS pivot_id,
+        c.since_ns,
         c.set_count > 1 AS may_be_two,
         c.proof_event_id = c.cut_event_id
         AND (c.set_count = 1 OR coalesce(d.is_certain, false)) AS is_certain
@@ -116,7 +119,7 @@ SELECT
     b.run_id, b.annotation_id, b.kind, b.publication_id, b.trace_id, b.thread_id, b.start_ns,
     b.start_event_id,
     m.callback_instance_id,
-    m.since_ns,
+    c.since_ns,
     CASE
         WHEN c.is_certain AND NOT m.is_close AND (b.publication_count = 1 OR NOT c.may_be_two)
             THEN 1

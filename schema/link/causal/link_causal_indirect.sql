@@ -341,7 +341,11 @@ SELECT
     f.publication_id,
     f.kind,
     f.annotation_id,
-    f.candidate_count::BIGINT AS candidate_count,
+    -- What may be missing may have been in the set.
+    greatest(
+        f.candidate_count,
+        CASE WHEN f.kind = 'approximate_sync' AND x.publication_id IS NOT NULL THEN 2 END
+    )::BIGINT AS candidate_count,
     x.publication_id IS NOT NULL AS is_loss_affected
 FROM found AS f
 LEFT JOIN (SELECT DISTINCT annotation_id, publication_id, callback_instance_id FROM exposed) AS x
