@@ -97,12 +97,14 @@ def test_sets_are_those_of_the_filter(analysis: Analysis, inputs: int, seed: int
 def test_sets_are_seldom_in_doubt(analysis: Analysis) -> None:
     arrived = [
         (stamp + 200_000, number, stamp)
-        for number, period in enumerate((20, 14, 33))
-        for stamp in range(3_700_000 * number, 1_000_000_000, period * 1_000_000)
+        for number, period in enumerate((20_030_000, 14_010_000, 33_070_000))
+        for stamp in range(1 + 3_700_000 * number, 1_000_000_000, period)
     ]
     system, sets = record([(number, stamp) for _, number, stamp in sorted(arrived)])
     assert len(sets) > 25
     assert found(analysis, system) == {each: (used, 1) for each, used in sets.items()}
+    # What came last is no cause by itself.
+    assert analysis.value("SELECT count(*) FROM link_causal WHERE kind = 'direct'") == 0
 
 
 @pytest.mark.parametrize("inputs", [2, 3])

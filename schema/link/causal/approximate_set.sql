@@ -19,9 +19,12 @@ WITH follower AS MATERIALIZED (
         annotation_id, subscription_id, callback_instance_id, start_ns, start_event_id, stamp_ns,
         age_ns,
         lead(stamp_ns) OVER by_stamp AS next_ns,
-        lead(start_event_id) OVER by_stamp AS next_event_id
+        lead(start_event_id) OVER by_stamp AS next_event_id,
+        stamp_ns < lag(stamp_ns) OVER by_arrival AS is_set_back
     FROM query_table(messages)
-    WINDOW by_stamp AS (PARTITION BY annotation_id, subscription_id ORDER BY stamp_ns)
+    WINDOW
+        by_stamp AS (PARTITION BY annotation_id, subscription_id ORDER BY stamp_ns),
+        by_arrival AS (PARTITION BY annotation_id, subscription_id ORDER BY start_event_id)
 ),
 -- Of every input the last message up to the pivot, and the one after it.
 around AS MATERIALIZED (
@@ -30,7 +33,7 @@ around AS MATERIALIZED (
         l.stamp_ns AS last_ns,
         l.start_ns AS last_start_ns,
         l.start_event_id AS last_event_id,
-        l.age_ns, l.next_ns, l.next_event_id,
+        l.age_ns, l.next_ns, l.next_event_id, l.is_set_back,
         -- Where it goes on after it waited for this input: those with older messages have come.
         max(coalesce(l.next_event_id, 9223372036854775807)) OVER (
             PARTITION BY p.annotation_id, p.pivot_id
@@ -144,7 +147,8 @@ close AS (
     WHERE coalesce(p.cost - n.cost <= (11 + 10) * a.age_ns, true)
     UNION
     -- The clock of the stamps was set back: the filter has its messages in another order.
-    SELECT annotation_id, pivot_id FROM around WHERE next_event_id < last_event_id
+    SELECT annotation_id, pivot_id FROM around
+    WHERE is_set_back OR next_event_id < last_event_id
 )
 SELECT
     m.annotation_id, m.pivot_id, p.pivot_ns, p.proof_event_id, p.since_ns,
