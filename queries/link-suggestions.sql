@@ -145,8 +145,8 @@ firing_input AS (
     FROM firing AS f
     JOIN input AS i ON f.node_id = i.node_id
 ),
--- A node that publishes as soon as it has a message of every input does so with the first one of the
--- input that came last.
+-- A node that publishes as soon as it has a message of every input does so with the first one of
+-- the input that came last.
 patient AS (
     SELECT f.publisher_id, count(*) AS patient_count
     FROM firing AS f

@@ -331,7 +331,8 @@ doubtful_set AS (
     SELECT DISTINCT c.publication_id
     FROM (
         SELECT
-            host, pid, publication_id, max(coalesce(publication_rmw_ns, publication_rcl_ns)) AS end_ns,
+            host, pid, publication_id,
+            max(coalesce(publication_rmw_ns, publication_rcl_ns)) AS end_ns,
             lag(min(callback_start_ns), 4) OVER (
                 PARTITION BY host, pid, topic_name ORDER BY publication_id
             ) AS start_ns

@@ -13,8 +13,8 @@
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
 
--- Waits and long callbacks disturb some publications, so only the middle four fifths count. Of fewer
--- than five messages the middle four fifths are all of them, and prove nothing.
+-- Waits and long callbacks disturb some publications, so only the middle four fifths count. Of
+-- fewer than five messages the middle four fifths are all of them, and prove nothing.
 CREATE OR REPLACE MACRO derive.answer_doubtful(only_run, links) AS TABLE
 WITH own AS MATERIALIZED (
     SELECT

@@ -1,10 +1,10 @@
 -- name: derive.approximate_message
 -- kind: macro
 -- description: Messages of the inputs of approximately synchronous annotations. The filter compares
---     the stamps in their headers, which are not in the trace: `stamp_ns`, when they were published,
---     stands for them. A header may be older, by up to `age_ns`: its node may have stamped it when
---     the publishing callback began, or copied the stamp of the message that the callback got, and
---     so on. Chains end where a publisher comes again.
+--     the stamps in their headers, which are not in the trace: `stamp_ns`, when they were
+--     published, stands for them. A header may be older, by up to `age_ns`: its node may have
+--     stamped it when the publishing callback began, or copied the stamp of the message that the
+--     callback got, and so on. Chains end where a publisher comes again.
 -- grain: one row per annotation and callback instance of one of its inputs
 -- param: only_run BIGINT  Run to look at
 CREATE OR REPLACE MACRO derive.approximate_message(only_run) AS TABLE

@@ -2,12 +2,12 @@
 -- kind: macro
 -- description: Messages of the sets that approximately synchronous annotations publish. A
 --     publication inside a callback instance of an input is a firing: that instance showed that a
---     set is complete (derive.approximate_set). If it did so for sets of several pivots that differ,
---     the firing before decides: the pivot is the latest of the first messages of the inputs that
---     came after its set. A link has one candidate if the firing, the firing before and the stamps
---     leave one set. It has two if nothing became complete at the firing but earlier, if the firing
---     before leaves several, if a publisher published more than once, which may be a second set, or
---     if headers that are older than the publication would make another set.
+--     set is complete (derive.approximate_set). If it did so for sets of several pivots that
+--     differ, the firing before decides: the pivot is the latest of the first messages of the
+--     inputs that came after its set. A link has one candidate if the firing, the firing before and
+--     the stamps leave one set. It has two if nothing became complete at the firing but earlier, if
+--     the firing before leaves several, if a publisher published more than once, which may be a
+--     second set, or if headers that are older than the publication would make another set.
 --     `since_ns`: from when on a message that is missing might have changed the choice.
 -- grain: one row per annotation, publication of a firing, and input
 -- param: only_run BIGINT  Run to look at
