@@ -5,4 +5,4 @@ SELECT
     run_id, callback_instance_id, publication_id, take_id, subscription_id, publisher_id, kind,
     annotation_id, candidate_count, is_loss_affected
 FROM store.link_causal
-WHERE derive.is_followed(annotation_id, candidate_count)
+WHERE derive.is_followed(kind, candidate_count)

@@ -27,7 +27,7 @@ SELECT
     END AS wait_ns,
     l.candidate_count,
     l.is_loss_affected,
-    derive.is_followed(l.annotation_id, l.candidate_count) AS is_followed
+    derive.is_followed(l.kind, l.candidate_count) AS is_followed
 FROM store.link_causal AS l
 LEFT JOIN main.callback_instance AS i
     ON l.callback_instance_id = i.callback_instance_id
