@@ -142,6 +142,8 @@ FAULTY_LAYOUTS = ("jazzy", "humble", "humble-fastdds")
 FAULTY_SYSTEMS = ("pipeline", "two_hosts")
 # What every system is recorded with once, since what it costs depends on what the system does.
 EVERY_LAYOUT = "jazzy"
+# Only this one has channels.
+CHANNEL_LAYOUT = "rolling"
 EVERY_FAULT = ("loss", "packets", "truncated", "rotated", "chunk_missing")
 # Where losses meet threads that move, and messages that come twice.
 GAP_SYSTEMS = ("container", "container_multi_threaded")
@@ -209,7 +211,7 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
                     or (system in FAULTY_SYSTEMS and layout in FAULTY_LAYOUTS)
                     or (system in TIMED_SYSTEMS and layout in TIMED_LAYOUTS)
                     or (
-                        layout == EVERY_LAYOUT
+                        layout == (CHANNEL_LAYOUT if system == "channels" else EVERY_LAYOUT)
                         and recording in EVERY_FAULT
                         and system not in ONE_NAME
                     )

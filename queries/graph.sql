@@ -8,7 +8,8 @@
 -- column: node VARCHAR [node]  Node
 -- column: name VARCHAR [topic]  Topic or service
 -- column: indirect VARCHAR         How messages wait in the node for what is published:
---     'periodic_async', 'partial_sync', or both; empty: no indirect link leads to it
+--     'periodic_async', 'partial_sync', 'approximate_sync', or several; empty: no indirect link
+--     leads to it
 -- column: count BIGINT             Messages, or requests, in the time window
 -- column: rate_hz DOUBLE [Hz]      Rate from the first to the last
 -- column: median_ns BIGINT [ns]    Median latency: for 'receive' from publication to take, for
@@ -24,7 +25,7 @@ WITH indirect AS (
     SELECT b.publisher_id, string_agg(DISTINCT l.kind, ', ' ORDER BY l.kind) AS kinds
     FROM main.link_causal AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
-    WHERE list_contains($runs, l.run_id) AND l.kind IN ('periodic_async', 'partial_sync')
+    WHERE list_contains($runs, l.run_id) AND l.annotation_id IS NOT NULL
     GROUP BY b.publisher_id
 ),
 answer AS (

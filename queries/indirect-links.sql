@@ -5,7 +5,8 @@
 --     direct and independent explain no indirect links.
 -- grain: one row per annotation
 -- column: run_id BIGINT             Run
--- column: kind VARCHAR              'periodic_async', 'partial_sync', 'direct' or 'independent'
+-- column: kind VARCHAR              'periodic_async', 'partial_sync', 'approximate_sync', 'direct'
+--     or 'independent'
 -- column: source VARCHAR            'trace' or 'file'
 -- column: node VARCHAR [node]  Node that declares it
 -- column: inputs VARCHAR [topic]  Topics of its inputs

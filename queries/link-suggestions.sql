@@ -2,15 +2,18 @@
 -- title: Links that the data suggest
 -- description: Where messages seem to be kept for later: a timer publishes while messages that its
 --     node receives lead nowhere (periodic_async), or callbacks of a node's subscriptions publish
---     only once each of several inputs has had a message (partial_sync). And where a node without
+--     only once each of several inputs has had a message (partial_sync), or later, when it is clear
+--     which messages are closest in time (approximate_sync). And where a node without
 --     traced callbacks seems to publish by itself, not because of the message before
 --     (independent). Only the author of the node knows whether that is so: review the candidates
 --     before you apply any.
 -- grain: one row per candidate
 -- param: min_share DOUBLE = 0.95    Minimum share of publications that had a new message of a
---     topic, for it to count as an input of a partial_sync candidate
+--     topic, for it to count as an input of a partial_sync candidate; and of those that did not
+--     wait for longer
 -- column: run_id BIGINT             Run
--- column: kind VARCHAR              'periodic_async', 'partial_sync' or 'independent'
+-- column: kind VARCHAR              'periodic_async', 'partial_sync', 'approximate_sync' or
+--     'independent'
 -- column: node VARCHAR [node]  Node
 -- column: inputs VARCHAR[] [topic]  Topics of the inputs
 -- column: outputs VARCHAR[] [topic]  Topics of the outputs
@@ -127,7 +130,8 @@ fired AS (
 ),
 firing AS (
     SELECT
-        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, published_ns,
+        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, start_ns,
+        published_ns,
         lag(published_ns) OVER (
             PARTITION BY publisher_id ORDER BY published_ns, callback_instance_id
         ) AS emptied_ns
@@ -140,6 +144,16 @@ firing_input AS (
         f.subscription_id = i.subscription_id AS is_own
     FROM firing AS f
     JOIN input AS i ON f.node_id = i.node_id
+),
+-- A node that publishes as soon as it has a message of every input does so with the first one of
+-- the input that came last.
+patient AS (
+    SELECT f.publisher_id, count(*) AS patient_count
+    FROM firing AS f
+    ASOF JOIN input_run AS r
+        ON f.subscription_id = r.subscription_id AND f.start_ns > r.start_ns
+    WHERE r.start_ns > f.emptied_ns
+    GROUP BY f.publisher_id
 ),
 -- An input counts where its messages lead nowhere else, or to this output.
 met AS (
@@ -176,9 +190,16 @@ synchronous AS (
         -- An output that waits for a message is published by the run that gets it.
         string_agg(i.topic_name, ' and ' ORDER BY i.topic_name, i.subscription_id)
             FILTER (WHERE m.own_count = 0) AS unproven,
-        min(m.met_count) AS met_count
+        min(m.met_count) AS met_count,
+        coalesce(any_value(p.patient_count), 0) AS patient_count,
+        CASE
+            WHEN any_value(p.patient_count) > any_value(m.firing_count) * (1 - $min_share)
+                THEN 'approximate_sync'
+            ELSE 'partial_sync'
+        END AS kind
     FROM met AS m
     JOIN input AS i ON m.subscription_id = i.subscription_id
+    LEFT JOIN patient AS p ON m.publisher_id = p.publisher_id
     WHERE m.met_count >= m.firing_count * $min_share
         AND (i.leading_count = 0 OR m.own_count > 0)
     GROUP BY m.node_id, m.publisher_id, m.output_topic
@@ -188,22 +209,29 @@ synchronous AS (
 partial AS (
     SELECT
         node_id,
-        'partial_sync' AS kind,
+        kind,
         inputs,
         list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
         printf(
             '%d of %d publications on %s came after a message of each input since the one before;'
-            || ' %s',
+            || '%s %s',
             min(met_count),
             min(firing_count),
             string_agg(DISTINCT output_topic, ' and ' ORDER BY output_topic),
+            CASE
+                WHEN kind = 'approximate_sync' THEN
+                    printf(' %d waited for a further message;', min(patient_count))
+                ELSE ''
+            END,
             min(evidence)
         ) AS evidence,
-        printf(
-            'no output waited for %s, which may only be more frequent', min(unproven)
-        ) AS doubt
+        CASE
+            WHEN kind = 'approximate_sync' THEN
+                'it is supposed that message_filters (ApproximateTime) chose the messages'
+            ELSE printf('no output waited for %s, which may only be more frequent', min(unproven))
+        END AS doubt
     FROM synchronous
-    GROUP BY node_id, inputs
+    GROUP BY node_id, kind, inputs
 ),
 -- What may have been published by a timer that shows no event.
 doubtful AS (
@@ -216,7 +244,10 @@ doubtful AS (
     JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
     JOIN main.publication AS b ON l.publication_id = b.publication_id
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+    -- There, a link is doubtful for another reason.
+    JOIN main.process AS o ON p.process_id = o.process_id
     WHERE list_contains($runs, l.run_id)
+        AND NOT coalesce(o.is_ambiguous, false)
         AND l.kind = 'take_adjacent' AND l.candidate_count > 1
         AND NOT p.is_internal AND NOT s.is_internal AND s.node_id = p.node_id
     GROUP BY ALL

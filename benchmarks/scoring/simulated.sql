@@ -216,21 +216,21 @@ asked AS (
         t.publication_id, t.take_id, t.publication_host,
         CASE
             WHEN t.method = 'ring_buffer' THEN 'derive.link_transport_ring_buffer'
-            WHEN is_rmw_stamped OR is_dds_stamped THEN 'derive.link_transport_exact'
+            WHEN u.is_stamped THEN 'derive.link_transport_exact'
             ELSE 'derive.link_transport_nearest'
         END AS needs,
         CASE
             -- A message that was kept for late subscriptions has no other event on its way there.
             WHEN t.method = 'ring_buffer' THEN p.is_intra AND r.is_dequeue AND NOT t.is_replay
-            WHEN is_rmw_stamped THEN p.is_rmw_publish AND r.is_rmw_take
-            WHEN is_dds_stamped THEN p.is_dds_write AND r.is_rmw_take
-            ELSE p.is_rmw_publish AND r.is_rmw_take
+            WHEN u.is_stamped AND is_rmw_stamped THEN p.is_rmw_publish AND r.is_rmw_take
+            WHEN u.is_stamped THEN p.is_dds_write AND r.is_rmw_take
+            ELSE p.is_whole AND r.is_rmw_take
         END
         AND (
             CASE
                 WHEN t.method = 'ring_buffer' THEN
                     t.take_id NOT IN (SELECT take_id FROM doubtful_buffer)
-                WHEN is_rmw_stamped OR is_dds_stamped THEN
+                WHEN u.is_stamped THEN
                     t.publication_id NOT IN (SELECT publication_id FROM twin WHERE is_equal)
                     AND (t.publication_host, t.publication_pid)
                         NOT IN (SELECT (host, pid) FROM mixed_process)
@@ -251,7 +251,6 @@ asked AS (
                         NOT IN (SELECT (host, pid) FROM unknown_process)
                     AND t.publication_host NOT IN (FROM far_host)
                     AND t.publication_id NOT IN (FROM torn_stamp)
-                    AND p.is_whole
             END
         ) AS is_decided
     FROM simulated_transport AS t
@@ -259,6 +258,12 @@ asked AS (
     JOIN recorded AS p ON p.kind = 'publication' AND t.publication_id::VARCHAR = p.id
     JOIN recorded AS r ON r.kind = 'take' AND t.take_id::VARCHAR = r.id
     JOIN simulated_publication AS s ON t.publication_id = s.publication_id
+    -- A message that was written to channels has no rmw_publish, and no stamp in the trace.
+    CROSS JOIN LATERAL (
+        SELECT
+            (is_rmw_stamped OR is_dds_stamped) AND (s.rmw_ns IS NOT NULL OR s.rcl_ns IS NULL)
+                AS is_stamped
+    ) AS u
 ),
 -- Time alone joins messages in groups: fewer messages of a host than these may agree by chance.
 message AS (
@@ -320,6 +325,24 @@ doubtful AS (
         AND coalesce(o.end_ns > i.start_ns, true) AND o.start_ns < b.rcl_ns
     WHERE c.kind IN ('periodic_async', 'partial_sync')
         AND (o.callback_instance_id IS NOT NULL OR coalesce(i.end_ns > r.start_ns, true))
+),
+-- A message that is missing may change a set, and the set after it.
+doubtful_set AS (
+    SELECT DISTINCT c.publication_id
+    FROM (
+        SELECT
+            host, pid, publication_id,
+            max(coalesce(publication_rmw_ns, publication_rcl_ns)) AS end_ns,
+            lag(min(callback_start_ns), 4) OVER (
+                PARTITION BY host, pid, topic_name ORDER BY publication_id
+            ) AS start_ns
+        FROM simulated_causal
+        WHERE kind = 'approximate_sync'
+        GROUP BY host, pid, topic_name, publication_id
+    ) AS c
+    JOIN truth_hole AS h
+        ON c.host = h.host AND coalesce(c.pid = h.pid, true)
+        AND coalesce(c.start_ns < h.end_ns, true) AND c.end_ns > h.begin_ns
 ),
 -- What threads sent after they took a request or response, in no callback.
 call AS (
@@ -445,17 +468,26 @@ SELECT
     'transport', 'publication', publication_id::VARCHAR, 'take', take_id::VARCHAR, is_decided, needs
 FROM message
 UNION ALL
+-- Where it is known that a filter published the message, its trigger is no cause.
 SELECT
-    c.kind, 'callback_instance', c.callback_instance_id::VARCHAR, 'publication',
-    c.publication_id::VARCHAR,
+    CASE c.kind WHEN 'triggered' THEN 'direct' ELSE c.kind END, 'callback_instance',
+    c.callback_instance_id::VARCHAR, 'publication', c.publication_id::VARCHAR,
     w.id IS NOT NULL
     AND p.is_whole
     AND (
-        c.kind NOT IN ('periodic_async', 'partial_sync')
+        c.kind <> 'triggered'
+        OR 'ros2:message_link_approximate_sync' NOT IN (SELECT event FROM simulated_declared)
+    )
+    AND (
+        c.kind NOT IN ('periodic_async', 'partial_sync', 'approximate_sync')
         OR 'ros2:message_link_' || c.kind IN (SELECT event FROM simulated_declared)
         AND (c.host, c.pid) NOT IN (SELECT (host, pid) FROM untold_process)
         AND (c.callback_instance_id, c.publication_id) NOT IN (
             SELECT (callback_instance_id, publication_id) FROM doubtful
+        )
+        AND NOT (
+            c.kind = 'approximate_sync'
+            AND c.publication_id IN (SELECT publication_id FROM doubtful_set)
         )
         AND (c.callback_instance_id, c.publication_id) NOT IN (
             SELECT (callback_instance_id, publication_id)

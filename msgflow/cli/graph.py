@@ -34,8 +34,8 @@ def command(
 
     Topics show their rate. Arrows to receivers show median and p95 from
     publication to take, arrows to services those of the round trip. Dashed
-    (periodic_async) and dotted (partial_sync) arrows lead to what an indirect
-    link causes. Nodes of one executor stand together.
+    (periodic_async) and dotted (partial_sync, approximate_sync) arrows lead to what
+    an indirect link causes. Nodes of one executor stand together.
     """
     from msgflow.cli.output import print_note, print_runs, print_text
     from msgflow.database import Database

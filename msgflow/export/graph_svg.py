@@ -31,7 +31,9 @@ _STYLE = """
 .msgflow-graph .edge { fill: none; stroke: #3d4653; stroke-width: 1.2; }
 .msgflow-graph .call, .msgflow-graph .serve { stroke: #a86b00; }
 .msgflow-graph .periodic_async { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 8 4; }
-.msgflow-graph .partial_sync { stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 2 4; }
+.msgflow-graph .partial_sync, .msgflow-graph .approximate_sync {
+  stroke: #aa4499; stroke-width: 1.8; stroke-dasharray: 2 4;
+}
 @media (prefers-color-scheme: dark) {
   .msgflow-graph { background: #14191f; }
   .msgflow-graph text { fill: #e6ebf0; }
@@ -43,7 +45,8 @@ _STYLE = """
   .msgflow-graph .service { fill: #3a2d12; stroke: #dba53a; }
   .msgflow-graph .edge { stroke: #c3ccd6; }
   .msgflow-graph .call, .msgflow-graph .serve { stroke: #dba53a; }
-  .msgflow-graph .periodic_async, .msgflow-graph .partial_sync { stroke: #d991cf; }
+  .msgflow-graph .periodic_async, .msgflow-graph .partial_sync,
+  .msgflow-graph .approximate_sync { stroke: #d991cf; }
 }
 """.strip()
 

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 # Links to what a node publishes later, from messages that it keeps.
-INDIRECT_KINDS = ("periodic_async", "partial_sync")
+# The synchronous ones need a message of every input.
+SYNCHRONOUS_KINDS = ("partial_sync", "approximate_sync")
+INDIRECT_KINDS = ("periodic_async", *SYNCHRONOUS_KINDS)
 # Whether the publications that come after a message are its effects.
 KINDS = (*INDIRECT_KINDS, "direct", "independent")
 _REQUIRED = ("kind", "node", "inputs", "outputs")
@@ -47,8 +49,9 @@ class DeclaredLink:
     """One entry of the file.
 
     Attributes:
-        kind: 'periodic_async' or 'partial_sync'; 'direct': the node publishes on the outputs
-            because of the message before; 'independent': not because of messages of the inputs.
+        kind: 'periodic_async', 'partial_sync' or 'approximate_sync'; 'direct': the node publishes
+            on the outputs because of the message before; 'independent': not because of messages of
+            the inputs.
         node: full name of a node, or a pattern.
         inputs: topics that the node receives, or patterns.
         inputs_of: name or pattern of another node of its process that receives the inputs for it.

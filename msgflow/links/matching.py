@@ -8,7 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
 
-from msgflow.links.file import INDIRECT_KINDS
+from msgflow.links.file import INDIRECT_KINDS, SYNCHRONOUS_KINDS
 from msgflow.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class MatchedLink:
     """A declared link of one node, with its subscriptions and publishers.
 
     Attributes:
-        kind: 'periodic_async', 'partial_sync', 'direct' or 'independent'.
+        kind: 'periodic_async', 'partial_sync', 'approximate_sync', 'direct' or 'independent'.
         process_id: process of the node.
         inputs: subscriptions, in order of their ids.
         outputs: publishers, likewise.
@@ -84,7 +84,8 @@ def match_links(
 
     Raises:
         UsageError: a node or topic that the run does not have, a name that means several nodes, an
-            input that is an output too, a partial_sync of one input, or links that form a cycle.
+            input that is an output too, a link of one input that would wait for others, or links
+            that form a cycle.
     """
     nodes = _read_nodes(con, run_id)
     matched = tuple(found for link in file.links for found in _match(file, link, nodes))
@@ -144,10 +145,10 @@ def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterat
                 f"a topic is input and output of the same link — {sorted(both)[0]}",
                 "leave it out on one side; narrow a pattern that matches it on both",
             )
-        if link.kind == "partial_sync" and len(inputs) == 1:
+        if link.kind in SYNCHRONOUS_KINDS and len(inputs) == 1:
             file.fail(
                 link.line,
-                f"a partial_sync of one input waits for nothing — {inputs[0].topic} of {node.name}",
+                f"{link.kind} with one input waits for nothing — {inputs[0].topic} of {node.name}",
                 "name all inputs that it waits for, or leave it out",
             )
         yield MatchedLink(link.kind, node.process_id, inputs, outputs, link.line)

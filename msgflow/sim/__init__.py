@@ -52,7 +52,8 @@ a topic has a take or a row here:
 causal — one row per publication made inside a callback, or with a message taken without one, and
 one per message of another input that it was made of (annotated nodes), or that the callback took:
     callback_instance_id, publication_id, host, pid, tid (of the callback), kind ('direct';
-    'take_adjacent' without a callback; 'periodic_async', 'partial_sync' of another input; 'polled'
+    'take_adjacent' without a callback; 'periodic_async', 'partial_sync' of another input;
+    'approximate_sync' of the set, and then 'triggered' instead of 'direct'; 'polled'
     without a callback, the last message of each topic that the publishing callback took itself),
     callback_start_ns, take_id, take_rmw_ns (NULL for timers), topic_name,
     publication_rcl_ns, publication_rmw_ns, is_internal, is_reuse (an earlier publication by the

@@ -34,6 +34,8 @@ class CallbackInstance:
         causes: what else its next publication is made of.
         request_id: the request that was taken, or answered by the response that was.
         is_response: it was a response.
+        header_ns: stamp in the header of the message that it got, or when the timer was called.
+            What it publishes has the same.
         polled: by topic, the message that was taken last in the callback itself.
     """
 
@@ -47,7 +49,13 @@ class CallbackInstance:
     causes: tuple[Cause, ...] = ()
     request_id: int | None = None
     is_response: bool = False
+    header_ns: int | None = None
     polled: dict[str, CallbackInstance] = field(default_factory=dict)
+
+    @property
+    def is_filtered(self) -> bool:
+        """Whether its next publication is made of a set, which its own message may not be in."""
+        return any(cause.kind == "approximate_sync" for cause in self.causes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +76,7 @@ def origins_on(instance: CallbackInstance, topic: str) -> tuple[Origin, ...]:
         return tuple((root, (*path, topic)) for root, path in instance.origins)
     inputs = [cause.instance.origins for cause in instance.causes]
     inputs += [polled.origins for polled in instance.polled.values()]
-    if instance.take_id is not None:
+    if instance.take_id is not None and not instance.is_filtered:
         inputs.insert(0, instance.origins)
     origins = {
         (root.callback_instance_id, path): (root, (*path, topic))

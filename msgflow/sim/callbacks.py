@@ -109,11 +109,15 @@ def run_callback(
         # Flows begin in timers; what the callback of a service publishes is no flow from a timer.
         root = Root(instance_id, hostname, pid, tid, start, start_ns)
         origins = ((root, ()),) if kind == "timer" else ()
-        instance = CallbackInstance(instance_id, start_ns, origins, None, None, tid, start)
+        instance = CallbackInstance(
+            instance_id, start_ns, origins, None, None, tid, start,
+            header_ns=machine.stamp_ns(start),
+        )  # fmt: skip
     else:
         instance = CallbackInstance(
-            instance_id, start_ns, taken.message.origins, taken.take_id, taken.rmw_ns, tid, start
-        )
+            instance_id, start_ns, taken.message.origins, taken.take_id, taken.rmw_ns, tid, start,
+            header_ns=taken.message.header_ns,
+        )  # fmt: skip
     facts = (instance_id, hostname, pid, tid, node, kind, callback, start_ns)
     thread.emit(machine.tracepoints.callback_start, start, thread.context, callback, is_intra)
     outcome = execute(thread, middleware, code, start, instance)

@@ -113,6 +113,8 @@ class Publisher:
         intra_process: subscriptions of the process that want it get messages without DDS.
         transient_local: the last `depth` messages are kept for subscriptions that come late.
         lifespan_ns: a message that waits for longer cannot be taken any more.
+        is_buffer_aware: its messages go to the channels of its subscriptions, in releases that
+            have these, unless one of them has no channel.
     """
 
     topic: str
@@ -122,6 +124,7 @@ class Publisher:
     intra_process: bool = False
     transient_local: bool = False
     lifespan_ns: int | None = None
+    is_buffer_aware: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +150,8 @@ class Subscription:
         created_ns: when a thread of the user creates it, after the begin of tracing; None: with
             the other objects of the node.
         destroyed_ns: when that thread destroys it; its addresses are free then.
+        channel: of publishers that are aware of buffers: 'own', 'shared' with the other
+            subscriptions of the topic that say so, or none.
     """
 
     topic: str
@@ -166,6 +171,7 @@ class Subscription:
     created_ns: int | None = None
     destroyed_ns: int | None = None
     first: tuple[Action, ...] = ()
+    channel: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +181,8 @@ class MessageLink:
     Attributes:
         kind: 'periodic_async': each input is kept until a newer one comes, and what is published
             is made of what is kept; 'partial_sync': callbacks of inputs publish only once there is
-            a message of every input, and use each up.
+            a message of every input, and use each up; 'approximate_sync': they do so with the sets
+            that `ApproximateTime` makes, once for each.
         inputs: topics of subscriptions of the node, or of the one that `inputs_of` names.
         outputs: topics of its publishers.
         is_late: a callback puts its message into the cache, and looks at the others, only when it
@@ -191,9 +198,10 @@ class MessageLink:
     inputs_of: str = ""
 
     def __post_init__(self) -> None:
-        if self.kind not in {"periodic_async", "partial_sync"}:
+        if self.kind not in {"periodic_async", "partial_sync", "approximate_sync"}:
             raise UsageError(
-                f"no such kind of link — {self.kind}", "choose periodic_async or partial_sync"
+                f"no such kind of link — {self.kind}",
+                "choose periodic_async, partial_sync or approximate_sync",
             )
         if not self.inputs or not self.outputs:
             raise UsageError("a link has inputs and outputs — one of them is missing")

@@ -118,6 +118,7 @@ SIGNATURES: Mapping[str, tuple[EventField, ...]] = MappingProxyType(
             "ros2:rclcpp_ring_buffer_clear": "buffer pointer",
             "ros2:message_link_periodic_async": "subs sequence, pubs sequence",
             "ros2:message_link_partial_sync": "subs sequence, pubs sequence",
+            "ros2:message_link_approximate_sync": "subs sequence, pubs sequence",
             "dds:create_writer": "writer pointer, topic_name string, gid_prefix bytes 12, "
             "gid_entity bytes 4, gid bytes 16",
             "dds:create_reader": "reader pointer, topic_name string, gid_prefix bytes 12, "

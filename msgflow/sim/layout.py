@@ -45,6 +45,8 @@ class Layout:
         is_stamped_early: DDS makes the stamp when write is entered (Cyclone DDS); else once the
             message is serialised (Fast DDS).
         has_end_of_deferred: callback_end is recorded for a service that answers later.
+        has_channels: the middleware layer (rmw_zenoh) writes a message with buffers to one channel
+            after the other, each time with a stamp of its own, and emits no rmw_publish.
         dds_write: the `dds:*` events of a publication, in order.
         packet_bytes: size of a sub-buffer, hence of a packet.
         tracer_minor: of LTTng 2.x.
@@ -57,6 +59,7 @@ class Layout:
     is_rosout_first: bool = True
     is_stamped_early: bool = False
     has_end_of_deferred: bool = False
+    has_channels: bool = False
     dds_write: tuple[str, ...] = ()
     packet_bytes: int = _LARGE_PACKET
     tracer_minor: int = 13
@@ -198,11 +201,17 @@ _KILTED = replace(
     has_end_of_deferred=True,
 )
 
+# The last one is no tracepoint of ROS 2: applications that use message_filters declare it so.
+_MESSAGE_LINKS = (
+    "message_link_periodic_async", "message_link_partial_sync", "message_link_approximate_sync",
+)  # fmt: skip
+
 _ROLLING = replace(
     _KILTED,
     name="rolling",
     version="8.10.1",
-    events=_events(_KILTED.having("message_link_periodic_async", "message_link_partial_sync")),
+    events=_events(_KILTED.having(*_MESSAGE_LINKS)),
+    has_channels=True,
 )
 
 
@@ -268,8 +277,7 @@ def _with_early_cyclone_dds(layout: Layout) -> Layout:
 
 def _with_message_links(layout: Layout) -> Layout:
     """The branch for annotations, which users of the instrumented DDS also use."""
-    events = layout.having("message_link_periodic_async", "message_link_partial_sync")
-    return replace(layout, events=_events(events))
+    return replace(layout, events=_events(layout.having(*_MESSAGE_LINKS)))
 
 
 @cache

@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from msgflow.sim.approximate_time import ApproximateTime
 from msgflow.sim.callback_instance import CallbackInstance, Cause
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 # More callbacks than this cannot end while another one is being run.
 _KEPT = 64
+# Kinds of links that wait for a message of every input.
+SYNCHRONOUS = ("partial_sync", "approximate_sync")
 
 
 @dataclass(slots=True, eq=False)
@@ -29,6 +32,7 @@ class LinkObject:
         ended: for each input the runs of its callback that have ended, each with its end.
         waiting: for each input the run whose message is there to be used (partial_sync).
         used: runs whose messages have been used.
+        filter: what makes the sets (approximate_sync).
     """
 
     description: MessageLink
@@ -37,20 +41,31 @@ class LinkObject:
     ended: dict[str, deque[tuple[int, CallbackInstance]]] = field(default_factory=dict)
     waiting: dict[str, CallbackInstance] = field(default_factory=dict)
     used: set[int | None] = field(default_factory=set)
+    filter: ApproximateTime[CallbackInstance] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.filter = ApproximateTime(len(self.description.inputs))
 
     def keep(self, topic: str, end: int, instance: CallbackInstance) -> None:
         """The callback of an input has ended: its message is in the cache."""
         self.ended.setdefault(topic, deque(maxlen=_KEPT)).append((end, instance))
 
-    def fire(self, topic: str, instance: CallbackInstance) -> tuple[CallbackInstance, ...] | None:
-        """A message of this input is there: the others that are used with it, None if any lacks."""
+    def fire(self, topic: str, instance: CallbackInstance) -> list[tuple[CallbackInstance, ...]]:
+        """A message of this input is there: returns the sets that are complete now.
+
+        Without the message itself, but for approximate_sync, where it need not be in the set.
+        """
+        if self.description.kind == "approximate_sync":
+            header_ns = instance.header_ns
+            assert header_ns is not None
+            return self.filter.add(self.description.inputs.index(topic), header_ns, instance)
         others = [other for other in self.description.inputs if other != topic]
         if not all(other in self.waiting for other in others):
             self.waiting[topic] = instance
-            return None
+            return []
         completed = tuple(self.waiting[other] for other in others)
         self.waiting.clear()
-        return completed
+        return [completed]
 
     def latest(self, own: str | None, cut: int) -> Iterable[CallbackInstance]:
         """For each input but `own` the run that was the last to end up to the cut."""
@@ -90,18 +105,18 @@ class CallbackLinks:
         return tuple(
             link
             for link in self.inputs
-            if link.description.kind == "partial_sync" and link.description.is_late is is_late
+            if link.description.kind in SYNCHRONOUS and link.description.is_late is is_late
         )
 
     def fill(
         self, instance: CallbackInstance, *, is_late: bool
-    ) -> dict[LinkObject, tuple[CallbackInstance, ...]]:
-        """Put the message into the caches; returns the links that fire, with what they use."""
+    ) -> dict[LinkObject, list[tuple[CallbackInstance, ...]]]:
+        """Put the message into the caches; returns the links that fire, with the sets they use."""
         fired = {}
         for link in self.gates(is_late=is_late):
             assert self.topic is not None
             completed = link.fire(self.topic, instance)
-            if completed is not None:
+            if completed:
                 fired[link] = completed
         return fired
 
@@ -110,9 +125,16 @@ class CallbackLinks:
         gates = [
             link
             for link in self.inputs
-            if link.description.kind == "partial_sync" and topic in link.description.outputs
+            if link.description.kind in SYNCHRONOUS and topic in link.description.outputs
         ]
         return not gates or any(link in fired for link in gates)
+
+    def set_count(
+        self, topic: str, fired: dict[LinkObject, list[tuple[CallbackInstance, ...]]]
+    ) -> int:
+        """How often it publishes on a topic: once for each set of the links that have fired."""
+        counts = [len(sets) for link, sets in fired.items() if topic in link.description.outputs]
+        return max(counts, default=1)
 
     def is_gated(self, topics: Sequence[str]) -> bool:
         """Whether everything that it publishes waits for other inputs."""
@@ -122,23 +144,28 @@ class CallbackLinks:
         self,
         topic: str,
         instance: CallbackInstance,
-        fired: dict[LinkObject, tuple[CallbackInstance, ...]],
+        fired: dict[LinkObject, list[tuple[CallbackInstance, ...]]],
         time: int,
+        number: int = 0,
     ) -> CallbackInstance:
-        """The run of the callback, with all that its publication on a topic is made of."""
+        """The run of the callback, with all that its publication on a topic is made of.
+
+        `number`: how often it has published on the topic before, once for each set.
+        """
         causes = []
         for link in self.outputs:
             description = link.description
             if topic not in description.outputs:
                 continue
-            if description.kind == "partial_sync":
-                used: Iterable[CallbackInstance] = fired.get(link, ())
+            if description.kind in SYNCHRONOUS:
+                sets = fired.get(link, [])
+                used: Iterable[CallbackInstance] = sets[number] if number < len(sets) else ()
             else:
                 used = link.latest(self.topic, time if description.is_late else instance.start)
             for each in used:
-                number = each.callback_instance_id
-                causes.append(Cause(description.kind, each, number in link.used))
-                link.used.add(number)
+                key = each.callback_instance_id
+                causes.append(Cause(description.kind, each, key in link.used))
+                link.used.add(key)
         return replace(instance, causes=tuple(causes))
 
     def end(self, end: int, instance: CallbackInstance) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from msgflow.sim.callback_instance import origins_on
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from msgflow.sim.callback_instance import CallbackInstance, Origin
     from msgflow.sim.entity import Publisher, Subscription, Work
@@ -28,12 +28,16 @@ class Message:
 
     Attributes:
         origins: the flows that lead to it, as far as they began in timers.
-        rmw: time of rmw_publish; `intra` that of rclcpp_intra_publish.
+        header_ns: stamp in its header; None: published in no callback.
+        rmw: time of rmw_publish, or of the last event without one; `intra` that of
+            rclcpp_intra_publish.
+        stamp_ns: its source stamp, the first one if it was written several times.
+        stamps: source stamps by subscription if it was written to channels, else None.
     """
 
     __slots__ = (
-        "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns", "rclcpp_ns", "rmw",
-        "rmw_ns", "stamp_ns", "tid",
+        "header_ns", "intra", "intra_ns", "origins", "publication_id", "publisher", "rcl_ns",
+        "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
     )  # fmt: skip
 
     def __init__(
@@ -50,8 +54,10 @@ class Message:
         self.publisher = publisher
         self.tid = tid
         self.origins: tuple[Origin, ...] = ()
+        self.header_ns: int | None = None
         if instance is not None:
             self.origins = origins_on(instance, publisher.topic)
+            self.header_ns = instance.header_ns
         self.intra = intra
         self.intra_ns = intra_ns
         self.rclcpp_ns: int | None = None
@@ -59,6 +65,11 @@ class Message:
         self.rmw: int | None = None
         self.rmw_ns: int | None = None
         self.stamp_ns: int | None = None
+        self.stamps: Mapping[SubscriptionObject, int] | None = None
+
+    def stamp_for(self, subscription: SubscriptionObject) -> int | None:
+        """The source stamp with which a subscription gets it; None if it does not."""
+        return self.stamp_ns if self.stamps is None else self.stamps.get(subscription)
 
     @property
     def time(self) -> int:
@@ -123,6 +134,24 @@ class PublisherObject:
     is_silent: bool = False
     history: deque[Message] | None = None
     sent: list[Message] = field(default_factory=list)
+
+    def channels(self, time: int) -> list[list[SubscriptionObject]] | None:
+        """The subscriptions of each channel that a message of `time` is written to, in order.
+
+        None if it is written once for all.
+        """
+        if not (self.process.machine.layout.has_channels and self.description.is_buffer_aware):
+            return None
+        known = [
+            match.subscription
+            for match in self.matches
+            if match.since <= time and match.subscription.ended is None
+        ]
+        if not all(subscription.description.channel for subscription in known):
+            return None
+        shared = [each for each in known if each.description.channel == "shared"]
+        own = [[each] for each in known if each.description.channel == "own"]
+        return [shared, *own] if shared else own
 
 
 @dataclass(slots=True, eq=False)

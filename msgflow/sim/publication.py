@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.sim.objects import Message
-from msgflow.sim.rmw import write
+from msgflow.sim.rmw import write, write_to_channels
 
 if TYPE_CHECKING:
     from msgflow.sim.callback_instance import CallbackInstance
@@ -50,9 +50,17 @@ def publish(
         rcl += int((250 + int(random() * 900)) * pace)
     emit(tracepoints.rcl_publish, rcl, context, publisher.handle, publisher.message)
     size_bytes = publisher.description.size_bytes
+    message.rcl_ns = rcl + epoch
+    if (channels := publisher.channels(rcl)) is not None:
+        message.rmw = rcl
+        message.stamps, end = write_to_channels(thread, channels, rcl, size_bytes)
+        message.stamp_ns = min(message.stamps.values(), default=None)
+        write_publication(thread, publisher, message, instance)
+        middleware.send(end, message)
+        return end + int((3_000 + int(random() * 6_000)) * pace)
     written = write(thread, publisher.rmw_handle, publisher.message, rcl, size_bytes)
     rmw, message.stamp_ns = written.rmw, written.stamp_ns
-    message.rcl_ns, message.rmw, message.rmw_ns = rcl + epoch, rmw, rmw + epoch
+    message.rmw, message.rmw_ns = rmw, rmw + epoch
     written.add_to_truth(thread, message.publication_id)
     write_publication(thread, publisher, message, instance)
     middleware.send(written.end, message)
@@ -84,7 +92,7 @@ def write_publication(
         return
     truth.causal.add(
         instance.callback_instance_id, message.publication_id, hostname, pid, tid,
-        "take_adjacent" if instance.callback_instance_id is None else "direct",
+        _kind(instance),
         instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
         message.rcl_ns, message.rmw_ns, is_internal, False,
     )  # fmt: skip
@@ -100,3 +108,10 @@ def write_publication(
             cause.kind, used.start_ns, used.take_id, used.take_rmw_ns, topic,
             message.rcl_ns, message.rmw_ns, is_internal, cause.is_reuse,
         )  # fmt: skip
+
+
+def _kind(instance: CallbackInstance) -> str:
+    """How a publication follows from the message of the instance itself."""
+    if instance.callback_instance_id is None:
+        return "take_adjacent"
+    return "triggered" if instance.is_filtered else "direct"

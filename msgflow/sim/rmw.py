@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from msgflow.sim.machine import Thread
+    from msgflow.sim.objects import SubscriptionObject
 
 # Fast DDS serialises a message before it stamps it, at about 5 bytes per ns.
 _SERIALISING_NS_PER_BYTE = 0.2
@@ -90,6 +91,24 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     if layout.is_stamped_early:
         end += duration
     return Written(rmw, stamp_ns, end + int(size_bytes * _SENDING_NS_PER_BYTE), tuple(dds))
+
+
+def write_to_channels(
+    thread: Thread, channels: list[list[SubscriptionObject]], time: int, size_bytes: int
+) -> tuple[dict[SubscriptionObject, int], int]:
+    """Publish a message on one channel after the other, called at `time`; no event tells.
+
+    Returns the source stamps by subscription, and the time at which the call returns.
+    """
+    scheduler, machine = thread.scheduler, thread.machine
+    stamps: dict[SubscriptionObject, int] = {}
+    for channel in channels:
+        time += 400 + int(scheduler.random() * 800)
+        time += int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * scheduler.random()))
+        time += int(scheduler.tail(1_500))
+        stamps |= dict.fromkeys(channel, machine.stamp_ns(time))
+        time += 1_000 + int(size_bytes * _SENDING_NS_PER_BYTE)
+    return stamps, time
 
 
 def read(thread: Thread, rmw_handle: int, buffer: int, time: int, stamp_ns: int, taken: int) -> int:

@@ -280,7 +280,7 @@ def _check_links(node: Node, process: Process) -> None:
         inputs = [subscriptions[topic] for topic in link.inputs]
         if any({*link.outputs} - {*each.publishes} for each in inputs):
             raise UsageError(
-                f"whatever input comes last has to publish — partial_sync of {node.full_name}"
+                f"whatever input comes last has to publish — {link.kind} of {node.full_name}"
             )
 
 

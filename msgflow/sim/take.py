@@ -45,7 +45,7 @@ class Taken:
         hostname, pid, tid = machine.hostname, thread.process.pid, thread.tid
         publisher, truth = message.publisher, thread.scheduler.truth
         is_internal = subscription.is_internal
-        stamp_ns = None if self.method == "ring_buffer" else message.stamp_ns
+        stamp_ns = None if self.method == "ring_buffer" else message.stamp_for(subscription)
         truth.take.add(
             self.take_id, hostname, pid, tid, subscription.node, publisher.topic,
             subscription.handle, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, stamp_ns,
@@ -101,8 +101,9 @@ def take(
     )  # fmt: skip
     if subscription.is_silent:
         return taken, reading
-    assert message.stamp_ns is not None
-    rmw = read(thread, subscription.rmw_handle, buffer, reading, message.stamp_ns, 1)
+    stamp_ns = message.stamp_for(subscription)
+    assert stamp_ns is not None
+    rmw = read(thread, subscription.rmw_handle, buffer, reading, stamp_ns, 1)
     taken.method, taken.time, taken.rmw_ns = "rmw", rmw, rmw + epoch
     last = rmw + 200 + int(random() * 900)
     emit(tracepoints.rcl_take, last, context, buffer)

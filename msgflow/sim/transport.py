@@ -102,6 +102,10 @@ class Middleware:
             if match.subscription.ended is not None or match.since > time:
                 self.miss(message, match, time)
                 continue
+            if message.stamp_for(match.subscription) is None:
+                # Discovered while it was written to the channels of others.
+                self.drop(message, match.subscription, "before_discovery")
+                continue
             if match.loss and scheduler.random() < match.loss:
                 self.drop(message, match.subscription, "lost_in_transport")
                 continue

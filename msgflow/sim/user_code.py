@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -89,12 +90,19 @@ def _fill_and_publish(
         time = yield thread.hold(time + _duration(thread, work))
         fired |= links.fill(instance, is_late=True)
         work = _KEEPING
-    publishers = tuple(each for each in code.publishers if links.may_publish(each.topic, fired))
+    published: Counter[str] = Counter()
+    publishers = tuple(
+        each
+        for each in code.publishers
+        if links.may_publish(each.topic, fired)
+        for _ in range(links.set_count(each.topic, fired))
+    )
     if not publishers and links.is_gated([each.topic for each in code.publishers]):
         work = _KEEPING
 
     def cause(topic: str, time: int) -> CallbackInstance:
-        return links.cause(topic, instance, fired, time)
+        published[topic] += 1
+        return links.cause(topic, instance, fired, time, published[topic] - 1)
 
     chosen = replace(
         code, work=work, publishers=publishers, is_stepwise=code.is_stepwise or bool(publishers)

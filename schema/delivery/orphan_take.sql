@@ -43,6 +43,13 @@ stampless AS (
     GROUP BY process_id
     HAVING count(source_timestamp_ns) = 0
 ),
+-- Likewise of single topics.
+channelled AS (
+    SELECT DISTINCT p.topic_name, b.process_id
+    FROM derive.unstamped_call(only_run) AS b
+    JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE b.is_without_event AND EXISTS (SELECT 1 FROM orphan)
+),
 -- Before Humble takes have no event of their own: that they have no stamp is not due to loss.
 stamping AS (
     SELECT process_id
@@ -107,7 +114,9 @@ sender AS (
         c.topic_name, c.process_id, c.created_ns, c.is_known, p.host_id, p.last_seen_ns,
         coalesce(r.begin_ns, p.first_seen_ns) AS begin_ns,
         coalesce(r.recorded_from_ns, p.first_seen_ns) AS recorded_from_ns,
-        c.process_id IN (SELECT process_id FROM stampless) AS is_stampless
+        c.process_id IN (SELECT process_id FROM stampless)
+        OR (c.topic_name, c.process_id) IN (SELECT (topic_name, process_id) FROM channelled)
+            AS is_stampless
     FROM candidate AS c
     JOIN store.process AS p ON c.process_id = p.process_id
     LEFT JOIN presence AS r ON c.process_id = r.process_id

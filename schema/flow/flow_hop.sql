@@ -15,7 +15,7 @@ entered AS (
     SELECT
         run_id, subscription_id AS from_subscription_id, route, publisher_id,
         false AS is_source,
-        bool_or(kind IN ('periodic_async', 'partial_sync')) AS is_cached
+        bool_or(derive.is_indirect(kind)) AS is_cached
     FROM derive.flow_continuation
     WHERE run_id = only_run
     GROUP BY run_id, subscription_id, route, publisher_id

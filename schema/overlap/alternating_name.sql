@@ -2,22 +2,28 @@
 -- kind: inline
 -- description: Names of processes that run at the same time under one id. A thread that has such
 --     a name gets it back after another one. A thread that renames itself does so inside of
---     callbacks, too: one that begins under a name and ends under another is of one process.
+--     callbacks, too: one that begins under a name and ends under another is of one process. A
+--     thread that initialises ROS may be of a further life of the id: names from before do not
+--     count.
 -- grain: one row per host, pid and name
 WITH named AS (
     SELECT
         s.host, r.vpid, r.thread_index, n.procname, n.first_event_id,
-        lag(n.procname) OVER (PARTITION BY n.thread_index ORDER BY n.first_event_id)
-            IS DISTINCT FROM n.procname AS is_other
+        i.event_id AS initialised_event_id,
+        lag(n.procname) OVER (
+            PARTITION BY n.thread_index, i.event_id ORDER BY n.first_event_id
+        ) IS DISTINCT FROM n.procname AS is_other
     FROM raw.thread_name AS n
+    ASOF LEFT JOIN raw.ros2_rcl_init AS i
+        ON n.thread_index = i.thread_index AND n.first_event_id >= i.event_id
     JOIN raw.thread AS r ON n.thread_index = r.thread_index
     JOIN session_trace AS s ON r.trace_index = s.trace_index
     WHERE r.pid_ns IS NULL AND r.vpid >= 0 AND n.procname IS NOT NULL
 ),
 alternating AS (
-    SELECT host, vpid, thread_index
+    SELECT DISTINCT host, vpid, thread_index
     FROM named
-    GROUP BY host, vpid, thread_index
+    GROUP BY host, vpid, thread_index, initialised_event_id
     HAVING count(*) FILTER (is_other) > count(DISTINCT procname)
 ),
 renamed AS (

@@ -155,7 +155,7 @@ cached AS (
     JOIN callback AS i ON c.publishing_id = i.callback_instance_id
     LEFT JOIN store.link_causal AS d ON c.publication_id = d.publication_id AND d.kind = 'direct'
     LEFT JOIN callback AS s ON d.callback_instance_id = s.callback_instance_id
-    WHERE c.kind IN ('periodic_async', 'partial_sync')
+    WHERE derive.is_indirect(c.kind)
 ),
 -- The moments at which a part begins. Those of a hop are in the order of `rank`.
 detour AS (

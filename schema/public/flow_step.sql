@@ -169,9 +169,8 @@ SELECT
     a.from_id,
     a.link_kind,
     CASE
-        WHEN a.link_kind IN (
-            'transport', 'callback', 'periodic_async', 'partial_sync', 'take_adjacent', 'polled'
-        )
+        WHEN a.link_kind IN ('transport', 'callback', 'take_adjacent', 'polled')
+            OR derive.is_indirect(a.link_kind)
             THEN d.start_ns - f.end_ns
         WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns
     END AS wait_ns,

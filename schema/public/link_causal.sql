@@ -11,6 +11,7 @@
 --     direct links
 -- column: candidate_count
 -- column: is_loss_affected
+-- column: is_followed BOOLEAN  Flows and paths follow it
 SELECT
     l.run_id,
     l.callback_instance_id,
@@ -25,7 +26,8 @@ SELECT
         ELSE b.start_ns - i.end_ns
     END AS wait_ns,
     l.candidate_count,
-    l.is_loss_affected
+    l.is_loss_affected,
+    derive.is_followed(l.kind, l.candidate_count) AS is_followed
 FROM store.link_causal AS l
 LEFT JOIN main.callback_instance AS i
     ON l.callback_instance_id = i.callback_instance_id

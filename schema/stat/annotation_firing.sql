@@ -1,8 +1,8 @@
 -- name: derive.annotation_firing
 -- description: Publications by the outputs of annotations, with the number of inputs that they
 --     have a message of: through an indirect link, or as the message that the publishing callback
---     instance was called with. Where all inputs have to come together (partial_sync), only
---     publications from the callback of an input are listed.
+--     instance was called with. Where all inputs have to come together (partial_sync,
+--     approximate_sync), only publications from the callback of an input are listed.
 -- grain: one row per annotation and publication that it applies to
 WITH input AS (
     SELECT annotation_id, count(*) AS input_count
@@ -24,6 +24,20 @@ direct AS (
     JOIN store.callback AS c ON i.callback_id = c.callback_id
     WHERE l.kind = 'direct'
         AND l.publisher_id IN (SELECT publisher_id FROM store.annotation_output)
+),
+-- Its own message is one of the set, or none: there is no direct link.
+filtered AS (
+    SELECT
+        o.annotation_id, b.publication_id, i.callback_instance_id
+    FROM store.annotation AS a
+    JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
+    JOIN store.publication AS b ON o.publisher_id = b.publisher_id
+    JOIN store.callback_instance AS i
+        ON b.callback_event_id = i.start_event_id AND b.run_id = i.run_id
+    JOIN store.callback AS c ON i.callback_id = c.callback_id
+    JOIN store.annotation_input AS n
+        ON o.annotation_id = n.annotation_id AND c.subscription_id = n.subscription_id
+    WHERE a.kind = 'approximate_sync' AND b.start_event_id < i.effective_end_event_id
 )
 SELECT
     a.run_id,
@@ -42,3 +56,12 @@ LEFT JOIN store.annotation_input AS i
 LEFT JOIN linked AS l
     ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
 WHERE a.kind = 'periodic_async' OR (a.kind = 'partial_sync' AND i.annotation_id IS NOT NULL)
+UNION ALL
+SELECT
+    a.run_id, a.annotation_id, f.publication_id, f.callback_instance_id,
+    coalesce(n.input_count, 0), coalesce(l.link_count, 0)
+FROM filtered AS f
+JOIN store.annotation AS a ON f.annotation_id = a.annotation_id
+LEFT JOIN input AS n ON f.annotation_id = n.annotation_id
+LEFT JOIN linked AS l
+    ON f.annotation_id = l.annotation_id AND f.publication_id = l.publication_id

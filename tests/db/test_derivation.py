@@ -115,7 +115,7 @@ def test_tables_have_no_row_without_those_of_their_when(
     """Of a run in which each of them has rows."""
     path = tmp_path / "run.duckdb"
     recording = Recording(lost_event_share=0.3)
-    simulate(system, tmp_path / "trace", factor=0.15, layout=layout, recording=recording)
+    simulate(system, tmp_path / "trace", factor=0.3, layout=layout, recording=recording)
     ingest([tmp_path / "trace"], path)
     with open_file(path, read_only=False) as con:
         for name, header in SOMETIMES_EMPTY.items():

@@ -168,7 +168,7 @@ def test_a_partial_sync_of_one_input_changes_nothing(database: Path, untouched: 
     text = BOTH.replace("periodic_async", "partial_sync").replace("[/a, /b]", "[/b]")
     with Database(database) as opened, pytest.raises(UsageError) as caught:
         opened.apply_links(write(database, text))
-    assert "links.yaml, line 3: a partial_sync of one input waits" in caught.value.message
+    assert "links.yaml, line 3: partial_sync with one input waits" in caught.value.message
     assert "/b of /fusion" in caught.value.message
     assert contents(database) == untouched
 

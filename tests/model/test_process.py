@@ -108,6 +108,17 @@ def test_a_name_that_does_not_come_back_is_a_new_name(system: RosSystem, analyse
     assert analyse(system).rows(NAMESPACES) == [("listener", None)]
 
 
+def test_a_name_that_comes_back_in_another_life_is_a_new_name(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    """Each of two lives renames its thread once."""
+    for _ in range(2):
+        system.context(Thread(7, name="python3"))
+        called(system, Thread(7, name="python3"))
+        called(system, Thread(7, name="listener"))
+    assert analyse(system).rows("SELECT DISTINCT pid_namespace FROM store.process") == [(None,)]
+
+
 def test_a_thread_that_renames_itself_in_callbacks_is_one(
     system: RosSystem, analyse: Analyse
 ) -> None:

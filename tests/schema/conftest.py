@@ -30,7 +30,8 @@ CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
     publication_id BIGINT, written_ns BIGINT, next_event_ns BIGINT,
     has_break BOOLEAN DEFAULT false);
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
-    source_timestamp_ns BIGINT, clock_id BIGINT DEFAULT 1, taken_ns BIGINT);
+    source_timestamp_ns BIGINT, only_subscription_id BIGINT DEFAULT 0, clock_id BIGINT DEFAULT 1,
+    taken_ns BIGINT);
 CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
     start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
     message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);

@@ -212,6 +212,88 @@ def test_a_publication_that_has_its_message_has_no_other(
     assert (found[time + first], found[time + 200_000]) == ((998, 1), (999, 1))
 
 
+def take_alone(con: duckdb.DuckDBPyConnection, subscription: int, *stamps: int) -> None:
+    """Messages that a subscription gets with stamps of its own."""
+    con.executemany(
+        "INSERT INTO message (source_timestamp_ns, only_subscription_id, taken_ns) "
+        "VALUES (?, ?, ?)",
+        [(stamp, subscription, 100 * SECOND) for stamp in stamps],
+    )
+
+
+def test_a_publication_may_have_a_message_for_each_subscription(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Also one that two share; but no second one for the same."""
+    clock(rules, (0, 100, 0))
+    for n in range(10):
+        time = n * PERIOD
+        publish(rules, n, time, time + MILLISECOND)
+        take_alone(rules, 5, time + 10_000)
+        take_alone(rules, 6, time + 10_000)
+        take_alone(rules, 7, time + 200_000)
+    take_alone(rules, 7, 900_000)
+    found = nearest(rules)
+    assert {found[n * PERIOD + 10_000] for n in range(10)} == {(n, 1) for n in range(10)}
+    assert [found[n * PERIOD + 200_000] for n in range(1, 10)] == [(n, 1) for n in range(1, 10)]
+    assert found[200_000] == (0, 1)
+    assert 900_000 not in found
+
+
+def test_what_is_usual_counts_each_subscription(rules: duckdb.DuckDBPyConnection) -> None:
+    """The second channel is written later than the first."""
+    clock(rules, (0, 100, 0))
+    for n in range(10):
+        publish(rules, n, n * PERIOD, n * PERIOD + MILLISECOND)
+        take_alone(rules, 5, n * PERIOD + 10_000)
+        take_alone(rules, 6, n * PERIOD + 200_000)
+    publish(rules, 999, SECOND, None)
+    take_alone(rules, 6, SECOND + 400_000)
+    assert nearest(rules)[SECOND + 400_000] == (999, 1)
+
+
+def test_what_one_subscription_has_is_no_rival_for_another(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Two writes go on; which of them the first message of 5 is of shows by its second."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [10_000] * 10, MILLISECOND)
+    rules.execute("UPDATE message SET only_subscription_id = 5")
+    publish(rules, 998, time, time + 900_000)
+    publish(rules, 999, time + 100_000, time + 500_000, publisher=2)
+    take_alone(rules, 5, time + 50_000, time + 200_000)
+    take_alone(rules, 6, time + 300_000)
+    found = nearest(rules)
+    assert (found[time + 50_000], found[time + 200_000]) == ((998, 1), (999, 1))
+    assert found[time + 300_000] == (None, 2)
+
+
+@pytest.mark.parametrize("second", [5, 6])
+def test_a_stamp_that_two_subscriptions_share_is_of_one_publication(
+    rules: duckdb.DuckDBPyConnection, second: int
+) -> None:
+    """For one of them it could only be this, for the other also that: nothing is told."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [10_000] * 10, MILLISECOND)
+    rules.execute("UPDATE message SET only_subscription_id = 5")
+    publish(rules, 998, time, time + 900_000)
+    publish(rules, 999, time + 100_000, time + 500_000, publisher=2)
+    take_alone(rules, 5, time + 50_000, time + 200_000)
+    if second != 5:
+        take_alone(rules, second, time + 200_000)
+    assert nearest(rules)[time + 200_000] == ((999, 1) if second == 5 else (None, 2))
+
+
+@pytest.mark.parametrize(("missed", "is_found"), [(False, True), (True, False)])
+def test_a_stranger_takes_the_place_of_what_one_subscription_missed(
+    rules: duckdb.DuckDBPyConnection, *, missed: bool, is_found: bool
+) -> None:
+    beside_strangers(rules, taken=20)
+    rules.execute("UPDATE message SET only_subscription_id = 5")
+    take_alone(rules, 6, *(n * PERIOD + 20_000 for n in range(20) if n or not missed))
+    assert nearest(rules)[UNUSUAL] == (9 if is_found else None, 1)
+
+
 def test_unless_that_comes_later_than_is_usual(rules: duckdb.DuckDBPyConnection) -> None:
     """The publisher writes for most of the time, so that it may be of somebody else."""
     clock(rules, (0, 100, 0))
@@ -385,15 +467,18 @@ def test_or_half_of_all_messages(
 
 
 def test_where_the_clocks_are_not_known_nothing_is_told(rules: duckdb.DuckDBPyConnection) -> None:
-    clock(rules, (0, 100, 0), (0, 0, 0))
+    """Nor in the stretch before: in its last part, the clock may have been set already."""
+    clock(rules, (0, 100, 0), (0, 100, 0), (0, 0, 0))
     publish(rules, 1, 0, MILLISECOND)
     publish(rules, 2, SECOND, SECOND + MILLISECOND)
     publish(rules, 3, -SECOND, MILLISECOND - SECOND)
-    take(rules, MICROSECOND - SECOND, MICROSECOND, SECOND + MICROSECOND)
+    publish(rules, 4, 2 * SECOND, 2 * SECOND + MILLISECOND)
+    take(rules, *(n * SECOND + MICROSECOND for n in (-1, 0, 1, 2)))
     assert nearest(rules) == {
         MICROSECOND - SECOND: (3, 1),
         MICROSECOND: (1, 1),
         SECOND + MICROSECOND: (None, 0),
+        2 * SECOND + MICROSECOND: (None, 0),
     }
 
 
@@ -439,6 +524,22 @@ def test_a_publication_beside_a_jump_is_on_either_side(
     stamp = written + difference + MICROSECOND
     take(rules, stamp)
     assert nearest(rules) == {stamp: (1, 1)}
+
+
+@pytest.mark.parametrize("segments", [(0, 1), (1, 2), (2, 3)])
+def test_after_a_clock_was_set_back_publications_of_one_side_do_not_hide_others(
+    rules: duckdb.DuckDBPyConnection, segments: tuple[int, int]
+) -> None:
+    """What was written 40 ms later got the same stamp, and was taken later."""
+    back = 40 * MILLISECOND
+    clock(rules, (0, 100, segments[0]), (-back, 100, segments[1]))
+    early = SECOND - 20 * MILLISECOND
+    publish(rules, 1, early, early + MILLISECOND)
+    publish(rules, 2, early + back + 300, early + back + MILLISECOND)
+    take(rules, early + 500, taken=early + MILLISECOND)
+    take(rules, early + 900, taken=early + back + MILLISECOND)
+    found = nearest(rules)
+    assert (found[early + 500], found[early + 900]) == ((1, 1), (2, 1))
 
 
 def test_an_unknown_side_of_a_jump_tells_nothing(rules: duckdb.DuckDBPyConnection) -> None:

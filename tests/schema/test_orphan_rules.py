@@ -42,6 +42,8 @@ CREATE TABLE derive.process_presence (run_id BIGINT DEFAULT 1, process_id BIGINT
     begin_ns BIGINT DEFAULT {100 * MS}, recorded_from_ns BIGINT DEFAULT {100 * MS});
 CREATE TABLE missed (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
 CREATE TABLE rival (take_id BIGINT);
+CREATE TABLE unstamped (process_id BIGINT, publisher_id BIGINT, is_without_event BOOLEAN);
+CREATE MACRO derive.unstamped_call(only_run) AS TABLE FROM unstamped;
 CREATE MACRO derive.process_gap(only_run) AS TABLE FROM missed;
 CREATE MACRO derive.take_candidate(only_run) AS TABLE FROM rival;
 INSERT INTO store.subscription (created_ns) VALUES (0);
@@ -316,6 +318,26 @@ def test_a_sender_whose_publications_have_no_stamps(
     )
     late = f"UPDATE store.publisher SET created_ns = {created}"
     assert reason(con, TAKE, SENDER, RECORDED, late, published) == expected
+
+
+@pytest.mark.parametrize(
+    ("topic", "is_without_event", "expected"),
+    [
+        ("/a", "true", "unknown"),
+        ("/a", "false", "publisher_not_traced"),
+        ("/b", "true", "publisher_not_traced"),
+    ],
+)
+def test_a_sender_whose_publications_on_the_topic_have_no_event_of_the_middleware(
+    con: duckdb.DuckDBPyConnection, topic: str, is_without_event: str, expected: str
+) -> None:
+    """Others of its process have stamps."""
+    published = (
+        "INSERT INTO store.publication (publication_id, source_timestamp_ns) VALUES (1, 7);"
+        f"INSERT INTO store.publisher (publisher_id, topic_name) VALUES (5, '{topic}');"
+        f"INSERT INTO unstamped VALUES (1, 5, {is_without_event})"
+    )
+    assert reason(con, TAKE, SENDER, RECORDED, published) == expected
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,24 @@ def test_which_publications_a_message_may_be_of(
     assert rows == [(count,)]
 
 
+def test_a_message_that_waited_on_another_clock_is_near_its_stamp(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) "
+        "SELECT n, n * 1000000, n * 1000000 + 2000 FROM range(200) AS r(n)"
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns, clock_id) "
+        "VALUES (500, 200500, 2), (100000500, 180200000, 2)"
+    )
+    rows = rules.execute(
+        "SELECT min(written_ns), max(written_ns) FROM derive.stamp_pair(1) "
+        "WHERE written_ns + greatest_ns = 100000500"
+    ).fetchall()
+    assert rows == [(76_000_000, 124_000_000)]
+
+
 @pytest.mark.parametrize(
     ("least", "greatest", "difference"), [(0, 6_000, 3_000), (0, 8_002, 4_002), (0, 90_000, 86_000)]
 )
@@ -273,6 +291,27 @@ def test_clocks_stood_where_one_difference_explains_what_several_do(
     assert rows == ([(4_000,)] * stretches if stands else [])
 
 
+@pytest.mark.parametrize(("jumps_at", "count"), [(3, 2), (6, 1)])
+def test_a_clock_that_has_jumped_does_not_stand_as_before(
+    rules: duckdb.DuckDBPyConnection, jumps_at: int, count: int
+) -> None:
+    """Even if the ranges of the differences overlap."""
+    rules.execute(
+        "CREATE TABLE pairs AS SELECT 1 AS clock_id, stretch, 0 AS least_ns, 8000 AS greatest_ns "
+        "FROM range(6) AS s(stretch), range(100) AS r(n)"
+    )
+    rules.execute(
+        "CREATE TABLE chosen AS SELECT 1 AS clock_id, stretch // ? AS place, stretch, "
+        "stretch * 1000000000 AS at_ns, 0 AS offset_ns, 0 AS least_ns, 8000 AS greatest_ns, "
+        "100 AS most_count FROM range(6) AS s(stretch)",
+        [jumps_at],
+    )
+    rows = rules.execute(
+        "SELECT span FROM derive.standing_difference('pairs', 'chosen')"
+    ).fetchall()
+    assert (len(rows), len(set(rows))) == (6, count)
+
+
 def test_where_nothing_is_told_a_clock_that_stood_stands(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:
@@ -287,6 +326,49 @@ def test_where_nothing_is_told_a_clock_that_stood_stands(
     ).fetchall()
     assert {known for known, *_ in rows} == {True}
     assert len({(difference, segment) for _, difference, segment in rows}) == 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_stretches_that_tell_nothing_between_two_in_which_a_clock_stood_alike(
+    rules: duckdb.DuckDBPyConnection, count: int
+) -> None:
+    """There the timer is never late, and its messages waited: they may be those of later ones."""
+    rules.execute(
+        "INSERT INTO published (publication_id, written_ns, next_event_ns) SELECT n, written_ns, "
+        "written_ns + 2000 FROM (SELECT n, n * $period + CASE WHEN n BETWEEN 150 AND $last "
+        "OR n IN (0, $count - 1) THEN 0 ELSE hash(n) % 80000 END AS written_ns "
+        "FROM range($count) AS r(n))",
+        {"period": PERIOD_NS, "count": COUNT, "last": 149 + 50 * count},
+    )
+    rules.execute(
+        "INSERT INTO message (source_timestamp_ns, taken_ns) "
+        "SELECT written_ns + 500 + (hash(publication_id, 7) % 1000)::BIGINT, written_ns + CASE "
+        "WHEN publication_id BETWEEN 150 AND $last THEN 25000000 ELSE 200000 END FROM published",
+        {"last": 149 + 50 * count},
+    )
+    rows = rules.execute(
+        "SELECT message_count > 0, difference_ns, segment FROM derive.stamp_clock(1)"
+    ).fetchall()
+    assert len(rows) == 8
+    assert {known for known, *_ in rows} == {True}
+    assert len({(difference, segment) for _, difference, segment in rows}) == 1
+
+
+HOURS_NS = 3 * 3_600 * SECOND
+
+
+@pytest.mark.parametrize("by_ns", [HOURS_NS, -HOURS_NS])
+@pytest.mark.parametrize("apart_ns", [0, HOURS_NS])
+def test_a_clock_that_is_set_by_hours_while_only_others_take_its_messages(
+    rules: duckdb.DuckDBPyConnection, by_ns: int, apart_ns: int
+) -> None:
+    """When they were taken tells when they were published, however far the clocks are apart."""
+    record(rules, width_ns=2_000, delay_ns=1_000, ppm=0)
+    rules.execute("UPDATE message SET clock_id = 2, taken_ns = taken_ns + ?", [apart_ns])
+    rows = step(rules, 4 * STRETCH_NS, by_ns)
+    found = [(round(difference / SECOND), segment) for _, _, difference, _, segment in rows]
+    assert set(found) == {(0, 0), (by_ns // SECOND, 1)}
+    assert next(row[0] for row in rows if row[4] == 1) <= 4 * STRETCH_NS
 
 
 @pytest.mark.parametrize(("here", "is_known"), [(10, True), (7, True), (6, False), (0, False)])

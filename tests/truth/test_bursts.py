@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from ingested import ingest_one
 from scoring import compare_simulated
 from thorough import few, thorough
 
-from msgflow.sim import Recording, simulate
+from msgflow.sim import Recording, scenarios, simulate
 
 SECOND = 1_000_000_000
 RECORDINGS = {
@@ -71,6 +72,54 @@ def test_writes_that_go_on_at_the_same_time(tmp_path: Path, layout: str) -> None
     transport = score["transport"]
     assert (transport.wrong, transport.missing) == (0, 0)
     assert transport.found >= 0.9 * transport.happened
+
+
+def test_a_clock_that_is_set_by_hours(tmp_path: Path) -> None:
+    """As on a host without a clock of its own; all messages are taken on the other host."""
+    known = scenarios()["two_hosts"]
+    set_by_hours = Recording(realtime_steps=((SECOND, 3 * 3_600 * SECOND),))
+    alpha, beta = known.hosts
+    scenario = replace(known, hosts=(alpha, replace(beta, recording=set_by_hours)))
+    simulation = simulate(scenario, tmp_path / "trace", factor=0.25, layout="humble")
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
+    transport = score["transport"]
+    assert transport.wrong == 0
+    assert transport.recall >= 0.99
+
+
+@pytest.mark.parametrize("layout", few(["rolling", "kilted"], "rolling"))
+def test_messages_that_are_written_for_each_subscription_on_its_own(
+    tmp_path: Path, layout: str
+) -> None:
+    """They carry a stamp each, and the middleware has no event; else stamps are equal."""
+    simulation = simulate("channels", tmp_path / "trace", factor=0.1, layout=layout)
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
+    transport = score["transport"]
+    assert (transport.wrong, transport.missing) == (0, 0)
+    assert transport.found == transport.happened
+    assert ("nearest" in transport.labels) is (layout == "rolling")
+    assert "exact" in transport.labels
+
+
+@pytest.mark.parametrize("system", ["pipeline", "channels"])
+def test_a_clock_that_is_set_back_by_milliseconds_makes_none_wrong(
+    tmp_path: Path, system: str
+) -> None:
+    """Stamps of before and after the step mix; its second one comes near the end of `channels`."""
+    recording = Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000)))
+    simulation = simulate(
+        system, tmp_path / "trace", factor=0.1, layout="humble", recording=recording
+    )
+    path = tmp_path / "run.duckdb"
+    ingest_one(simulation.directory, path).connection.close()
+    score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}
+    transport = score["transport"]
+    assert transport.wrong == 0
+    assert transport.recall > (0.97 if system == "pipeline" else 0.7)
 
 
 def test_a_clock_that_is_set_back_by_seconds_makes_few_wrong(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ CASES = {
         SELECT host, pid, tid, kind, callback_start_ns, take_rmw_ns, topic_name,
             publication_rcl_ns, publication_rmw_ns
         FROM truth_causal
-        WHERE kind <> 'take_adjacent'
+        WHERE kind NOT IN ('take_adjacent', 'triggered')
         """,
         """
         SELECT p.hostname, p.pid, p.tid, l.kind, i.start_ns, t.taken_ns, u.topic_name, b.rcl_ns,

@@ -21,7 +21,11 @@ Table(
     STORE,
     key("annotation_id", "Identity of the annotation"),
     run_id(),
-    text("kind", "'periodic_async', 'partial_sync', 'direct' or 'independent'", required=True),
+    text(
+        "kind",
+        "'periodic_async', 'partial_sync', 'approximate_sync', 'direct' or 'independent'",
+        required=True,
+    ),
     text("source", "'trace' or 'file'", required=True),
     process_id(),
     comment="One row per declared link",
@@ -123,7 +127,8 @@ Table(
     reference("publisher_id", "Publisher of the effect", to="publisher.publisher_id"),
     text(
         "kind",
-        "'direct', 'periodic_async', 'partial_sync', 'take_adjacent' or 'polled'",
+        "'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'take_adjacent' or "
+        "'polled'",
         required=True,
     ),
     reference(
@@ -135,7 +140,8 @@ Table(
         "candidate_count",
         "Callback instances that it could have been; one more if the message may have led to "
         "nothing: an input of an indirect link that had no message when the publishing callback "
-        "began, or a publication after a take without a callback that a timer may have made",
+        "began, or a publication after a take without a callback that a timer may have made. "
+        "approximate_sync: 2 if the set may be another one",
     ),
     flag("is_loss_affected", "A gap of the trace may hide a better partner"),
     comment="One row per callback instance, or take without one, and publication that it led to",
@@ -173,7 +179,8 @@ Table(
     reference("response_id", "Effect: a response", to="response.response_id"),
     number(
         "candidate_count",
-        "1; 2 where the thread sends such messages by itself, too, or its process is ambiguous",
+        "1; 2 where the thread sends such messages by itself, too; at least 2 where its process is "
+        "ambiguous",
         required=True,
     ),
     comment=(

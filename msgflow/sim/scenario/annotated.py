@@ -71,6 +71,35 @@ def partial_sync() -> Scenario:
     )  # fmt: skip
 
 
+def approximate_sync() -> Scenario:
+    """Filters of messages (ApproximateTime) of inputs with like and unlike periods."""
+    nodes = (
+        _filter("filter_two", ("/a", "/b"), outputs=1),
+        _filter("filter_three", ("/a", "/b", "/c"), outputs=2),
+        _filter("filter_alike", ("/a", "/d"), outputs=1),
+        _filter("filter_rare", ("/b", "/c", "/e"), outputs=1),
+    )
+    periods_ms = {"/a": 20, "/b": 14, "/c": 33, "/d": 20, "/e": 90}
+    return Scenario(
+        name="approximate_sync",
+        description="Filters that publish the messages of up to three inputs that are closest.",
+        hosts=(Host("alpha", cpu_count=8),),
+        processes=(
+            *_sources(tuple(periods_ms.values()), tuple(periods_ms)),
+            *(
+                Process(
+                    node.name, "alpha", 1801 + 100 * number, (node,),
+                    start_ns=(3 + 5 * number) * MILLISECOND,
+                )
+                for number, node in enumerate(nodes)
+            ),
+            _sink(nodes, pid=2501),
+        ),
+        duration_ns=4 * SECOND,
+        layout="rolling",
+    )  # fmt: skip
+
+
 def reentrant() -> Scenario:
     """Callbacks in reentrant groups of four threads, which keep and use messages early or late."""
     nodes = (
@@ -116,7 +145,7 @@ def _spinning() -> Node:
     )
 
 
-def _sources(periods_ms: tuple[int, ...]) -> tuple[Process, ...]:
+def _sources(periods_ms: tuple[int, ...], topics: tuple[str, ...] = _INPUTS) -> tuple[Process, ...]:
     return tuple(
         Process(
             f"source_{number}", "alpha", 1101 + 100 * number,
@@ -129,7 +158,7 @@ def _sources(periods_ms: tuple[int, ...]) -> tuple[Process, ...]:
             ),
             start_ns=number * 4 * MILLISECOND,
         )
-        for number, (topic, period_ms) in enumerate(zip(_INPUTS, periods_ms, strict=True))
+        for number, (topic, period_ms) in enumerate(zip(topics, periods_ms, strict=True))
     )  # fmt: skip
 
 
@@ -197,6 +226,16 @@ def _partial(inputs: int, outputs: int) -> Node:
     )
 
 
+def _filter(name: str, inputs: tuple[str, ...], outputs: int) -> Node:
+    topics = _outputs(name, outputs)
+    return Node(
+        name,
+        publishers=tuple(Publisher(topic) for topic in topics),
+        subscriptions=tuple(Subscription(topic, topics, Work(MILLISECOND)) for topic in inputs),
+        links=(MessageLink("approximate_sync", inputs, topics),),
+    )
+
+
 def _both_kinds() -> Node:
     together, periodic = topics = _outputs("both_kinds", 2)
     return Node(
@@ -213,10 +252,10 @@ def _both_kinds() -> Node:
     )
 
 
-def _sink(nodes: tuple[Node, ...]) -> Process:
+def _sink(nodes: tuple[Node, ...], pid: int = 2201) -> Process:
     topics = [publisher.topic for node in nodes for publisher in node.publishers]
     sink = Node("sink", subscriptions=tuple(Subscription(topic) for topic in topics))
-    return Process("sink", "alpha", 2201, (sink,), start_ns=30 * MILLISECOND)
+    return Process("sink", "alpha", pid, (sink,), start_ns=30 * MILLISECOND)
 
 
 def _sync(name: str, inputs: tuple[str, ...], *, is_late: bool) -> Node:

@@ -14,7 +14,7 @@ const SLOW = 10;
 const LEAST_SCALE = 0.8;
 // Hosts have a colour each, as far as there are some in the style sheet.
 const HOSTS = 5;
-const INDIRECT = { periodic_async: "8 4", partial_sync: "2 4" };
+const INDIRECT = { periodic_async: "8 4", partial_sync: "2 4", approximate_sync: "2 4" };
 
 export class GraphPage {
   constructor(app, root) {

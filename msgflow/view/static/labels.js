@@ -12,11 +12,12 @@ export const LINKS = {
   direct: "published by",
   periodic_async: "periodic (cached until the timer)",
   partial_sync: "synchronised (cached until the set was complete)",
+  approximate_sync: "synchronised (cached until the closest set was known)",
   take_adjacent: "published after the take",
   polled: "taken in the callback, then published",
   service: "service",
 };
-export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent", "polled"];
+export const LINK_CODES = ["transport", "direct", "periodic_async", "partial_sync", "take_adjacent", "polled", "approximate_sync"];
 
 const TITLES = {
   run_id: "run", roots: "flows", loss_affected: "touched by losses",

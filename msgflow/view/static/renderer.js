@@ -536,11 +536,12 @@ const ORDER = [7, 6, 0, 1, 2, 3, 4, 5, 8];
 const LINK_STYLE = [
   { color: "transport" }, { color: "direct" }, { color: "indirect", dash: [6, 3] },
   { color: "indirect", dash: [2, 3] }, { color: "direct", dash: [4, 2] },
-  { color: "direct", dash: [4, 2] },
+  { color: "direct", dash: [4, 2] }, { color: "indirect", dash: [2, 3] },
 ];
 const EDGE_STYLE = {
   transport: { color: "transport" }, callback: { color: "transport" }, direct: { color: "direct" },
   periodic_async: { color: "indirect", dash: [6, 3] }, partial_sync: { color: "indirect", dash: [2, 3] },
+  approximate_sync: { color: "indirect", dash: [2, 3] },
   take_adjacent: { color: "direct", dash: [4, 2] }, polled: { color: "direct", dash: [4, 2] },
   service: { color: "direct", dash: [4, 2] },
 };

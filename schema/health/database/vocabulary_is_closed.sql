@@ -25,7 +25,9 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'annotation.kind', kind
     FROM store.annotation
-    WHERE kind NOT IN ('periodic_async', 'partial_sync', 'direct', 'independent')
+    WHERE kind NOT IN (
+        'periodic_async', 'partial_sync', 'approximate_sync', 'direct', 'independent'
+    )
     UNION ALL
     SELECT DISTINCT run_id, 'annotation.source', source
     FROM store.annotation
@@ -49,7 +51,9 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'link_causal.kind', kind
     FROM store.link_causal
-    WHERE kind NOT IN ('direct', 'periodic_async', 'partial_sync', 'take_adjacent', 'polled')
+    WHERE kind NOT IN (
+        'direct', 'periodic_async', 'partial_sync', 'approximate_sync', 'take_adjacent', 'polled'
+    )
     UNION ALL
     SELECT DISTINCT run_id, 'undelivered.reason', reason
     FROM store.undelivered

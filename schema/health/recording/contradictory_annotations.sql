@@ -1,8 +1,8 @@
 -- name: finding.contradictory_annotations
 -- title: Annotations that contradict each other
--- description: Inputs and outputs that one annotation declares periodic_async, and another
---     partial_sync: the caches would be emptied by one, and kept by the other, and both count. Or
---     one declares them direct, and another independent, which counts.
+-- description: Inputs and outputs that two annotations declare as links of different kinds:
+--     periodic_async, partial_sync or approximate_sync. They use the messages in different ways,
+--     and both count. Or one declares them direct, and another independent, which counts.
 -- cause: A file of links declares one, the trace or another entry of the file the other.
 -- cure: Take the wrong one out of the file (msgflow links apply FILE), or out of the node.
 -- grain: one row per run
@@ -24,7 +24,7 @@ FROM (
     FROM declared_pair AS p
     JOIN declared_pair AS s
         ON p.subscription_id = s.subscription_id AND p.publisher_id = s.publisher_id
-    WHERE (p.kind = 'periodic_async' AND s.kind = 'partial_sync')
+    WHERE (derive.is_indirect(p.kind) AND derive.is_indirect(s.kind) AND p.kind > s.kind)
         OR (p.kind = 'direct' AND s.kind = 'independent')
 ) AS c
 LEFT JOIN store.subscription AS s ON c.subscription_id = s.subscription_id

@@ -5,15 +5,16 @@
 --     answer comes once per message, and soon. So whether a publisher answers the messages of a
 --     subscription is doubtful if a timer explains the publisher (derive.timed_publisher), if its
 --     own intervals are steadier than its delay after the takes, or if the number of publications
---     per message differs. Messages that are too few to tell are doubtful if the publisher or the
---     subscription is older than the recording: then timers may be, too. If the publisher answers,
+--     per message differs. Only messages count that the publisher published something after. If
+--     these are fewer than five, they do not tell: then the publisher is doubtful if it or the
+--     subscription is older than the recording, since timers may be, too. If the publisher answers,
 --     what it publishes beyond the usual number per message is doubtful.
 -- grain: one row per publication that is not surely an answer
 -- param: only_run BIGINT  Run to look at
 -- param: links VARCHAR  Name of the rows of derive.link_causal_take_adjacent
 
--- Waits and long callbacks disturb some publications: only the middle four fifths count. With less
--- than five messages, these would be all.
+-- Waits and long callbacks disturb some publications, so only the middle four fifths count. Of
+-- fewer than five messages the middle four fifths are all of them, and prove nothing.
 CREATE OR REPLACE MACRO derive.answer_doubtful(only_run, links) AS TABLE
 WITH own AS MATERIALIZED (
     SELECT

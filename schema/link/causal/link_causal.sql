@@ -15,7 +15,7 @@ WITH declared AS MATERIALIZED (
     FROM store.annotation AS a
     JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
     JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
-    WHERE a.run_id = only_run AND a.kind IN ('direct', 'independent')
+    WHERE a.run_id = only_run AND a.kind IN ('direct', 'independent', 'approximate_sync')
 ),
 adjacent AS MATERIALIZED (
     FROM derive.link_causal_take_adjacent(only_run)
@@ -78,7 +78,14 @@ SELECT
 FROM link AS l
 LEFT JOIN store.take AS t ON l.take_id = t.take_id AND t.run_id = only_run
 LEFT JOIN mixed AS m ON l.publication_id = m.publication_id
-ANTI JOIN (SELECT subscription_id, publisher_id FROM declared WHERE kind = 'independent') AS d
-    ON l.kind IN ('direct', 'take_adjacent')
+ANTI JOIN (
+    SELECT
+        subscription_id, publisher_id,
+        unnest(CASE kind WHEN 'independent' THEN ['direct', 'take_adjacent'] ELSE ['direct'] END)
+            AS kind
+    FROM declared
+    WHERE kind <> 'direct'
+) AS d
+    ON l.kind = d.kind
     AND t.subscription_id = d.subscription_id
     AND l.publisher_id = d.publisher_id

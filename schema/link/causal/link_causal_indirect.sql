@@ -271,6 +271,18 @@ cached AS (
     LEFT JOIN around AS a
         ON d.publishing_id = a.callback_instance_id AND p.callback_instance_id = a.outer_id
 ),
+linked AS (
+    SELECT
+        run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
+        trace_id, thread_id, start_ns, start_event_id, NULL::BIGINT AS since_ns
+    FROM cached
+    UNION ALL
+    SELECT
+        run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
+        trace_id, thread_id, start_ns, start_event_id, since_ns
+    FROM derive.link_causal_approximate(only_run)
+),
+-- A message that is missing may have been the right one, since the first that was looked at.
 found AS MATERIALIZED (
     SELECT
         c.run_id, c.annotation_id, c.kind, c.publication_id, c.callback_instance_id,
@@ -278,8 +290,9 @@ found AS MATERIALIZED (
         i.trace_id AS input_trace_id,
         i.thread_id AS input_thread_id,
         i.start_ns AS input_start_ns,
+        least(c.since_ns, i.start_ns) AS since_ns,
         i.start_event_id AS input_start_event_id
-    FROM cached AS c
+    FROM linked AS c
     JOIN store.callback_instance AS i
         ON c.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
 ),
@@ -300,7 +313,7 @@ exposed AS MATERIALIZED (
     ) AS f
     ASOF JOIN derive.recording_gap AS g
         ON f.recording_id = g.recording_id AND f.start_ns > g.start_ns
-    WHERE g.covered_until_ns >= f.input_start_ns
+    WHERE g.covered_until_ns >= f.since_ns
 ),
 -- What may have been lost on other CPUs is marked.
 break AS (
@@ -328,7 +341,11 @@ SELECT
     f.publication_id,
     f.kind,
     f.annotation_id,
-    f.candidate_count::BIGINT AS candidate_count,
+    -- What may be missing may have been in the set.
+    greatest(
+        f.candidate_count,
+        CASE WHEN f.kind = 'approximate_sync' AND x.publication_id IS NOT NULL THEN 2 END
+    )::BIGINT AS candidate_count,
     x.publication_id IS NOT NULL AS is_loss_affected
 FROM found AS f
 LEFT JOIN (SELECT DISTINCT annotation_id, publication_id, callback_instance_id FROM exposed) AS x

@@ -31,6 +31,7 @@ WITH observed AS (
     WHERE run_id = only_run
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 ),
+-- Before a stretch that is not known, the clock may have been set already.
 course AS (
     SELECT
         clock_id, at_ns, start_ns, drift_ppb, state, row_number() OVER on_clock = 1 AS is_first,
@@ -44,9 +45,11 @@ course AS (
                 difference_ns := CASE WHEN is_between THEN between_ns ELSE difference_ns END,
                 segment := segment,
                 is_sharp := coalesce(is_sharp, true),
-                is_known := message_count > 0 OR is_between
+                is_known := (message_count > 0 OR is_between)
+                    AND coalesce(lead(message_count > 0 OR is_between) OVER on_clock, true)
             ) AS state
         FROM observed
+        WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
     )
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 ),
@@ -75,14 +78,16 @@ located AS (
     ) AS c ON b.clock_id = c.clock_id AND b.written_ns >= c.start_ns
 ),
 -- Around a jump of the clock, a publication may be before or after it. A message that fits
--- publications on both sides is ambiguous.
+-- publications on both sides is ambiguous. Where the clock was set back, stamps from before and
+-- after the jump mix: one side is not to hide the other.
 sided AS (
-    SELECT 'now' AS side, *, difference_ns AS then_ns FROM located WHERE state.is_known
+    SELECT state.segment % 3 AS side, *, difference_ns AS then_ns FROM located
+    WHERE state.is_known
     UNION ALL
-    SELECT 'before', *, before.difference_ns FROM located
+    SELECT before.segment % 3, *, before.difference_ns FROM located
     WHERE before.segment < state.segment AND before.is_known
     UNION ALL
-    SELECT 'after', *, after.difference_ns FROM located
+    SELECT after.segment % 3, *, after.difference_ns FROM located
     WHERE after.segment > state.segment AND after.is_known
 ),
 published AS MATERIALIZED (
@@ -121,25 +126,30 @@ publisher AS (
 ),
 message AS MATERIALIZED (
     SELECT
-        m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id,
+        m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
         min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END) AS taken_ns
     FROM derive.unstamped_message(only_run) AS m
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
-    GROUP BY m.run_id, m.topic_name, m.source_timestamp_ns, p.publisher_id
+    GROUP BY
+        m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id
 ),
 -- Threads that share a publisher write at the same time; one alone never does.
 looked_for AS (
-    SELECT m.topic_name, m.publisher_id, p.thread_id, m.source_timestamp_ns, m.taken_ns, p.side
+    SELECT
+        m.topic_name, m.publisher_id, p.thread_id, m.source_timestamp_ns, m.only_subscription_id,
+        m.taken_ns, p.side
     FROM message AS m
     JOIN (SELECT DISTINCT publisher_id, thread_id, side FROM published) AS p
         ON m.publisher_id = p.publisher_id
 ),
 within AS MATERIALIZED (
     SELECT
-        m.topic_name, m.publisher_id, m.source_timestamp_ns, p.publication_id, p.clock_id,
-        p.goes_on, p.is_crowded, m.source_timestamp_ns - p.opens_ns AS delay_ns,
+        m.topic_name, m.publisher_id, m.source_timestamp_ns, m.only_subscription_id,
+        p.publication_id, p.clock_id, p.goes_on, p.is_crowded,
+        m.source_timestamp_ns - p.opens_ns AS delay_ns,
         row_number() OVER (
-            PARTITION BY p.publication_id, p.side ORDER BY m.source_timestamp_ns
+            PARTITION BY p.publication_id, p.side, m.only_subscription_id
+            ORDER BY m.source_timestamp_ns
         ) AS place
     FROM looked_for AS m
     ASOF JOIN published AS p
@@ -169,8 +179,14 @@ strange AS MATERIALIZED (
 exposed AS (
     SELECT DISTINCT p.publisher_id
     FROM published AS p
-    JOIN strange AS s ON p.topic_name = s.topic_name
-    ANTI JOIN within AS w ON p.publication_id = w.publication_id
+    JOIN (
+        SELECT DISTINCT topic_name, only_subscription_id
+        FROM message
+        WHERE topic_name IN (FROM strange)
+    ) AS s ON p.topic_name = s.topic_name
+    ANTI JOIN within AS w
+        ON p.publication_id = w.publication_id
+        AND s.only_subscription_id = w.only_subscription_id
 ),
 -- How much of the time the publisher was writing: the more, the more messages fall into it by
 -- chance.
@@ -218,16 +234,18 @@ usual_of_clock AS (
 -- All that a message may be of. Several writes may go on at the moment of its stamp.
 candidate AS MATERIALIZED (
     SELECT
-        topic_name, source_timestamp_ns, publisher_id, publication_id,
+        topic_name, source_timestamp_ns, only_subscription_id, publisher_id, publication_id,
         bool_or(is_crowded) AS is_crowded,
         bool_or(is_usual) AS is_usual,
         bool_or(is_prompt) AS is_prompt,
         bool_or(is_hasty) AS is_hasty,
-        count(*) OVER (PARTITION BY topic_name, source_timestamp_ns) AS candidate_count
+        count(*) OVER (
+            PARTITION BY topic_name, source_timestamp_ns, only_subscription_id
+        ) AS candidate_count
     FROM (
         SELECT
-            w.topic_name, w.source_timestamp_ns, w.publisher_id, w.publication_id, w.is_crowded,
-            w.goes_on,
+            w.topic_name, w.source_timestamp_ns, w.only_subscription_id, w.publisher_id,
+            w.publication_id, w.is_crowded, w.goes_on,
             w.delay_ns <= u.usual_ns AS is_prompt,
             coalesce(derive.clock_limit().usual_factor * w.delay_ns < c.least_ns, false)
                 AS is_hasty,
@@ -246,27 +264,32 @@ candidate AS MATERIALIZED (
     )
     -- Whether a thread that is not seen to go on still writes is known by what is usual alone.
     WHERE is_usual OR goes_on
-    GROUP BY topic_name, source_timestamp_ns, publisher_id, publication_id
+    GROUP BY topic_name, source_timestamp_ns, only_subscription_id, publisher_id, publication_id
 ),
 -- A publication that is all a message may be of has that message: the first of several, unless
 -- others came as soon. So no other message is of it.
 owned AS MATERIALIZED (
     SELECT
-        topic_name, source_timestamp_ns, publication_id, is_usual,
+        topic_name, source_timestamp_ns, only_subscription_id, publication_id, is_usual,
         coalesce(lead(is_prompt) OVER on_publication, false) AS is_rivalled,
         row_number() OVER on_publication AS place
     FROM candidate
     WHERE candidate_count = 1
-    WINDOW on_publication AS (PARTITION BY publication_id ORDER BY source_timestamp_ns)
+    WINDOW on_publication AS (
+        PARTITION BY publication_id, only_subscription_id ORDER BY source_timestamp_ns
+    )
 ),
 left_over AS (
     SELECT
-        c.topic_name, c.source_timestamp_ns, c.publisher_id, c.publication_id, c.is_crowded,
-        c.is_usual, c.is_hasty, c.is_prompt,
-        count(*) OVER (PARTITION BY c.topic_name, c.source_timestamp_ns) AS candidate_count
+        c.topic_name, c.source_timestamp_ns, c.only_subscription_id, c.publisher_id,
+        c.publication_id, c.is_crowded, c.is_usual, c.is_hasty, c.is_prompt,
+        count(*) OVER (
+            PARTITION BY c.topic_name, c.source_timestamp_ns, c.only_subscription_id
+        ) AS candidate_count
     FROM candidate AS c
     LEFT JOIN owned AS o
         ON c.publication_id = o.publication_id
+        AND c.only_subscription_id = o.only_subscription_id
         AND c.source_timestamp_ns <> o.source_timestamp_ns
         AND o.place = 1
     WHERE o.publication_id IS NULL
@@ -281,10 +304,10 @@ doubtful AS (
 ),
 matched AS (
     SELECT
-        topic_name, publisher_id, source_timestamp_ns, publication_id,
+        topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
         is_crowded
         OR NOT is_usual
-        OR count(*) OVER (PARTITION BY publication_id, candidate_count) > 1
+        OR count(*) OVER (PARTITION BY publication_id, only_subscription_id, candidate_count) > 1
         OR (is_hasty AND publication_id IN (FROM doubtful)) AS is_rivalled
     FROM left_over
 ),
@@ -335,12 +358,12 @@ SELECT
     p.topic_name,
     p.source_timestamp_ns,
     CASE
-        WHEN count(x.publication_id) = 1
+        WHEN count(DISTINCT x.publication_id) = 1
             AND NOT bool_or(coalesce(x.is_rivalled, false))
             AND bool_and(x.publication_id IS NULL OR t.is_trusted)
             THEN any_value(x.publication_id)
     END AS publication_id,
-    count(x.publication_id) AS candidate_count
+    count(DISTINCT x.publication_id) AS candidate_count
 FROM placed AS p
 JOIN trusted AS t ON p.clock_id = t.clock_id AND p.segment = t.segment
 LEFT JOIN matched AS x

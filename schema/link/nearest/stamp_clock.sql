@@ -9,7 +9,7 @@
 -- grain: one row per clock and stretch of time with messages; message_count is 0 where the
 --     difference is not known
 -- param: only_run BIGINT  Run to look at
--- when: derive.unstamped_process
+-- when: derive.unstamped_call
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (
     FROM derive.stamp_pair(only_run)
@@ -112,9 +112,7 @@ placed AS (
         CASE
             WHEN standing_ns IS NOT NULL OR before_span = after_span OR is_alone THEN later_ns
         END AS standing_ns,
-        CASE
-            WHEN standing_ns IS NOT NULL OR before_span = after_span OR is_alone THEN after_span
-        END AS span
+        CASE WHEN standing_ns IS NOT NULL OR is_alone THEN after_span END AS span
     FROM (
         SELECT
             f.clock_id, f.stretch, f.difference_ns, f.message_count, f.segment,

@@ -29,7 +29,7 @@ message AS MATERIALIZED (
 ),
 extent AS (
     SELECT
-        run_id, clock_id, start_ns,
+        run_id, clock_id, start_ns, end_ns,
         1 + (end_ns - start_ns) // least(
             greatest(
                 (end_ns - start_ns) // derive.clock_limit().stretch_ns,
@@ -54,16 +54,37 @@ publisher AS (
     FROM published
     GROUP BY run_id, clock_id, topic_name, publisher_id
 ),
-placed AS (
+heard AS (
     SELECT
         m.run_id, p.clock_id, p.publisher_id, p.publisher_count, m.source_timestamp_ns,
-        bool_or(m.clock_id = p.clock_id) AS is_taken_here,
-        coalesce(
-            min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END), m.source_timestamp_ns
-        ) AS near_ns
+        m.clock_id AS taken_clock_id, m.taken_ns,
+        m.source_timestamp_ns BETWEEN x.start_ns AND x.end_ns AS is_in_time
     FROM message AS m
     JOIN publisher AS p ON m.run_id = p.run_id AND m.topic_name = p.topic_name
-    GROUP BY m.run_id, p.clock_id, p.publisher_id, p.publisher_count, m.source_timestamp_ns
+    JOIN extent AS x ON p.clock_id = x.clock_id
+),
+-- How far another clock is from this one, but for the drift: the least time from stamp to take
+-- while the clock of stamps was right.
+apart AS (
+    SELECT clock_id, taken_clock_id, min(taken_ns - source_timestamp_ns) AS apart_ns
+    FROM heard
+    WHERE is_in_time
+    GROUP BY clock_id, taken_clock_id
+),
+-- A stamp at which nothing was recorded says little of when the message was published: the clock of
+-- stamps was set. When it was taken does, on whatever clock.
+placed AS (
+    SELECT
+        h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns,
+        bool_or(h.taken_clock_id = h.clock_id) AS is_taken_here,
+        coalesce(
+            min(CASE WHEN h.taken_clock_id = h.clock_id THEN h.taken_ns END),
+            min(CASE WHEN NOT h.is_in_time THEN h.taken_ns - a.apart_ns END),
+            h.source_timestamp_ns
+        ) AS near_ns
+    FROM heard AS h
+    LEFT JOIN apart AS a ON h.clock_id = a.clock_id AND h.taken_clock_id = a.taken_clock_id
+    GROUP BY h.run_id, h.clock_id, h.publisher_id, h.publisher_count, h.source_timestamp_ns
 ),
 turn AS (
     SELECT

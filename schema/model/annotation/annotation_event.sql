@@ -6,3 +6,6 @@ FROM staging.located('ros2_message_link_periodic_async')
 UNION ALL
 SELECT event_id, process_id, 'partial_sync', subs, pubs
 FROM staging.located('ros2_message_link_partial_sync')
+UNION ALL
+SELECT event_id, process_id, 'approximate_sync', subs, pubs
+FROM staging.located('ros2_message_link_approximate_sync')

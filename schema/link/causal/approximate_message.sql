@@ -1,0 +1,65 @@
+-- name: derive.approximate_message
+-- kind: macro
+-- description: Messages of the inputs of approximately synchronous annotations. The filter compares
+--     the stamps in their headers, which are not in the trace: `stamp_ns`, when they were
+--     published, stands for them. A header may be older, by up to `age_ns`: its node may have
+--     stamped it when the publishing callback began, or copied the stamp of the message that the
+--     callback got, and so on. Chains end where a publisher comes again.
+-- grain: one row per annotation and callback instance of one of its inputs
+-- param: only_run BIGINT  Run to look at
+CREATE OR REPLACE MACRO derive.approximate_message(only_run) AS TABLE
+WITH RECURSIVE input AS MATERIALIZED (
+    SELECT
+        a.annotation_id, r.subscription_id, r.callback_instance_id, r.start_ns, r.start_event_id,
+        c.take_id
+    FROM store.annotation AS a
+    JOIN store.annotation_input AS i ON a.annotation_id = i.annotation_id
+    JOIN derive.annotated_run(only_run) AS r ON i.subscription_id = r.subscription_id
+    JOIN store.callback_instance AS c ON r.callback_instance_id = c.callback_instance_id
+    WHERE a.run_id = only_run AND a.kind = 'approximate_sync' AND c.run_id = only_run
+),
+sent AS MATERIALIZED (
+    SELECT
+        t.take_id, b.publisher_id, i.take_id AS cause_id,
+        coalesce(nullif(t.source_timestamp_ns, 0), b.start_ns) AS stamp_ns,
+        b.start_ns - coalesce(i.start_ns, b.start_ns) AS working_ns
+    FROM store.take AS t
+    JOIN store.link_transport AS l ON t.take_id = l.take_id
+    JOIN store.publication AS b ON l.publication_id = b.publication_id
+    LEFT JOIN derive.link_causal_direct(only_run) AS d ON b.publication_id = d.publication_id
+    LEFT JOIN store.callback_instance AS i
+        ON d.callback_instance_id = i.callback_instance_id AND i.run_id = only_run
+    WHERE t.run_id = only_run AND l.run_id = only_run AND b.run_id = only_run
+        AND EXISTS (SELECT annotation_id FROM input)
+),
+origin (take_id, cause_id, publisher_ids, made_ns) AS (
+    SELECT s.take_id, s.cause_id, [s.publisher_id], s.stamp_ns - s.working_ns
+    FROM sent AS s
+    SEMI JOIN input AS i ON s.take_id = i.take_id
+    UNION ALL
+    SELECT
+        o.take_id, s.cause_id, list_append(o.publisher_ids, s.publisher_id),
+        s.stamp_ns - s.working_ns
+    FROM origin AS o
+    JOIN sent AS s ON o.cause_id = s.take_id
+    WHERE NOT list_contains(o.publisher_ids, s.publisher_id)
+),
+made AS (
+    SELECT take_id, min(made_ns) AS made_ns
+    FROM origin
+    GROUP BY take_id
+)
+SELECT
+    i.annotation_id, i.subscription_id, i.callback_instance_id, i.start_ns, i.start_event_id,
+    coalesce(s.stamp_ns, t.source_timestamp_ns) AS stamp_ns,
+    s.stamp_ns - m.made_ns AS age_ns
+FROM input AS i
+JOIN store.take AS t ON i.take_id = t.take_id AND t.run_id = only_run
+LEFT JOIN sent AS s ON i.take_id = s.take_id
+LEFT JOIN made AS m ON i.take_id = m.take_id
+WHERE coalesce(s.stamp_ns, nullif(t.source_timestamp_ns, 0)) IS NOT NULL
+-- Of equal stamps of an input the last counts.
+QUALIFY lead(i.start_event_id) OVER (
+    PARTITION BY i.annotation_id, i.subscription_id, coalesce(s.stamp_ns, t.source_timestamp_ns)
+    ORDER BY i.start_event_id
+) IS NULL

@@ -1,0 +1,120 @@
+"""Sets of messages that message_filters (ApproximateTime) makes, against the algorithm itself.
+
+A process publishes on several topics, at random; the callbacks of another node get all messages,
+one after the other, and publish whenever the filter has made a set.
+"""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from analysis import Analysis
+from ros_system import RosSystem
+from staged_events import Thread
+from thorough import few
+
+from msgflow.sim.approximate_time import ApproximateTime
+
+SOURCE, NODE = Thread(100), Thread(200)
+OUTPUT = 0x31
+PERIODS = (10, 14, 20, 20, 33, 50, 90)
+Messages = list[tuple[int, int]]
+# Of each publication (by its time) the inputs, the times of the callbacks, and the candidates.
+LINKS = (
+    "SELECT b.start_ns, i.start_ns, l.candidate_count FROM link_causal AS l "
+    "JOIN callback_instance AS i USING (callback_instance_id) "
+    "JOIN publication AS b ON l.publication_id = b.publication_id "
+    "WHERE l.kind = 'approximate_sync'"
+)
+
+
+def messages(random: Random, inputs: int) -> Messages:
+    """Input and stamp (ns) of each message, in the order of arrival."""
+    arrivals = []
+    for number in range(inputs):
+        period = random.choice(PERIODS) * 1_000_000
+        jitter = random.choice((10_000, 1_000_000, period // 5))
+        delay = random.choice((100_000, 1_000_000, 5_000_000))
+        stamp = random.randrange(period)
+        while stamp < 600_000_000:
+            own = stamp + random.randrange(jitter)
+            arrivals.append((own + delay + random.randrange(delay // 5), number, own))
+            stamp += period
+    return [(number, stamp) for _, number, stamp in sorted(arrivals)]
+
+
+def record(
+    arrived: Messages, *, silent: float = 0, random: Random | None = None
+) -> tuple[RosSystem, dict[int, list[int]]]:
+    """The events of such a system, and of each publication the callbacks of its set."""
+    inputs = 1 + max(number for number, _ in arrived)
+    system = RosSystem()
+    system.context(SOURCE)
+    system.node(SOURCE, 0x1, "source")
+    system.context(NODE)
+    system.node(NODE, 0x1, "filter")
+    for number in range(inputs):
+        system.publisher(SOURCE, 0x21 + number, f"/in{number}")
+        system.subscription(NODE, 0x11 + number, f"/in{number}", callback=0xC1 + number)
+    system.publisher(NODE, OUTPUT, "/out")
+    system.annotate(NODE, "approximate_sync", [0x11 + n for n in range(inputs)], [OUTPUT])
+    filters: ApproximateTime[int] = ApproximateTime(inputs)
+    sets: dict[int, list[int]] = {}
+    outputs = iter(range(10**12, 2 * 10**12))
+    for number, stamp in arrived:
+        system.publish(SOURCE, 0x21 + number, stamp)
+        system.take(NODE, 0x11 + number, stamp)
+        start = system.start(NODE, 0xC1 + number)
+        for used in filters.add(number, stamp, start):
+            if random is None or random.random() >= silent:
+                sets[system.publish(NODE, OUTPUT, next(outputs))] = sorted(used)
+        system.end(NODE, 0xC1 + number)
+    return system, sets
+
+
+def found(analysis: Analysis, system: RosSystem) -> dict[int, tuple[list[int], int]]:
+    """Of each publication the callbacks that it is linked to, and the candidates."""
+    links: dict[int, list[int]] = {}
+    counts = {}
+    for publication, start, count in analysis.build(system).rows(LINKS):
+        links.setdefault(publication, []).append(start)
+        counts[publication] = count
+    return {each: (sorted(starts), counts[each]) for each, starts in links.items()}
+
+
+@pytest.mark.parametrize("inputs", [2, 3, 4])
+@pytest.mark.parametrize("seed", few(range(12), 0, 1, 2))
+def test_sets_are_those_of_the_filter(analysis: Analysis, inputs: int, seed: int) -> None:
+    system, sets = record(messages(Random(100 * inputs + seed), inputs))
+    links = found(analysis, system)
+    assert links.keys() == sets.keys()
+    assert {
+        each for each, (used, count) in links.items() if count == 1 and used != sets[each]
+    } == set()
+
+
+def test_sets_are_seldom_in_doubt(analysis: Analysis) -> None:
+    arrived = [
+        (stamp + 200_000, number, stamp)
+        for number, period in enumerate((20_030_000, 14_010_000, 33_070_000))
+        for stamp in range(1 + 3_700_000 * number, 1_000_000_000, period)
+    ]
+    system, sets = record([(number, stamp) for _, number, stamp in sorted(arrived)])
+    assert len(sets) > 25
+    assert found(analysis, system) == {each: (used, 1) for each, used in sets.items()}
+    # What came last is no cause by itself.
+    assert analysis.value("SELECT count(*) FROM link_causal WHERE kind = 'direct'") == 0
+
+
+@pytest.mark.parametrize("inputs", [2, 3])
+@pytest.mark.parametrize("seed", few(range(12), 0))
+def test_a_filter_whose_sets_are_not_all_published(
+    analysis: Analysis, inputs: int, seed: int
+) -> None:
+    random = Random(100 * inputs + seed)
+    system, sets = record(messages(random, inputs), silent=0.4, random=random)
+    links = found(analysis, system)
+    assert links.keys() <= sets.keys()
+    wrong = {each for each, (used, count) in links.items() if count == 1 and used != sets[each]}
+    assert wrong == set()
