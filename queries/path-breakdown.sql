@@ -3,12 +3,14 @@
 -- description: End-to-end latency of every path, hop by hop. The parts of a flow follow each other
 --     from its start to its end and add up to its latency exactly. The parts of a hop are: the
 --     callback up to its publication; the wait in a cache for other messages or a timer; calls of
---     services; publishing by layer; the time up to the take; and the time from the take to the
---     callback. A trace does not say when a message arrived, so the time up to the take is three
---     parts, with the bounds of executor-wait: network_or_idle, executor_busy (with other
---     callbacks), and undecided (one or the other). Executors were busy at least for executor_busy,
---     at most for executor_busy and undecided together. A part is negative if the next one began
---     before it ended (overlaps), for example between hosts whose clocks are apart.
+--     services; publishing by layer, up to the last one; the time from there to the take; and the
+--     time from the take to the callback. Publishing goes on behind the event of its last layer: it
+--     is not known how long, and is part of the time up to the take. A trace does not say when a
+--     message arrived either, so that time is three parts, with the bounds of executor-wait:
+--     network_or_idle, executor_busy (with other callbacks), and undecided (one or the other).
+--     Executors were busy at least for executor_busy, at most for executor_busy and undecided
+--     together. A part is negative if the next one began before it ended (overlaps), for example
+--     between hosts whose clocks are apart.
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- param: from VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
 --     commas (default: any)

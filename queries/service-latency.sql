@@ -19,7 +19,8 @@
 -- column: negative BIGINT             Requests or responses that were taken before they were sent
 -- column: request_median_ns BIGINT [ns]   Median time from the sending of the request to its take
 -- column: wait_median_ns BIGINT [ns]      Median time from its take to the service callback
--- column: callback_median_ns BIGINT [ns]  Median duration of the service callback
+-- column: callback_median_ns BIGINT [ns]  Median duration of the service callback; empty, as the
+--     wait for it, for actions: rclcpp_action has no events of callbacks
 -- column: reply_median_ns BIGINT [ns]     Median time from the end of the service callback to the
 --     sending of the response; negative if the callback sends it itself
 -- column: response_median_ns BIGINT [ns]  Median time from the sending of the response to its take

@@ -44,7 +44,7 @@
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
 --     meanwhile, lateness_median_ns, busy_share, rate_hz, bunched
 WITH asked AS (
-    SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns
+    SELECT c.run_id, c.callback_id, c.timer_id, c.symbol, t.period_ns, t.created_ns
     FROM main.callback AS c
     JOIN main.timer AS t ON c.timer_id = t.timer_id
     WHERE list_contains($runs, c.run_id)
@@ -106,6 +106,19 @@ kept AS (
     WHERE i.interval_ns IS NOT NULL AND NOT i.is_loss_affected
     GROUP BY i.callback_id
 ),
+-- How far behind the grid of its creation a timer is called. Its creation is recorded a little
+-- later than the instant from which periods count: a hundredth of the period is allowed for that.
+placed AS (
+    SELECT
+        i.callback_id,
+        quantile_disc(
+            (i.start_ns - a.created_ns + a.period_ns // 100) % a.period_ns, [0.25, 0.75]
+        ) AS place
+    FROM instance AS i
+    JOIN asked AS a ON i.callback_id = a.callback_id
+    WHERE a.period_ns > 0
+    GROUP BY i.callback_id
+),
 counted AS (
     SELECT
         callback_id,
@@ -121,7 +134,6 @@ delayed AS (
         l.callback_id,
         count(*) AS known,
         quantile_disc(l.lateness_ns, [0.5, 0.95, 0.99, 1]) AS lateness,
-        quantile_disc(l.lateness_ns, [0.25, 0.75]) AS usual_lateness,
         sum(l.lateness_ns // nullif(a.period_ns, 0))::BIGINT AS missed,
         sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share
     FROM late AS l
@@ -191,8 +203,8 @@ SELECT
         -- equally late by chance.
         WHEN
             d.known >= 10
-            AND d.usual_lateness[2] - d.usual_lateness[1] <= a.period_ns // 100
-            AND d.usual_lateness[1] > a.period_ns // 10
+            AND g.place[2] - g.place[1] <= a.period_ns // 100
+            AND g.place[1] > a.period_ns // 10
             AND d.busy_share < 0.5
             THEN 'reset'
     END AS off_grid,
@@ -210,5 +222,6 @@ LEFT JOIN counted AS c ON a.callback_id = c.callback_id
 LEFT JOIN usual AS u ON a.callback_id = u.callback_id
 LEFT JOIN kept AS k ON a.callback_id = k.callback_id
 LEFT JOIN delayed AS d ON a.callback_id = d.callback_id
+LEFT JOIN placed AS g ON a.callback_id = g.callback_id
 LEFT JOIN meanwhile AS m ON a.callback_id = m.callback_id
 ORDER BY a.run_id, n.node, n.label, a.callback_id

@@ -350,8 +350,12 @@ call AS (
         row_number() OVER () AS id,
         CASE WHEN is_response THEN 'response_taken' ELSE 'request_taken' END AS taken_kind,
         request_id::VARCHAR AS taken_id,
-        CASE WHEN publication_id IS NULL THEN 'request_sent' ELSE 'publication' END AS sent_kind,
-        coalesce(publication_id, sent_request_id)::VARCHAR AS sent_id
+        CASE
+            WHEN publication_id IS NOT NULL THEN 'publication'
+            WHEN sent_request_id IS NOT NULL THEN 'request_sent'
+            ELSE 'response_sent'
+        END AS sent_kind,
+        coalesce(publication_id, sent_request_id, answered_request_id)::VARCHAR AS sent_id
     FROM simulated_link_call
 ),
 doubtful_call AS (

@@ -65,9 +65,10 @@ request — one row per request:
 response — one row per request that was answered:
     request_id, service_name, client_gid, sequence_number, source_timestamp_ns,
     service_{host,pid,tid}, sent_ns, client_{host,pid,tid}, taken_ns
-link_call — one row per publication or request that followed from a request, or a response, without
-a callback that is traced:
-    request_id (which was taken, or answered), is_response, publication_id, sent_request_id
+link_call — one row per publication, request or response that followed from a request, or a
+response, without a callback that is traced:
+    request_id (which was taken, or answered), is_response, publication_id, sent_request_id,
+    answered_request_id (whose response was sent)
 user_event — one row per event of the user's own tracepoints (`Record`):
     user_event_id, host, pid, tid, name, at_ns, callback_instance_id (the innermost callback inside
     which it was recorded, else NULL), frame, score, label (its fields)

@@ -7,9 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from msgflow.sim.callback_instance import CallbackInstance
-from msgflow.sim.entity import Call, Poll, Publish, Record, SendGoal, Spin, Transition
+from msgflow.sim.entity import Answer, Call, Poll, Publish, Record, SendGoal, Spin, Transition
 from msgflow.sim.publication import publish
-from msgflow.sim.services import ClientObject, call
+from msgflow.sim.services import ClientObject, ServiceObject, answer, call
 from msgflow.sim.take import take
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class NodeObjects:
     executors: Sequence[Executor]
     publishers: dict[str, PublisherObject]
     clients: dict[str, ClientObject] = field(default_factory=dict)
+    services: dict[str, ServiceObject] = field(default_factory=dict)
     action_clients: dict[str, ActionClientObject] = field(default_factory=dict)
     polled: dict[str, SubscriptionObject] = field(default_factory=dict)
     lifecycle: Lifecycle | None = None
@@ -139,6 +140,18 @@ def _publish(
     yield  # It takes no step, but is called as one that does.
 
 
+def _answer(
+    action: Answer,
+    objects: NodeObjects,
+    thread: ExecutorThread,
+    _: Middleware,
+    time: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    return answer(thread, objects.services[action.service], time, instance)
+    yield  # It takes no step, but is called as one that does.
+
+
 def _transition(
     _: Transition,
     objects: NodeObjects,
@@ -191,6 +204,7 @@ _DEEDS: Mapping[type, Callable[..., Steps]] = {
     Spin: _spin,
     Poll: _poll,
     Publish: _publish,
+    Answer: _answer,
     Transition: _transition,
     Record: _record,
 }

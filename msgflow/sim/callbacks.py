@@ -21,6 +21,8 @@ def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: 
     timer.due += timer.period
     if timer.due < time:
         timer.due += (1 + (time - timer.due - 1) // timer.period) * timer.period
+    if timer.reset is not None and timer.due >= timer.reset:
+        timer.due, timer.reset = timer.reset + timer.period, None
     start = time + 500 + int(thread.scheduler.random() * 2_500)
     if not timer.code.is_callback:
         return execute(thread, middleware, timer.code, start, None)

@@ -257,10 +257,13 @@ class Creator:
         code = self._code(node, description, executor)
         if description.is_action:
             code = replace(code, is_callback=False)
-        return ServiceObject(
+        service = ServiceObject(
             self._network, self._process, executor, group, node.description.full_name, name,
             handle, rmw_handle, callback, memory.on_stack(), code, description.is_deferred,
+            description.is_answered_later,
         )  # fmt: skip
+        node.objects.services[name] = service
+        return service
 
     def _add_service_callback(self, handle: int, callback: int, symbol: str) -> None:
         self._emit_of_rclcpp("rclcpp_service_callback_added", handle, callback)
@@ -336,6 +339,7 @@ class Creator:
             handle, rmw_handle, gid[:16], memory.on_stack(), code,
         )  # fmt: skip
         node.objects.clients[name] = client
+        self._network.add_client(client)
         executor.waitables.append(client)
         return client
 
@@ -345,6 +349,7 @@ class Creator:
         handle, callback = self._memory.allocate(), self._memory.allocate()
         period = description.period_ns
         self.emit("rcl_timer_init", handle, period)
+        period = int(period / description.rate)
         due = self.time + period
         symbol = symbols.timer_callback(node.description.name)
         self._emit_of_rclcpp("rclcpp_timer_callback_added", handle, callback)
@@ -353,7 +358,9 @@ class Creator:
         group, executor = node.groups[description.group]
         code = self._code(node, description, executor)
         name = node.description.full_name
-        executor.timers.append(TimerObject(name, handle, callback, period, code, group, due))
+        executor.timers.append(
+            TimerObject(name, handle, callback, period, code, group, due, description.reset_ns)
+        )
 
     def links(self, node: NodeContext, created: Mapping[str, NodeContext]) -> None:
         """What user code says about its messages, once its objects are there."""
@@ -389,6 +396,9 @@ class Creator:
             or any(publisher.intra is not None for publisher in publishers),
             executor.has_callbacks,
             _links(node, description),
+            deeds(description.first, node.objects)
+            if isinstance(description, entity.Subscription)
+            else (),
         )
 
     def _buffer(self, subscription: SubscriptionObject, symbol: str) -> IntraBuffer:

@@ -81,6 +81,13 @@ class Publish:
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """Send the response to the oldest request of a service of the node that waits for one."""
+
+    service: str
+
+
+@dataclass(frozen=True, slots=True)
 class Transition:
     """Take a managed node to its next state: configured, active, inactive, active, and so on."""
 
@@ -90,7 +97,7 @@ class Record:
     """Record an event of a tracepoint of the user's own, `my_pkg:frame_done`."""
 
 
-Action = Call | SendGoal | Spin | Poll | Publish | Transition | Record
+Action = Call | SendGoal | Spin | Poll | Publish | Answer | Transition | Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +139,7 @@ class Subscription:
         message_type: C++ name of the message, part of the callback's symbol.
         logs: each run of the callback logs once, which publishes on /rosout.
         does: what each run does after it has published.
+        first: what each run does before anything else.
         group: name of its callback group; the node's default one if empty.
         kind: 'typed', 'serialized' or 'loaned', which pass different layers.
         intra_process: see `Publisher`.
@@ -162,6 +170,7 @@ class Subscription:
     polled: bool = False
     created_ns: int | None = None
     destroyed_ns: int | None = None
+    first: tuple[Action, ...] = ()
     channel: str = ""
 
 
@@ -200,7 +209,12 @@ class MessageLink:
 
 @dataclass(frozen=True, slots=True)
 class Timer:
-    """A timer of a node and what its callback does; see `Subscription`."""
+    """A timer of a node and what its callback does; see `Subscription`.
+
+    Attributes:
+        reset_ns: when user code resets it, after the begin of tracing: periods count from then on.
+        rate: how fast its clock runs, as a multiple of that of the host (simulated time).
+    """
 
     period_ns: int
     publishes: tuple[str, ...] = ()
@@ -208,6 +222,8 @@ class Timer:
     logs: bool = False
     does: tuple[Action, ...] = ()
     group: str = ""
+    reset_ns: int | None = None
+    rate: float = 1.0
 
     def __post_init__(self) -> None:
         if self.period_ns <= 0:
@@ -221,6 +237,7 @@ class Service:
     Attributes:
         is_action: it is of an action server, whose callbacks are not traced.
         is_deferred: the callback does not return the response, which is sent on its own.
+        is_answered_later: not even the callback sends it, but `Answer` does.
     """
 
     name: str
@@ -231,6 +248,7 @@ class Service:
     group: str = ""
     is_action: bool = False
     is_deferred: bool = False
+    is_answered_later: bool = False
 
 
 @dataclass(frozen=True, slots=True)

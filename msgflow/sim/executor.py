@@ -71,6 +71,7 @@ class Executor:
         owner: the thread that looks for something ready, or waits; others are blocked meanwhile.
         sleeper: the thread that waits.
         thread_count: threads that spin it.
+        timeout_ns: a wait ends after that at the latest; None: it may be for ever.
     """
 
     def __init__(
@@ -84,6 +85,8 @@ class Executor:
         self.owner: Spinner | None = None
         self.sleeper: Spinner | None = None
         self.thread_count = description.thread_count
+        self.timeout_ns = description.timeout_ns
+        self._waits_busily = description.waits_busily
         self._scheduler = scheduler
         self._ready: deque[Entity] = deque()
         self._blocked: deque[Spinner] = deque()
@@ -137,15 +140,18 @@ class Executor:
         """When a wait that begins at `asleep` ends at the latest, None if it may be for ever."""
         due: int | None = None
         for timer in self.timers:
-            if (due is None or timer.due < due) and _is_free(timer.group):
+            if (due is None or timer.due < due) and self._ends_wait(timer.group):
                 due = timer.due
         for subscription in self.subscriptions:
-            if subscription.is_ready(asleep) and _is_free(subscription.group):
+            if subscription.is_ready(asleep) and self._ends_wait(subscription.group):
                 return asleep
         for entity in self.waitables:
-            if entity.is_ready(asleep) and _is_free(entity.group):
+            if entity.is_ready(asleep) and self._ends_wait(entity.group):
                 return asleep
         return due
+
+    def _ends_wait(self, group: CallbackGroup) -> bool:
+        return self._waits_busily or _is_free(group)
 
 
 def _is_free(group: CallbackGroup) -> bool:

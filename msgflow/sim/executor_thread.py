@@ -65,6 +65,11 @@ class ExecutorThread(Thread):
         if self._is_idle or self.process.is_stepwise:
             self.cut()
 
+    def shut_down(self, time: int) -> None:
+        """ROS is shut down: the thread does not wait any more, and goes on when it has executed."""
+        if self._is_idle:
+            self.go_on(max(time, self._asleep_since))
+
     def finish(self) -> None:
         """Write down what has begun and whose end was not seen."""
         self.cut()
@@ -117,26 +122,52 @@ class ExecutorThread(Thread):
                     time += 900 + int(self.scheduler.random() * 3_000)
                     continue
             executor.release(time)
-            end = self._execute(executor, entity, time)
-            if not isinstance(end, int):
-                end = yield from end
-            end += 400 + int(self.scheduler.random() * 2_000)
-            self.keep_cpu(end)
-            time = yield end
-            entity.group.is_busy = False
-            if executor.thread_count > 1 and not entity.group.is_reentrant:
-                executor.wake(time)
+            time = yield from self._execute(executor, entity, time)
+        return time
+
+    def poll(self, executor: Executor, time: int, pause: int) -> Steps:
+        """Execute what is ready, again and again, and do something else for `pause` in between.
+
+        Ends when the process does; returns the time of that.
+        """
+        time = yield time
+        while later := self.take_cpu(time):
+            time = yield later
+        while not self.process.is_stopped:
+            self._enter(executor, _WAIT, time, 0)
+            time += 1_500 + int(self.scheduler.random() * 3_000)
+            executor.collect(time)
+            self._enter(executor, _PROCESS, time)
+            while (entity := executor.pick()) is not None:
+                time = yield from self._execute(executor, entity, time)
+                self._enter(executor, _PROCESS, time)
+            self.keep_cpu(time + 1)
+            self._is_idle, self._asleep_since = True, time + 1
+            time = yield time + pause
+            self._is_idle = False
             while later := self.take_cpu(time):
                 time = yield later
         return time
 
-    def _execute(self, executor: Executor, entity: Entity, time: int) -> Run:
+    def _execute(self, executor: Executor, entity: Entity, time: int) -> Steps:
+        """Execute something; returns the time at which the thread goes on, with a CPU."""
         time += 800 + int(self.scheduler.random() * 3_500)
         entity.group.is_busy = True
         kind = type(entity)
         if kind in _ANNOUNCED:
             self._enter(executor, _EXECUTE, time, entity.handle)
-        return HANDLERS[kind](self, self._middleware, entity, time)
+        end = HANDLERS[kind](self, self._middleware, entity, time)
+        if not isinstance(end, int):
+            end = yield from end
+        end += 400 + int(self.scheduler.random() * 2_000)
+        self.keep_cpu(end)
+        time = yield end
+        entity.group.is_busy = False
+        if executor.thread_count > 1 and not entity.group.is_reentrant:
+            executor.wake(time)
+        while later := self.take_cpu(time):
+            time = yield later
+        return time
 
     def _fall_asleep(self, executor: Executor, time: int, until: int | None) -> None:
         random = self.scheduler.random
@@ -150,12 +181,23 @@ class ExecutorThread(Thread):
         self._asleep_since = asleep
         self._wake_at = None
         due = executor.next_wake_up(asleep)
+        if executor.timeout_ns is not None:
+            until = asleep + executor.timeout_ns
+            if not self.process.is_rclcpp:
+                self._emit_timer(time, executor.timeout_ns)
         if until is not None and (due is None or until < due):
             due = until
         if due is not None:
             self.wake(due)
         if random() < _SPURIOUS_WAKE_UP:
             self.wake(asleep + 15 * MICROSECOND)
+
+    def _emit_timer(self, time: int, period: int) -> None:
+        """A wait of rclpy that may time out has a timer, which exists as long as the wait."""
+        memory = self.process.memory
+        handle = memory.allocate()
+        self.emit(self.machine.tracepoints.rcl_timer_init, time, self.context, handle, period)
+        memory.free(handle)
 
     def _enter(self, executor: Executor, state: str, time: int, argument: int = 0) -> None:
         """Emit the event that begins a state, and write it down."""

@@ -276,6 +276,7 @@ class UserCode:
         is_stepwise: other threads must be able to act between its publications.
         is_callback: it runs in a callback that is traced.
         links: what it has to do with caches of its node.
+        first: what it does before anything else, like `deeds`.
     """
 
     work: Work
@@ -285,11 +286,15 @@ class UserCode:
     is_stepwise: bool = False
     is_callback: bool = True
     links: CallbackLinks | None = None
+    first: tuple[Callable[..., Steps], ...] = ()
 
 
 @dataclass(slots=True, eq=False)
 class TimerObject:
-    """A timer as it exists in its process; `due` is when it has to be called next."""
+    """A timer as it exists in its process.
+
+    `due` is when it has to be called next, `reset` when user code will reset it.
+    """
 
     node: str
     handle: int
@@ -298,6 +303,7 @@ class TimerObject:
     code: UserCode
     group: CallbackGroup
     due: int
+    reset: int | None = None
 
     def is_ready(self, time: int) -> bool:
         """Whether it has to be called."""

@@ -86,7 +86,9 @@ def write_publication(
     if instance is None:
         return
     if instance.request_id is not None:
-        truth.link_call.add(instance.request_id, instance.is_response, message.publication_id, None)
+        truth.link_call.add(
+            instance.request_id, instance.is_response, message.publication_id, None, None
+        )
         return
     truth.causal.add(
         instance.callback_instance_id, message.publication_id, hostname, pid, tid,

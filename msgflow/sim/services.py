@@ -48,10 +48,10 @@ class Request:
     taken_ns: int | None = None
     callback_instance_id: int | None = None
     stamp_ns: int | None = None
+    answered_tid: int | None = None
     answered_ns: int | None = None
     received_tid: int | None = None
     received_ns: int | None = None
-    answered_tid: int | None = None
     goal: Goal | None = None
 
 
@@ -74,7 +74,10 @@ class Goal:
 
 @dataclass(slots=True, eq=False)
 class ServiceObject:
-    """A service as it exists in its process; `action` answers requests of an action."""
+    """A service as it exists in its process.
+
+    `waiting` are requests without a response; `action` answers requests of an action.
+    """
 
     network: ServiceNetwork
     process: RunningProcess
@@ -88,8 +91,10 @@ class ServiceObject:
     message: int
     code: UserCode
     is_deferred: bool = False
+    is_answered_later: bool = False
     action: Answer | None = None
-    requests: deque[Request] = field(default_factory=deque)
+    requests: deque[Request | None] = field(default_factory=deque)
+    waiting: deque[Request] = field(default_factory=deque)
 
     def is_ready(self, time: int) -> bool:
         """Whether a request is there."""
@@ -98,9 +103,12 @@ class ServiceObject:
 
 @dataclass(slots=True, eq=False)
 class ClientObject:
-    """A client as it exists in its process; `answered` is the number of the last response taken.
+    """A client as it exists in its process.
 
-    `action` does what follows from a response of an action.
+    Attributes:
+        answered: number of the last response taken.
+        responses: those that have come; None stands for one to another client of the service.
+        action: does what follows from a response of an action.
     """
 
     network: ServiceNetwork
@@ -117,7 +125,7 @@ class ClientObject:
     sequence_number: int = 0
     answered: int = 0
     action: Callable[[Thread, Request, int], int] | None = None
-    responses: deque[Request] = field(default_factory=deque)
+    responses: deque[Request | None] = field(default_factory=deque)
 
     def is_ready(self, time: int) -> bool:
         """Whether a response is there."""
@@ -130,11 +138,16 @@ class ServiceNetwork:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._services: dict[str, ServiceObject] = {}
+        self._clients: dict[str, list[ClientObject]] = {}
         self._requests: list[Request] = []
 
     def add(self, service: ServiceObject) -> None:
         """A service was created."""
         self._services[service.name] = service
+
+    def add_client(self, client: ClientObject) -> None:
+        """A client was created."""
+        self._clients.setdefault(client.name, []).append(client)
 
     def send_request(self, time: int, request: Request) -> None:
         """Send a request; without such a service it is lost."""
@@ -145,17 +158,22 @@ class ServiceNetwork:
             self._scheduler.at(arrival, self._arrive, (service.requests, service.executor, request))
 
     def send_response(self, time: int, service: ServiceObject, request: Request) -> None:
-        """Send a response to the client."""
-        client = request.client
-        arrival = self._arrival(time, service.process, client.process)
-        self._scheduler.at(arrival, self._arrive, (client.responses, client.executor, request))
+        """Send a response: all clients of the service get it, one can take it."""
+        for client in self._clients[service.name]:
+            if client is request.client or not client.process.is_stopped:
+                arrival = self._arrival(time, service.process, client.process)
+                response = request if client is request.client else None
+                delivery = (client.responses, client.executor, response)
+                self._scheduler.at(arrival, self._arrive, delivery)
 
     def finish(self) -> None:
         """Write down what became of each request."""
         for request in self._requests:
             write_request(self._scheduler.truth, request)
 
-    def _arrive(self, time: int, delivery: tuple[deque[Request], Executor, Request]) -> None:
+    def _arrive(
+        self, time: int, delivery: tuple[deque[Request | None], Executor, Request | None]
+    ) -> None:
         queue, executor, request = delivery
         queue.append(request)
         executor.wake(time)
@@ -182,7 +200,7 @@ def call(
     )  # fmt: skip
     if cause is not None and cause.request_id is not None:
         thread.scheduler.truth.link_call.add(
-            cause.request_id, cause.is_response, None, request.request_id
+            cause.request_id, cause.is_response, None, request.request_id, None
         )
     client.network.send_request(sent, request)
     return sent + 2_000 + int(random() * 4_000), request
@@ -194,6 +212,7 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     random, tracepoints, epoch = thread.scheduler.random, machine.tracepoints, machine.epoch
     time += 1_000 + int(random() * 5_000)
     request = service.requests.popleft()
+    assert request is not None
     client = request.client
     thread.emit(
         tracepoints.rmw_take_request, time, thread.context,
@@ -215,7 +234,24 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     else:
         now = turn(thread, request, time, is_response=False)
         end = yield from settle(execute(thread, middleware, service.code, start, now))
+    if service.is_answered_later:
+        service.waiting.append(request)
+        return end
     return respond(thread, service, request, end)
+
+
+def answer(
+    thread: Thread, service: ServiceObject, time: int, cause: CallbackInstance | None
+) -> int:
+    """Send the response that a request waits for, if one does; returns the time after that."""
+    if not service.waiting:
+        return time
+    request = service.waiting.popleft()
+    if cause is not None and cause.request_id is not None:
+        thread.scheduler.truth.link_call.add(
+            cause.request_id, cause.is_response, None, None, request.request_id
+        )
+    return respond(thread, service, request, time)
 
 
 def respond(thread: Thread, service: ServiceObject, request: Request, time: int) -> int:
@@ -236,10 +272,19 @@ def respond(thread: Thread, service: ServiceObject, request: Request, time: int)
 
 
 def run_client(thread: Thread, middleware: Middleware, client: ClientObject, time: int) -> Run:
-    """Take a response and do what is to be done with it, in no callback that is traced."""
+    """Take a response and do what is to be done with it, in no callback that is traced.
+
+    Nothing is there to take if it was one to another client.
+    """
     random, machine = thread.scheduler.random, thread.machine
     time += 1_000 + int(random() * 5_000)
     request = client.responses.popleft()
+    if request is None:
+        thread.emit(
+            machine.tracepoints.rmw_take_response, time, thread.context,
+            client.rmw_handle, client.message, client.message, 0, 0,
+        )  # fmt: skip
+        return time
     thread.emit(
         machine.tracepoints.rmw_take_response, time, thread.context,
         client.rmw_handle, client.message, request.sequence_number, request.stamp_ns, 1,

@@ -20,7 +20,7 @@ from msgflow.sim.user_thread import UserThread
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from msgflow.sim.machine import RunningProcess
+    from msgflow.sim.machine import RunningProcess, Steps
     from msgflow.sim.objects import PublisherObject
     from msgflow.sim.services import ServiceNetwork
     from msgflow.sim.transport import Middleware
@@ -76,14 +76,20 @@ class Startup:
         self._scheduler.at(time, self.begin)
 
     def end(self, time: int, _: None = None) -> None:
-        """The process ends at `time`: its threads do as soon as they have executed, or at once."""
+        """The process ends at `time`: its threads do as soon as they have executed, or at once.
+
+        Its middleware says goodbye, unless it is killed.
+        """
         self._process.is_stopped = True
         if self._listener is not None:
             self._discovery.leave(self._listener)
         self._middleware.end_process(self._process, time)
         self._user_thread.cut()
         for thread in self._process.threads:
-            thread.stop()
+            if thread is self.thread and not self._process.description.is_killed:
+                self.thread.shut_down(time)
+            else:
+                thread.stop()
 
     def _spin(self, time: int) -> None:
         """Let all threads of all executors spin; the first one is the main thread."""
@@ -95,13 +101,31 @@ class Startup:
                 continue
             for _ in range(description.thread_count):
                 thread = self.thread
+                steps = self._main(executor, description, time)
                 if number:
                     tid = self._process.description.tid(number)
                     thread = ExecutorThread(self._process, tid, self._middleware)
-                thread.begin(time, thread.spin(executor, time))
+                    steps = thread.spin(executor, time)
+                thread.begin(time, steps)
                 number += 1
                 time += 15 * MICROSECOND
         self._user_thread.begin_if_needed(time)
+
+    def _main(self, executor: Executor, description: system.Executor, time: int) -> Steps:
+        """What the main thread does: it spins or polls, and then ROS is shut down."""
+        thread, creator = self.thread, self._creator
+        if description.polled_ns is None:
+            time = yield from thread.spin(executor, time)
+        else:
+            time = yield from thread.poll(executor, time, description.polled_ns)
+        for _ in self._process.description.nodes:
+            time = yield time
+            while later := thread.take_cpu(time):
+                time = yield later
+            creator.time = time
+            creator.announce()
+            time = thread.hold(creator.time)
+        return time
 
     def _sequence(self) -> Iterator[bool]:
         process, creator = self._process, self._creator

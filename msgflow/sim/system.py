@@ -13,6 +13,7 @@ from msgflow.sim.entity import (
     Action,
     ActionClient,
     ActionServer,
+    Answer,
     Call,
     Client,
     MessageLink,
@@ -54,10 +55,19 @@ class Executor:
             events), 'wait_set' (user code that waits and takes by itself: neither executor events
             nor callbacks), 'nested' (only callbacks spin it, which wait for something).
         thread_count: its threads; the first one of the first executor is the main thread.
+        polled_ns: the main thread executes what is ready, and then does something else for so long
+            (spin_some); None: it spins.
+        timeout_ns: how long a wait lasts at most (spin_once in a loop); None: for ever. For each,
+            rclpy makes a timer.
+        waits_busily: what is ready ends a wait although its group is busy, so that it may not be
+            executed.
     """
 
     kind: str = "single_threaded"
     thread_count: int = 1
+    polled_ns: int | None = None
+    timeout_ns: int | None = None
+    waits_busily: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,6 +292,7 @@ def _check_topics(node: Node) -> None:
         *node.services,
     )
     actions = _actions(node)
+    actions += [action for each in node.subscriptions for action in each.first]
     used = {topic for each in (*callbacks, *node.clients) for topic in each.publishes}
     used |= {action.topic for action in actions if isinstance(action, Publish)}
     if missing := sorted(used - own):
@@ -290,6 +301,10 @@ def _check_topics(node: Node) -> None:
     calls = {action.service for action in actions if isinstance(action, Call)}
     if missing := sorted(calls - clients):
         raise UsageError(f"no client of {', '.join(missing)} — node {node.full_name}")
+    services = {service.name for service in node.services if service.is_answered_later}
+    answers = {action.service for action in actions if isinstance(action, Answer)}
+    if missing := sorted(answers ^ services):
+        raise UsageError(f"a service that is answered later has one answer — {missing[0]}")
     known = {client.action for client in node.action_clients}
     goals = {action.action for action in actions if isinstance(action, SendGoal)}
     if missing := sorted(goals - known):

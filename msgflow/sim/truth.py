@@ -95,7 +95,8 @@ _SCHEMAS: Mapping[str, pa.Schema] = {
     "goal": _schema(goal_id=_ID, is_accepted=_FLAG, result_request_id=_ID),
     "goal_message": _schema(goal_id=_ID, publication_id=_ID),
     "link_call": _schema(
-        request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID
+        request_id=_ID, is_response=_FLAG, publication_id=_ID, sent_request_id=_ID,
+        answered_request_id=_ID,
     ),
     "user_event": _schema(
         user_event_id=_ID, host=_TEXT, pid=_NUMBER, tid=_NUMBER, name=_TEXT, at_ns=_TIME,

@@ -32,9 +32,27 @@ def execute(
     instance: CallbackInstance | None,
 ) -> Run:
     """Run user code: compute, publish, do, log; returns the time at which it ends."""
+    if code.first:
+        return _execute_first(thread, middleware, code, start, instance)
     if code.links is not None and instance is not None:
         return _execute_linked(thread, middleware, code, code.links, start, instance)
     return _execute(thread, middleware, code, start, instance)
+
+
+def _execute_first(
+    thread: Thread,
+    middleware: Middleware,
+    code: UserCode,
+    start: int,
+    instance: CallbackInstance | None,
+) -> Steps:
+    """Run user code that does something before it looks at its message."""
+    time = start + 200
+    for deed in code.first:
+        time = yield thread.hold(time)
+        time = yield from deed(thread, middleware, time, instance)
+    rest = replace(code, first=())
+    return (yield from settle(execute(thread, middleware, rest, time, instance)))
 
 
 def _execute_linked(

@@ -1,8 +1,7 @@
 -- name: derive.unseen_creation
 -- description: Processes with objects that were used, but were not seen to be created: how many,
---     their kinds, and whether events of the time when the process was created may have been
---     lost. Objects of ROS itself do not count: /rosout is published on handles never
---     initialised.
+--     their kinds, and whether the events of their creation may have been lost. Objects of ROS
+--     itself do not count: /rosout is published on handles never initialised.
 -- grain: one row per such process
 WITH object AS (
     SELECT process_id, 'nodes' AS kind, is_inferred FROM store.node

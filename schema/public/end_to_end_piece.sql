@@ -19,11 +19,12 @@
 --     publishes or calls), 'cache' (from the end of the callback to the callback instance that
 --     publishes for it),
 --     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'publish_to_take' (from its end to the take: the network, an
---     idle executor or a busy one, see main.executor_wait), 'take_to_callback', 'request_to_take'
---     (from the sending of a request), 'service' (from the start of the service callback to what
---     it publishes or calls, or to the sending of the response), 'response_to_take' (from there on;
---     what the client does then is a 'callback' again, from the take on)
+--     (publishing, layer not known), 'publish_to_take' (from the last layer to the take: writing
+--     the message, the network, an idle executor or a busy one, see main.executor_wait),
+--     'take_to_callback', 'request_to_take' (from the sending of a request), 'service' (from the
+--     start of the service callback to what it publishes or calls, or to the sending of the
+--     response), 'response_to_take' (from there on; what the client does then is a 'callback'
+--     again, from the take on)
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns

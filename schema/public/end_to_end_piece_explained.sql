@@ -25,11 +25,12 @@
 --     publishes or calls), 'cache' (from the end of the callback to the callback instance that
 --     publishes for it),
 --     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'publish_to_take' (from its end to the take: the network, an
---     idle executor or a busy one, see main.executor_wait), 'take_to_callback', 'request_to_take'
---     (from the sending of a request), 'service' (from the start of the service callback to what
---     it publishes or calls, or to the sending of the response), 'response_to_take' (from there on;
---     what the client does then is a 'callback' again, from the take on)
+--     (publishing, layer not known), 'publish_to_take' (from the last layer to the take: writing
+--     the message, the network, an idle executor or a busy one, see main.executor_wait),
+--     'take_to_callback', 'request_to_take' (from the sending of a request), 'service' (from the
+--     start of the service callback to what it publishes or calls, or to the sending of the
+--     response), 'response_to_take' (from there on; what the client does then is a 'callback'
+--     again, from the take on)
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns
@@ -231,9 +232,13 @@ message AS (
         i.callback_id, i.busy_min_ns, i.busy_max_ns,
         b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns, b.end_ns,
         least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) AS layer_ns,
+        -- Nothing shows when the last one ends, unless it has a later event itself: the message is
+        -- written behind it.
         (b.intra_ns IS NOT NULL)::INTEGER + (b.rclcpp_ns IS NOT NULL)::INTEGER
         + (b.rcl_ns IS NOT NULL)::INTEGER + (b.rmw_ns IS NOT NULL)::INTEGER
-        + (b.dds_ns IS NOT NULL)::INTEGER AS layer_count,
+        + (b.dds_ns IS NOT NULL)::INTEGER - coalesce(
+            greatest(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) >= b.end_ns, false
+        )::INTEGER AS layer_count,
         h.hop > 1 OR f.root_kind = 'callback_instance' AS is_entered,
         CASE WHEN h.hop = 1 THEN f.root_ns ELSE coalesce(p.start_ns, u.taken_ns) END AS entered_ns,
         CASE WHEN h.hop = 1 THEN f.root_id ELSE p.callback_instance_id END AS entered_id,
@@ -304,7 +309,7 @@ every_part AS (
                 CASE WHEN rmw_ns > at_ns OR rmw_ns = at_ns AND slot < 4 THEN rmw_ns END,
                 CASE WHEN dds_ns > at_ns OR dds_ns = at_ns AND slot < 5 THEN dds_ns END
             ),
-            end_ns
+            CASE WHEN end_ns > at_ns THEN end_ns END
         ) AS to_ns,
         NULL::BIGINT AS callback_instance_id,
         NULL::BIGINT AS callback_id,
@@ -312,7 +317,7 @@ every_part AS (
         NULL::BIGINT AS busy_max_ns,
         publication_id
     FROM layer
-    WHERE at_ns IS NOT NULL
+    WHERE to_ns IS NOT NULL
     UNION ALL
     SELECT
         run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,

@@ -226,6 +226,17 @@ def test_what_may_have_been_lost_when_a_process_was_created(
     assert found == [(1,)] * is_lossy
 
 
+@pytest.mark.parametrize(("kind", "is_lossy"), [("loss", True), ("pause", False)])
+def test_what_began_in_the_recording_can_only_be_lost(
+    con: duckdb.DuckDBPyConnection, kind: str, *, is_lossy: bool
+) -> None:
+    for statement in (SEEN.format(150), CREATED.format("node", 200), CALLED.format(300, 400)):
+        con.execute(statement)
+    con.execute(GAP.format(kind, 500, 600))
+    found = con.execute("SELECT process_id FROM derive.lossy_start").fetchall()
+    assert found == [(1,)] * is_lossy
+
+
 COPIES = """
 CREATE SCHEMA derive;
 CREATE SCHEMA store;

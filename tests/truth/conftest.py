@@ -21,6 +21,7 @@ _LENGTHS = {
     "restarts": 0.9,
     "container_restarts": 0.9,
     "services": 0.4,
+    "timers": 0.6,
     "mixed_intra_process": 0.5,
     "autoware": 0.2,
     "autoware_two_threads": 0.2,

@@ -21,7 +21,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "truth.py"
 @pytest.fixture(scope="module")
 def simulation(tmp_path_factory):
     directory = tmp_path_factory.mktemp("scoring")
-    recording = Recording(lost_event_share=0.3)
+    recording = Recording(lost_event_share=0.2)
     return simulate("two_hosts", directory / "trace", factor=0.2, recording=recording)
 
 

@@ -7,6 +7,7 @@ from msgflow.sim.entity import (
     SECOND,
     MessageLink,
     Publisher,
+    Spin,
     Subscription,
     Timer,
     Work,
@@ -59,7 +60,11 @@ def partial_sync() -> Scenario:
                 "two_threads", "alpha", 2001, (_both_kinds(),), start_ns=70 * MILLISECOND,
                 executors=(Executor("multi_threaded", 2),),
             ),
-            _sink((*nodes, _both_kinds())),
+            Process(
+                "spinning", "alpha", 2101, (_spinning(),), start_ns=80 * MILLISECOND,
+                executors=(Executor(), Executor("nested")),
+            ),
+            _sink((*nodes, _both_kinds(), _spinning())),
         ),
         duration_ns=4 * SECOND,
         layout="rolling",
@@ -122,6 +127,22 @@ def reentrant() -> Scenario:
         duration_ns=4 * SECOND,
         layout="rolling",
     )  # fmt: skip
+
+
+def _spinning() -> Node:
+    """The callback of one input waits for the other, which is received nested in it."""
+    topics = _outputs("spinning", 1)
+    spin = Spin(1, 9 * MILLISECOND)
+    return Node(
+        "spinning",
+        groups=(Group("within", executor=1),),
+        publishers=tuple(Publisher(topic) for topic in topics),
+        subscriptions=(
+            Subscription("/c", topics, first=(spin,)),
+            Subscription("/b", topics, group="within"),
+        ),
+        links=(MessageLink("partial_sync", ("/c", "/b"), topics),),
+    )
 
 
 def _sources(periods_ms: tuple[int, ...], topics: tuple[str, ...] = _INPUTS) -> tuple[Process, ...]:

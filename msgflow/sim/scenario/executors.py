@@ -1,4 +1,4 @@
-"""Executors: many threads, callback groups, several in one process, with and without events."""
+"""Executors: many threads, callback groups, several in a process, polled ones, odd timers."""
 
 from __future__ import annotations
 
@@ -81,4 +81,93 @@ def executors() -> Scenario:
             Process("sink", "alpha", 1301, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=4 * SECOND,
+    )  # fmt: skip
+
+
+def busy_waiting() -> Scenario:
+    """Callbacks that are ready wake an executor that may not run them yet; another one sleeps."""
+    crowded = Node(
+        "crowded",
+        subscriptions=(Subscription("/fast"), Subscription("/slow", work=Work(8 * MILLISECOND))),
+        timers=(Timer(15 * MILLISECOND, work=Work(MILLISECOND)),),
+    )
+    return Scenario(
+        name="busy_waiting",
+        description="Two multi-threaded executors, one of which waits busily.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("source", "alpha", 1101, (_SOURCE,)),
+            Process(
+                "crowded", "alpha", 1201, (crowded,), start_ns=3 * MILLISECOND,
+                executors=(Executor("multi_threaded", 2, waits_busily=True),),
+            ),
+            Process(
+                "worker", "alpha", 1301, (_WORKER,), start_ns=5 * MILLISECOND,
+                executors=(Executor("multi_threaded", 4),),
+            ),
+            Process("sink", "alpha", 1401, (_SINK,), start_ns=7 * MILLISECOND),
+        ),
+        duration_ns=SECOND,
+    )  # fmt: skip
+
+
+def polled() -> Scenario:
+    """Loops that execute what is ready and then do something else; one that waits in between."""
+    relay = Node(
+        "relay",
+        publishers=(Publisher("/seen"),),
+        subscriptions=(Subscription("/fast", ("/seen",)),),
+        timers=(Timer(40 * MILLISECOND),),
+    )
+    checker = Node(
+        "checker",
+        publishers=(Publisher("/checked"),),
+        subscriptions=(Subscription("/slow", ("/checked",)),),
+    )
+    return Scenario(
+        name="polled",
+        description="Loops that poll their executor, and one that waits in it for a while.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("source", "alpha", 1101, (_SOURCE,)),
+            Process(
+                "relay", "alpha", 1201, (relay,), start_ns=3 * MILLISECOND,
+                executors=(Executor(polled_ns=15 * MILLISECOND),),
+            ),
+            Process(
+                "checker", "alpha", 1301, (checker,), start_ns=5 * MILLISECOND,
+                executors=(Executor(timeout_ns=12 * MILLISECOND),),
+            ),
+            Process("sink", "alpha", 1401, (_SINK,), start_ns=7 * MILLISECOND),
+        ),
+        duration_ns=2 * SECOND,
+    )  # fmt: skip
+
+
+def timers() -> Scenario:
+    """Timers on and off the grid of their creation; one is kept waiting by another callback."""
+    node = Node(
+        "node",
+        timers=(
+            Timer(100 * MILLISECOND, reset_ns=540 * MILLISECOND),
+            Timer(70 * MILLISECOND, rate=2.0),
+            Timer(50 * MILLISECOND),
+        ),
+    )
+    late = Node(
+        "late",
+        timers=(
+            Timer(20 * MILLISECOND, work=Work(15 * MILLISECOND, MILLISECOND)),
+            Timer(60 * MILLISECOND),
+        ),
+    )
+    return Scenario(
+        name="timers",
+        description="Timers: one is reset, one follows a clock that runs twice as fast.",
+        hosts=(Host("alpha"),),
+        processes=(
+            Process("node", "alpha", 1101, (node,)),
+            Process("late", "alpha", 1201, (late,), start_ns=3 * MILLISECOND),
+        ),
+        duration_ns=5 * SECOND,
     )  # fmt: skip

@@ -41,7 +41,7 @@ def python() -> Scenario:
             ),
             Process(
                 "python3", "alpha", 1301, (listener,), start_ns=7 * MILLISECOND,
-                client_library="rclpy",
+                client_library="rclpy", executors=(Executor(timeout_ns=5 * MILLISECOND),),
             ),
             Process("listener", "alpha", 1401, (listener,), start_ns=11 * MILLISECOND),
         ),
@@ -123,7 +123,9 @@ def python_timers() -> Scenario:
                     "python3", "alpha", 1201 + 100 * number, (node,),
                     start_ns=(3 + 4 * number) * MILLISECOND, client_library="rclpy",
                     executors=(
-                        Executor("multi_threaded", 4) if node is threads else Executor(),
+                        Executor("multi_threaded", 4) if node is threads
+                        # Each wait makes a timer.
+                        else Executor(timeout_ns=10 * MILLISECOND),
                     ),
                 )
                 for number, node in enumerate(nodes)

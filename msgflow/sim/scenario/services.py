@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgflow.sim.entity import (
     MILLISECOND,
     SECOND,
+    Answer,
     Call,
     Client,
     Publisher,
@@ -26,9 +27,10 @@ def calls() -> Scenario:
             Client("/accept", ("/asked",), does=(Call("/finish"),)),
             Client("/finish", ("/result",)),
             Client("/sum", ("/result",)),
+            Client("/total", ("/result",)),
         ),
         subscriptions=(Subscription("/sensor", does=(Call("/accept"),)),),
-        timers=(Timer(30 * MILLISECOND, ("/tick",), does=(Call("/sum"),)),),
+        timers=(Timer(30 * MILLISECOND, ("/tick",), does=(Call("/sum"), Call("/total"))),),
     )
     acting = Node(
         "acting",
@@ -39,6 +41,14 @@ def calls() -> Scenario:
             Service("/finish", ("/status",), does=(Call("/inner"),), is_action=True),
             Service("/sum", ("/summed",)),
             Service("/inner"),
+        ),
+    )
+    # It answers when another service has answered it, and hears what that answers to others.
+    asked = Node(
+        "asked",
+        clients=(Client("/inner", does=(Answer("/total"),)),),
+        services=(
+            Service("/total", does=(Call("/inner"),), is_deferred=True, is_answered_later=True),
         ),
     )
     source = Node(
@@ -59,6 +69,7 @@ def calls() -> Scenario:
         processes=(
             Process("acting", "alpha", 1101, (acting,), executors=(Executor("multi_threaded", 2),)),
             Process("sink", "alpha", 1201, (sink,), start_ns=3 * MILLISECOND),
+            Process("asked", "alpha", 1501, (asked,), start_ns=40 * MILLISECOND),
             Process("asking", "alpha", 1301, (asking,), start_ns=60 * MILLISECOND),
             Process("source", "alpha", 1401, (source,), start_ns=80 * MILLISECOND),
         ),

@@ -3,7 +3,8 @@
 -- description: The process was seen to create nodes and to publish through rcl, and has no event
 --     of rclcpp, although these were enabled. So there are no callbacks, durations or executor
 --     states of it. A message is taken to have caused what its thread sent before the next take:
---     what a timer of the process sent in that time may look the same (doubtful_answer).
+--     what a timer of the process sent in that time may look the same (doubtful_answer). Its timers
+--     include those that rclpy makes for waits with a timeout.
 -- cause: It is written in Python (rclpy) or uses another client library. These have no tracepoints
 --     of their own.
 -- cure: None for this recording. Measure callbacks of such nodes in the nodes themselves.
@@ -34,7 +35,7 @@ rclcpp AS (
 SELECT
     l.label AS subject,
     s.number AS count,
-    printf('%d publications and %d timers, and no callback', s.number, coalesce(t.number, 0))
+    printf('publications: %d, timers: %d, callbacks: none', s.number, coalesce(t.number, 0))
         AS detail
 FROM sent AS s
 -- One of rclcpp that was there before the recording may only have logged.

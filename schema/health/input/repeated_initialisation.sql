@@ -1,7 +1,8 @@
 -- name: finding.repeated_initialisation
 -- title: Objects that were initialised again
 -- description: Publishers and subscriptions were initialised on the handle of another one of the
---     same topic. The later one counts from then on.
+--     same topic. The later one counts from then on. Not counted: publishers of /rosout, all of
+--     which rcl initialises at one address.
 -- cause: The object was destroyed and created again, or its creation was traced twice.
 -- cure: None needed.
 -- grain: one row, if there are any
@@ -25,5 +26,5 @@ SELECT
     || 'created again, or traced twice; the later one counts from then on: '
     || string_agg(DISTINCT topic_name, ', ' ORDER BY topic_name) AS detail
 FROM initialised
-WHERE topic_name = previous_topic
+WHERE topic_name = previous_topic AND topic_name <> '/rosout'
 HAVING count(*) > 0

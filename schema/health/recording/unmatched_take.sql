@@ -2,7 +2,8 @@
 -- title: Messages received whose publication is not known
 -- description: Messages were received whose publication is not known. Their flows begin at the
 --     take.
--- cause: The publisher is not traced, events of it were lost, or the message carries no stamp.
+-- cause: The publisher is not traced, events of it were lost, or the message carries no stamp. Of
+--     messages that are matched by time (Humble, Iron), several publications may be meant.
 -- cure: msgflow query unmatched gives the reason of each. The findings publisher_not_traced,
 --     trace_ends_early and message_without_stamp say what can be done.
 -- grain: one row per trace, for messages with a stamp and without

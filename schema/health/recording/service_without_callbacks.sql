@@ -1,0 +1,35 @@
+-- name: finding.service_without_callbacks
+-- title: Services whose callbacks have no events
+-- description: The process took requests of these services and ran none of its callbacks with them,
+--     as far as the trace shows. So these callbacks have no duration and no wait, and do not count
+--     as use of the executor. What they publish and send is known all the same (link_call).
+-- cause: They belong to an action: rclcpp_action runs its callbacks without events.
+-- cure: None. Time them in the node, with a tracepoint of your own.
+-- grain: one row per process that runs other callbacks
+-- severity: info
+-- when: store.request
+WITH served AS (
+    SELECT process_id, service_id, count(*) AS number
+    FROM (
+        SELECT s.process_id, q.service_id, q.callback_instance_id
+        FROM store.request AS q
+        JOIN store.service AS s ON q.service_id = s.service_id
+        WHERE q.taken_ns IS NOT NULL
+    )
+    GROUP BY process_id, service_id
+    HAVING count(callback_instance_id) = 0
+)
+SELECT
+    p.run_id,
+    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    sum(v.number)::BIGINT AS count,
+    printf(
+        '%s of %s', derive.counted(sum(v.number), 'request'),
+        string_agg(s.service_name, ', ' ORDER BY s.service_name)
+    ) AS detail
+FROM served AS v
+JOIN store.service AS s ON v.service_id = s.service_id
+JOIN main.process AS p ON v.process_id = p.process_id
+JOIN main.host AS h ON p.host_id = h.host_id
+WHERE v.process_id IN (SELECT process_id FROM store.callback)
+GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname
